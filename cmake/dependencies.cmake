@@ -1,0 +1,31 @@
+# Everything Drench links, by Debian 12 name in README.md. TBB and OpenEXR are looked for with CONFIG
+# before OpenVDB, whose own modules of the same names would shadow them.
+find_package(Threads REQUIRED)
+find_package(TBB CONFIG REQUIRED)
+find_package(Imath CONFIG REQUIRED)
+find_package(OpenEXR CONFIG REQUIRED)
+find_package(PNG REQUIRED)
+find_package(JPEG REQUIRED)
+find_package(fmt CONFIG REQUIRED)
+find_package(spdlog CONFIG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+find_package(GTest CONFIG REQUIRED)
+find_package(embree 4 CONFIG QUIET)
+if(NOT embree_FOUND)
+  find_package(embree 3 CONFIG REQUIRED)
+endif()
+
+# CLI11, toml++ and xxHash are header-only and found by their headers.
+foreach(header CLI/CLI.hpp toml++/toml.h xxhash.h)
+  string(MAKE_C_IDENTIFIER "DRENCH_${header}" variable)
+  find_path(${variable} ${header} REQUIRED)
+endforeach()
+
+# Debian ships no OpenVDBConfig and its FindOpenVDB asks for Boost libraries that are not needed:
+# the library and its headers are enough.
+find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)
+find_library(OPENVDB_LIBRARY openvdb REQUIRED)
+add_library(OpenVDB::openvdb UNKNOWN IMPORTED)
+set_target_properties(OpenVDB::openvdb PROPERTIES
+  IMPORTED_LOCATION ${OPENVDB_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${OPENVDB_INCLUDE})
+target_link_libraries(OpenVDB::openvdb INTERFACE Imath::Imath TBB::tbb)

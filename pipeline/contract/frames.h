@@ -1,0 +1,39 @@
+#pragma once
+// What one stage hands the next, in memory. On disk: particles_file.h (VDB) and mesh_file.h (PLY).
+
+#include <Imath/ImathVec.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace drench {
+
+/// Fluid particles of one frame. All columns have the same length n >= 0, or are empty where noted.
+struct ParticleFrame {
+  std::vector<Imath::V3f> position;  // m, world
+  std::vector<Imath::V3f> velocity;  // m/s
+  std::vector<float> density;        // kg/m^3, or empty
+  std::vector<uint32_t> id;          // unique over the shot, or empty
+  float spacing = 0;                 // m, a; a particle's mass is rest_density a^3
+  float rest_density = 1000;         // kg/m^3
+};
+
+/// A triangle mesh: the fluid's surface (closed, outward) or a sheet of cloth (open).
+/// Vertex columns have the length of `position`, or are empty where noted.
+struct TriangleMesh {
+  std::vector<Imath::V3f> position;        // m, world
+  std::vector<Imath::V3f> velocity;        // m/s
+  std::vector<Imath::V3f> normal;          // unit, or empty
+  std::vector<Imath::V2f> uv;              // cloth: texture and rest plane, or empty
+  std::vector<Imath::V3f> rest_position;   // cloth: m, at rest, or empty
+  std::vector<Imath::V3<uint32_t>> triangle;  // counter-clockwise seen from outside
+};
+
+/// One sheet of cloth of one frame.
+struct ClothFrame {
+  std::string name;
+  TriangleMesh mesh;
+};
+
+}  // namespace drench

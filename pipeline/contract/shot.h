@@ -1,0 +1,205 @@
+#pragma once
+// A shot as the stages see it: every value checked, every default filled in. SI units; colours are
+// linear ACEScg. Read from TOML by shot_file.h; the parameter table there is the one list of keys.
+
+#include <Imath/ImathVec.h>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace drench {
+
+using Imath::V2i;
+using Imath::V3d;
+using Imath::V3f;
+
+enum class Interpolation { linear, smooth, step };
+
+/// A value over frames; one key is a constant. Frames are film frames and may be fractional.
+template <class T>
+struct Animated {
+  std::vector<std::pair<double, T>> keys;  // sorted by frame, at least one
+  Interpolation interpolation = Interpolation::linear;
+
+  Animated(T constant = T{}) : keys{{0.0, constant}} {}
+
+  T at(double frame) const {
+    if (frame <= keys.front().first) return keys.front().second;
+    if (frame >= keys.back().first) return keys.back().second;
+    size_t k = 1;
+    while (keys[k].first <= frame) ++k;
+    double t = (frame - keys[k - 1].first) / (keys[k].first - keys[k - 1].first);
+    if (interpolation == Interpolation::step) t = 0;
+    if (interpolation == Interpolation::smooth) t = t * t * (3 - 2 * t);
+    return keys[k - 1].second * (1 - t) + keys[k].second * t;
+  }
+};
+
+/// Frames of the shot. Frame f stands at t = (f - first) / fps; the first is the initial state.
+struct Timeline {
+  int first = 1001, last = 1048;  // inclusive
+  double fps = 24;
+};
+
+enum class Axis { open, walls };  // walls: a plane at both ends of the domain
+
+struct Domain {
+  V3d min{-1, 0, -1}, max{1, 2, 1};  // m; walls stand on these planes
+  std::array<Axis, 3> axis{Axis::walls, Axis::walls, Axis::walls};
+};
+
+struct FluidBox {  // a lattice of round((max-min)/spacing) particles a side
+  V3d min, max, velocity{0, 0, 0};
+};
+struct FluidSphere {
+  V3d center;
+  double radius = 0;
+  V3d velocity{0, 0, 0};
+};
+struct FluidEmitter {  // a round inlet; particles leave as lattice layers
+  V3d center, direction{0, -1, 0};
+  double radius = 0, speed = 0;  // m, m/s
+  double start = 0, stop = 1e9;  // s
+};
+struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kept apart
+  V3d min, max, velocity{0, 0, 0};
+  double radius = 0;  // m
+  int count = 0;      // drops
+  int particles = 0;  // if > 0: exactly so many particles in all, lattice balls truncated by radius
+};
+
+struct Fluid {
+  double spacing = 0.01;             // m, a
+  double support_ratio = 2;          // support radius / spacing
+  double rest_density = 1000;        // kg/m^3
+  double kinematic_viscosity = 1e-6; // m^2/s
+  double artificial_viscosity = 0.05;  // alpha of Monaghan 1992, dimensionless; 0 is none
+  double sound_speed = 0;            // m/s; 0: ten times the largest speed expected
+  std::string material = "water";
+  std::vector<FluidBox> box;
+  std::vector<FluidSphere> sphere;
+  std::vector<FluidEmitter> emitter;
+  std::vector<FluidDrops> drops;
+  bool present() const { return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty()); }
+};
+
+struct ClothPin {  // vertices held where they start; exactly one of the two forms is given
+  std::vector<uint32_t> vertices;
+  std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
+};
+
+struct Cloth {
+  std::string name = "cloth";
+  // A grid (mesh_file empty): corner + i/nu u + j/nv v, with both diagonals as springs.
+  V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
+  V2i cells{64, 64};
+  std::filesystem::path mesh_file;  // PLY or OBJ triangles, absolute after reading
+  std::vector<ClothPin> pin;
+  V3d velocity{0, 0, 0};        // m/s at the start
+  double areal_density = 0.2;   // kg/m^2
+  double adjacent_stiffness = 400;  // N/m, the 2-D modulus k_adj
+  double diagonal_stiffness = 200;  // N/m, k_diag; isotropic when k_adj = 2 k_diag
+  double damping = 0.5;         // 1/s, rate of eq (3): d = exp(-damping dt)
+  double spring_damping = 0.02; // fraction of critical, along each spring; momentum is kept
+  double thickness = 0.001;     // m
+  std::string material = "cotton";
+};
+
+enum class CouplingScheme { exact, paper };  // exact: mended; paper: Harada et al. 2007 as published
+
+struct Coupling {
+  CouplingScheme scheme = CouplingScheme::exact;
+};
+
+struct SurfaceSettings {
+  double voxel = 0.5;       // voxel edge / spacing
+  double support = 2.5;     // kernel support / spacing
+  double iso_value = 0.45;  // of the colour field
+  int smoothing = 10;       // passes on the mesh, volume kept
+  bool level_set = false;   // also write fluid.####.vdb
+  double memory_gib = 8;    // refuse grids that would need more
+};
+
+/// A keyframed thin-lens camera, looking along -Z of its own frame.
+struct Camera {
+  Animated<V3d> position{V3d(0, 1, 3)}, target{V3d(0, 0.5, 0)};  // m
+  Animated<double> fov_deg{40.0};         // horizontal
+  Animated<double> focus_distance{0.0};   // m; 0: distance to target
+  Animated<double> lens_radius{0.0};      // m; 0: pinhole
+  V3d up{0, 1, 0};
+  double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
+};
+
+enum class LightType { rectangle, sphere, sun, environment };
+
+struct Light {
+  LightType type = LightType::rectangle;
+  std::string name = "light";
+  V3f radiance{1, 1, 1};       // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
+  V3d center{0, 3, 0};         // rectangle, sphere, m
+  V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
+  double radius = 0.1;         // sphere, m
+  V3d direction{0, -1, 0};     // sun: the way its light travels
+  double angle_deg = 0.53;     // sun: apparent diameter
+  std::filesystem::path map;   // environment: latitude-longitude EXR; empty: constant
+  double rotation_deg = 0;     // environment, about Y
+};
+
+enum class MaterialType { dielectric, cloth, diffuse };
+
+struct Material {
+  std::string name;
+  MaterialType type = MaterialType::diffuse;
+  V3f reflectance{0.5f, 0.5f, 0.5f};    // diffuse, cloth
+  V3f transmittance{0, 0, 0};           // cloth: diffuse transmission; reflectance + it <= 1
+  double ior = 1.333;                   // dielectric
+  V3f absorption{0, 0, 0};              // dielectric, 1/m
+  std::filesystem::path texture;        // diffuse, cloth: PNG, JPEG or EXR, multiplies reflectance
+  bool checker = false;                 // diffuse: built-in checker of checker_size
+  double checker_size = 0.1;            // m
+};
+
+/// A horizontal plane that the renderer draws under the scene.
+struct Ground {
+  bool present = false;
+  double height = 0;      // m
+  double half_size = 50;  // m, square around center
+  V3d center{0, 0, 0};    // m; y is unused
+  std::string material = "ground";
+};
+
+struct RenderSettings {
+  int width = 960, height = 540;  // pixels
+  int samples = 64;               // camera samples a pixel
+  int depth = 8;                  // diffuse bounces; specular ones end by roulette
+  bool motion_blur = true;
+  uint32_t seed = 1;
+};
+
+/// A whole shot.
+struct Shot {
+  std::string name;            // file stem
+  std::filesystem::path file;  // as given
+  Timeline timeline;
+  double preroll = 0;  // s simulated before the first frame
+  uint32_t seed = 1;
+  V3d gravity{0, -9.81, 0};  // m/s^2
+  double time_step = 0;      // s; 0: adaptive. Fixed steps above the stable one are refused
+  Domain domain;
+  Fluid fluid;
+  std::vector<Cloth> cloth;
+  Coupling coupling;
+  SurfaceSettings surface;
+  Camera camera;
+  std::vector<Light> light;
+  std::vector<Material> material;  // built-in water, cotton, ground unless redefined
+  Ground ground;
+  RenderSettings render;
+};
+
+}  // namespace drench

@@ -1,0 +1,51 @@
+#pragma once
+// Meshes + camera + lights -> film -> EXR.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/frames.h"
+#include "pipeline/contract/shot.h"
+
+namespace drench {
+
+/// The moving geometry of one frame. Blurred from stored velocity: x + t v / fps over the shutter.
+struct FrameGeometry {
+  TriangleMesh fluid;             // closed; material shot.fluid.material; may be empty
+  std::vector<ClothFrame> cloth;  // material of the shot's cloth of the same name
+};
+
+/// One rendered frame: beauty in linear ACEScg with alpha, row-major from the top left.
+struct Film {
+  int width = 0, height = 0;
+  std::vector<float> rgba;  // 4 x width x height
+};
+
+struct RenderStats {
+  uint64_t camera_samples = 0, rays = 0;
+  double cpu_s = 0;  // of the whole process during the call
+};
+
+/// Path-traces one frame. The same bits for any thread count and tile order.
+/// @param progress  called with the finished share 0..1; may throw to stop.
+/// @throws Error for a map or texture that cannot be read, or a light or camera without extent.
+Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, RenderStats* stats = nullptr,
+                  const std::function<void(double)>& progress = {});
+
+/// Half RGBA, ZIP, chromaticities of ACEScg, and the given attributes as strings ("shot", "frame",
+/// "seed", "samples", "version", "key.*"); no times or dates, so that equal inputs give equal files.
+WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
+                      const std::vector<std::pair<std::string, std::string>>& attributes);
+/// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.
+Film read_exr(const std::filesystem::path& path);
+
+/// Display-referred 8-bit sRGB of a film through the built-in view transform; 3 x width x height.
+std::vector<uint8_t> view_transform(const Film& film);
+WrittenFile write_png(const std::filesystem::path& path, int width, int height, const std::vector<uint8_t>& rgb);
+
+}  // namespace drench

@@ -1,0 +1,67 @@
+#pragma once
+// The coupled simulator: SPH fluid and mass-spring cloth that push each other.
+// Method: Harada, Koshizuka, Kawaguchi 2007; docs/design.md lists equation, file and test.
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/frames.h"
+#include "pipeline/contract/shot.h"
+
+namespace drench {
+
+enum class Device { automatic, cpu, cuda };
+
+struct SimulatorOptions {
+  Device device = Device::automatic;  // automatic: CUDA when there is a device, else CPU
+  std::filesystem::path checkpoint_dir;  // named in the message of a blow-up; may be empty
+};
+
+/// What the last call to advance did, for logs and stats.jsonl.
+struct StepReport {
+  int steps = 0, cloth_substeps = 0;      // fluid steps; cloth steps in all
+  double time = 0, smallest_dt = 0, largest_dt = 0;  // s
+  std::string limit;                      // which limit ruled most steps: "sound speed", "force", ...
+  size_t particles = 0, near = 0;         // near: within the support radius of cloth at the end
+  double max_speed = 0;                   // m/s
+  double mean_compression = 0, max_compression = 0;  // max(rho/rho0 - 1, 0)
+  double kinetic_energy = 0;              // J, fluid and cloth
+  uint64_t guard_hits = 0;                // particles that the path test held back
+};
+
+class Simulator {
+ public:
+  /// Builds the initial state. @throws Error if fluid overlaps cloth, a cloth mesh is degenerate or not
+  /// manifold, nothing is to be simulated, or cuda is asked for and absent.
+  Simulator(const Shot& shot, const SimulatorOptions& options);
+  ~Simulator();
+  Simulator(Simulator&&) noexcept;
+
+  /// Runs the pre-roll, if any (once, before the first frame).
+  /// Advances from frame to frame + 1; steps land exactly on frames.
+  /// @param keep_going  asked before every step; false throws Stopped after the current state is whole.
+  /// @throws Error on NaN or blow-up with frame, time, particle and the last good checkpoint.
+  StepReport advance_frame(const std::function<bool()>& keep_going = {});
+
+  int frame() const;  // film frame of the current state
+  ParticleFrame particles() const;
+  std::vector<ClothFrame> cloth() const;
+
+  /// Every state the next step reads, lossless: a resumed run has the same bits.
+  WrittenFile write_checkpoint(const std::filesystem::path& path) const;
+  /// @throws Error if damaged or made by another shot or build of the state's layout.
+  void read_checkpoint(const std::filesystem::path& path);
+
+  std::string device_name() const;
+
+  struct Implementation;
+
+ private:
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace drench
