@@ -1,0 +1,58 @@
+#pragma once
+// SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6 for density,
+// spiky for pressure gradients, and the viscosity kernel's Laplacian; and their integrals over a flat
+// layer and over the half-space beyond it, the wall functions of the seed's eqs (8) and (9).
+// q = distance / h throughout. Closed forms and their derivation: tests/validation/README.md, section 4.
+
+#include "sim/pack.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+constexpr float pi = 3.14159265358979f;
+
+/// poly6: W(r) = poly6_factor(h) (h^2 - r^2)^3, 1/m^3.
+DRENCH_HD float poly6_factor(float h) {
+  const float h3 = h * h * h;
+  return 315.f / (64.f * pi * h3 * h3 * h3);
+}
+/// spiky: dW/dr = -spiky_gradient_factor(h) (h - r)^2; viscosity: lap W = the same factor (h - r).
+DRENCH_HD float spiky_gradient_factor(float h) {
+  const float h3 = h * h * h;
+  return 45.f / (pi * h3 * h3);
+}
+
+/// h times the integral of poly6 over a plane at distance qh.
+DRENCH_HD float poly6_plane(float q) {
+  const float s = max0(1.f - q * q);
+  return 315.f / 256.f * s * s * s * s;
+}
+/// Integral of poly6 over everything beyond a plane at distance qh: the share of density that a
+/// particle at q misses there. 1/2 at q = 0.
+DRENCH_HD float poly6_halfspace(float q) {
+  const float p = q < 1.f ? q : 1.f, p2 = p * p;
+  const float odd = p * (1.f + p2 * (-4.f / 3 + p2 * (6.f / 5 + p2 * (-4.f / 7 + p2 / 9.f))));
+  return max0(0.5f - 315.f / 256.f * odd);
+}
+/// h times the integral of the spiky kernel over a plane at distance qh; by the divergence theorem
+/// also h times the gradient sum over the half-space beyond, along the normal.
+DRENCH_HD float spiky_plane(float q) {
+  const float u = max0(1.f - q), u4 = u * u * u * u;
+  return 7.5f * u4 - 6.f * u4 * u;
+}
+/// -d spiky_plane / dq.
+DRENCH_HD float spiky_plane_slope(float q) {
+  const float u = max0(1.f - q);
+  return 30.f * u * u * u * (1.f - u);
+}
+/// h^3 times the integral of the viscosity Laplacian over a plane at distance qh.
+DRENCH_HD float viscosity_plane(float q) {
+  const float u = max0(1.f - q);
+  return 15.f * u * u * (1.f + 2.f * q);
+}
+/// h^2 times the integral of the viscosity Laplacian over the half-space beyond.
+DRENCH_HD float viscosity_halfspace(float q) {
+  const float p = q < 1.f ? q : 1.f;
+  return max0(15.f * (0.5f - p + p * p * p - 0.5f * p * p * p * p));
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,98 @@
+#pragma once
+// Launches: the same text for both backends, named so that a profile reads like the algorithm.
+// Results never depend on the number of threads: every index writes its own place, and the only
+// reductions are maxima and minima (order-free) or sums over fixed chunks.
+
+#include "sim/column.h"
+
+#if defined(__CUDACC__)
+#else
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#endif
+
+#include <algorithm>
+
+namespace drench::sim::DRENCH_BACKEND {
+
+#if defined(__CUDACC__)
+
+template <class F>
+__global__ void launch_for(int n, F f) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i < n) f(i);
+}
+
+template <class F>
+void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
+  if (n <= 0) return;
+  launch_for<<<(n + 127) / 128, 128>>>(n, f);
+  check_cuda(cudaGetLastError(), name);
+}
+
+constexpr int reduce_block = 256, reduce_blocks = 128;
+
+template <class T, class F, class Combine>
+__global__ void launch_reduce(int n, T start, F f, Combine combine, T* out) {
+  __shared__ T shared[reduce_block];
+  T value = start;
+  for (int i = blockIdx.x * reduce_block + threadIdx.x; i < n; i += gridDim.x * reduce_block) {
+    value = combine(value, f(i));
+  }
+  shared[threadIdx.x] = value;
+  for (int half = reduce_block / 2; half > 0; half /= 2) {
+    __syncthreads();
+    if (threadIdx.x < half) {
+      shared[threadIdx.x] = combine(shared[threadIdx.x], shared[threadIdx.x + half]);
+    }
+  }
+  if (threadIdx.x == 0) out[blockIdx.x] = shared[0];
+}
+
+/// combine over f(0..n-1) by a fixed tree; waits for the device.
+template <class T, class F, class Combine>
+T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f, const Combine& combine) {
+  if (n <= 0) return start;
+  static Column<T> partial;  // one simulator a process uses the device at a time
+  partial.resize(reduce_blocks);
+  const int blocks = std::min(reduce_blocks, (n + reduce_block - 1) / reduce_block);
+  launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
+  check_cuda(cudaGetLastError(), name);
+  T value = start;
+  for (const T& part : to_host(partial, blocks)) value = combine(value, part);
+  return value;
+}
+
+#else
+
+template <class F>
+void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
+  constexpr int grain = 2048;
+  if (n <= grain) {
+    for (int i = 0; i < n; ++i) f(i);
+    return;
+  }
+  ::tbb::parallel_for(::tbb::blocked_range<int>(0, n, grain), [&](const auto& range) {
+    for (int i = range.begin(); i < range.end(); ++i) f(i);
+  });
+}
+
+/// combine over f(0..n-1), chunk by chunk of fixed size, chunks in order.
+template <class T, class F, class Combine>
+T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f, const Combine& combine) {
+  constexpr int chunk = 4096;
+  const int chunks = (n + chunk - 1) / chunk;
+  std::vector<T> partial(chunks, start);
+  ::tbb::parallel_for(0, chunks, [&](int c) {
+    T value = start;
+    for (int i = c * chunk; i < std::min(n, (c + 1) * chunk); ++i) value = combine(value, f(i));
+    partial[c] = value;
+  });
+  T value = start;
+  for (const T& part : partial) value = combine(value, part);
+  return value;
+}
+
+#endif
+
+}  // namespace drench::sim::DRENCH_BACKEND
