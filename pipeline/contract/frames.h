@@ -27,7 +27,7 @@ struct TriangleMesh {
   std::vector<Imath::V3f> normal;          // unit, or empty
   std::vector<Imath::V2f> uv;              // cloth: texture and rest plane, or empty
   std::vector<Imath::V3f> rest_position;   // cloth: m, at rest, or empty
-  std::vector<Imath::V3<uint32_t>> triangle;  // counter-clockwise seen from outside
+  std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
 };
 
 /// One sheet of cloth of one frame.
