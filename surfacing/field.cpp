@@ -1,0 +1,312 @@
+#include "surfacing/field.h"
+
+#include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/error.h"
+#include "surfacing/pack.h"
+
+namespace drench::surfacing {
+namespace {
+
+constexpr int rows = block_edge * block_edge;
+
+template <class F>
+void for_each_neighbour(F f) {
+  V3i step;
+  for (step.z = -1; step.z <= 1; ++step.z)
+    for (step.y = -1; step.y <= 1; ++step.y)
+      for (step.x = -1; step.x <= 1; ++step.x)
+        if (step != V3i(0)) f(step);
+}
+
+/// 2 (1-q)^3 - 8 (1/2-q)^3, each term where its base is positive: the cubic spline in one line.
+struct SplineSum {
+  Pack sum{};
+  void add(Pack distance_squared, Pack weight2, Pack weight8) {  // distance in supports
+    const Pack a = larger(1.f - square_root(distance_squared), Pack{});
+    const Pack b = larger(a - 0.5f, Pack{});
+    sum = multiply_add(a * a, a * weight2, sum);
+    sum = subtract_product(sum, b * b, b * weight8);
+  }
+};
+
+/// Adds one particle to every row of the block that it reaches. p in supports from lattice point 0.
+void splat(const V3f p, float weight, float step, FieldBlock& field) {
+  const auto away = [&](float v) { return std::max({-v, v - (block_edge - 1) * step, 0.f}); };
+  const Pack dx = lanes() * step - p.x;
+  const Pack dx2 = dx * dx;
+  const Pack weight2 = pack(2 * weight), weight8 = pack(8 * weight);
+  const float free_x = 1 - away(p.x) * away(p.x);
+  for (int z = 0; z < block_edge; ++z) {
+    const float dz = z * step - p.z;
+    const float free_z = free_x - dz * dz;
+    if (free_z <= 0) continue;
+    float* row = field.value.data() + z * rows;
+    for (int y = 0; y < block_edge; ++y, row += block_edge) {
+      const float dy = y * step - p.y;
+      if (dy * dy >= free_z) continue;
+      SplineSum sum{load(row)};
+      sum.add(dx2 + (dy * dy + dz * dz), weight2, weight8);
+      store(row, sum.sum);
+    }
+  }
+}
+
+void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel, FieldBlock& field,
+                    NearParticles& near) {
+  field.value.fill(0.f);
+  const float reach = particles.lattice.reach;
+  gather_near(particles, field.block, block_edge - 1, reach, near);
+  const float step = 1 / reach, scale = kernel.scale();
+  for (size_t j = 0; j < near.size(); ++j)
+    splat(V3f(near.x[j], near.y[j], near.z[j]) * step, near.weight[j] * scale, step, field);
+  for (int row = 0; row < rows; ++row)
+    field.inside[row] = static_cast<uint8_t>(
+        not_less_bits(load(field.value.data() + row * block_edge), pack(kernel.iso_value)));
+}
+
+/// Blocks and what is known of them while the set grows. Occupied blocks come first, in the order
+/// of the particles' blocks; then empty ones in reach of a particle; then those added by the
+/// closure.
+struct BlockSet {
+  std::vector<BlockKey> key;
+  BlockMap map;
+  std::vector<uint32_t> slot;  // evaluated: index into the blocks; interior or waiting: none
+};
+
+/// Bounding box of a block's particles, voxels from its corner.
+void bounds_of(const BinnedParticles& particles, size_t b, V3f& low, V3f& high) {
+  low = V3f(block_edge);
+  high = V3f(0);
+  for (uint32_t i = particles.first[b]; i < particles.first[b + 1]; ++i) {
+    const V3f p(particles.x[i], particles.y[i], particles.z[i]);
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], p[axis]);
+      high[axis] = std::max(high[axis], p[axis]);
+    }
+  }
+}
+
+BlockSet blocks_in_reach(const BinnedParticles& particles) {
+  const int ring = particles.lattice.ring();
+  const float reach = particles.lattice.reach;
+  tbb::enumerable_thread_specific<std::vector<BlockKey>> found;
+  tbb::parallel_for(size_t{0}, particles.block.size(), [&](size_t b) {
+    const V3i block = block_of(particles.block[b]);
+    V3f low, high;
+    bounds_of(particles, b, low, high);
+    const auto gap = [&](int axis, int step) {  // between the particles' box and the block's cells
+      const float from = static_cast<float>(step * block_edge);
+      return std::max({from - high[axis], low[axis] - from - block_edge, 0.f});
+    };
+    V3i step;
+    for (step.z = -ring; step.z <= ring; ++step.z)
+      for (step.y = -ring; step.y <= ring; ++step.y)
+        for (step.x = -ring; step.x <= ring; ++step.x)
+          if (V3f(gap(0, step.x), gap(1, step.y), gap(2, step.z)).length2() < reach * reach &&
+              particles.map.find(block + step) == BlockMap::none)
+            found.local().push_back(key_of(block + step));
+  });
+  BlockSet set{particles.block, particles.map, {}};
+  std::vector<BlockKey> empty;
+  for (const auto& part : found) empty.insert(empty.end(), part.begin(), part.end());
+  tbb::parallel_sort(empty.begin(), empty.end());
+  empty.erase(std::unique(empty.begin(), empty.end()), empty.end());
+  for (const BlockKey key : empty) {
+    set.map.insert(key, static_cast<uint32_t>(set.key.size()));
+    set.key.push_back(key);
+  }
+  set.slot.assign(set.key.size(), BlockMap::none);
+  return set;
+}
+
+/// Whether the layer of points of `field` that shares cells with the block at `step` is wholly on
+/// the side `inside`.
+bool border_is(const FieldBlock& field, V3i step, bool inside) {
+  const auto first = [](int s) { return s > 0 ? block_edge - 1 : 0; };
+  const auto last = [](int s) { return s < 0 ? 0 : block_edge - 1; };
+  const uint8_t mask = step.x > 0 ? 0x80 : step.x < 0 ? 0x01 : 0xff;
+  const uint8_t wanted = inside ? mask : 0;
+  for (int z = first(step.z); z <= last(step.z); ++z)
+    for (int y = first(step.y); y <= last(step.y); ++y)
+      if ((field.inside[z * block_edge + y] & mask) != wanted) return false;
+  return true;
+}
+
+/// Blocks not yet evaluated whose side the border of an evaluated neighbour contradicts, and
+/// interior blocks with a neighbour outside the set.
+std::vector<BlockKey> contradicted(const BlockSet& set, const std::vector<FieldBlock>& fields,
+                                   size_t first_new) {
+  tbb::enumerable_thread_specific<std::vector<BlockKey>> found;
+  tbb::parallel_for(first_new, fields.size(), [&](size_t f) {
+    for_each_neighbour([&](V3i step) {
+      const V3i block = fields[f].block + step;
+      const uint32_t b = set.map.find(block);
+      if (b != BlockMap::none && set.slot[b] != BlockMap::none) return;
+      if (!border_is(fields[f], step, b != BlockMap::none)) found.local().push_back(key_of(block));
+    });
+  });
+  if (first_new == 0)
+    tbb::parallel_for(size_t{0}, set.key.size(), [&](size_t b) {
+      if (set.slot[b] != BlockMap::none) return;
+      const V3i block = block_of(set.key[b]);
+      bool closed = true;
+      for_each_neighbour([&](V3i step) { closed &= set.map.find(block + step) != BlockMap::none; });
+      if (!closed) found.local().push_back(set.key[b]);
+    });
+  std::vector<BlockKey> keys;
+  for (const auto& part : found) keys.insert(keys.end(), part.begin(), part.end());
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+void check_memory(size_t blocks, double max_bytes) {
+  const double bytes = static_cast<double>(blocks) * sizeof(FieldBlock);
+  if (bytes <= max_bytes) return;
+  throw Error(
+      fmt::format("surfacing: {} lattice blocks need {:.3g} GiB, more than the {:.3g} GiB left of "
+                  "surface.memory_gib; raise surface.memory_gib or surface.voxel",
+                  blocks, bytes / (1 << 30), max_bytes / (1 << 30)));
+}
+
+}  // namespace
+
+float ColourKernel::scale() const {
+  return static_cast<float>(8 / (std::numbers::pi * support * support * support));
+}
+
+float ColourKernel::shape(float q) {
+  const float a = std::max(1 - q, 0.f), b = std::max(0.5f - q, 0.f);
+  return 2 * a * a * a - 8 * b * b * b;
+}
+
+float ColourKernel::full_colour() const {
+  constexpr float ball_radius = 0.62035f;  // (3 / (4 pi))^(1/3): a ball of one spacing^3
+  return iso_value / shape(ball_radius / support);
+}
+
+float ColourKernel::weight(float c) const { return std::max(1.f, full_colour() / c); }
+
+std::vector<uint8_t> count_interior(const BinnedParticles& particles) {
+  const int bins = particles.lattice.bins, padded = bins + 2;
+  const float bin_spacings =
+      block_edge / (particles.lattice.voxels_per_spacing * static_cast<float>(bins));
+  const float full = bin_spacings * bin_spacings * bin_spacings;  // particles in a full bin
+  constexpr float enough = 0.65f;
+  std::vector<uint8_t> interior(particles.block.size());
+  tbb::parallel_for(size_t{0}, interior.size(), [&](size_t b) {
+    const size_t count = particles.first[b + 1] - particles.first[b];
+    if (static_cast<float>(count) < enough * full * static_cast<float>(particles.bin_stride() - 1))
+      return;
+    const V3i block = block_of(particles.block[b]);
+    std::vector<float> cell(static_cast<size_t>(padded) * padded * padded);
+    size_t at = 0;
+    for (int z = -1; z <= bins; ++z)
+      for (int y = -1; y <= bins; ++y)
+        for (int x = -1; x <= bins; ++x, ++at) {
+          const auto side = [&](int v) { return v < 0 ? -1 : v == bins ? 1 : 0; };
+          const uint32_t other = particles.map.find(block + V3i(side(x), side(y), side(z)));
+          if (other == BlockMap::none) continue;
+          const auto wrap = [&](int v) { return (v + bins) % bins; };
+          const uint32_t* bin_first = particles.bins_of(other);
+          const int bin = (wrap(z) * bins + wrap(y)) * bins + wrap(x);
+          cell[at] = static_cast<float>(bin_first[bin + 1] - bin_first[bin]);
+        }
+    // Weights 1/4, 1/2, 1/4 along each axis in turn: a count that varies as smoothly as the field.
+    for (const size_t stride : {size_t{1}, size_t(padded), size_t(padded) * padded})
+      for (size_t k = 0, end = cell.size() - 2 * stride; k < end; ++k)
+        cell[k] = 0.25f * cell[k] + 0.5f * cell[k + stride] + 0.25f * cell[k + 2 * stride];
+    for (int z = 0; z < bins; ++z)
+      for (int y = 0; y < bins; ++y)
+        for (int x = 0; x < bins; ++x)
+          if (cell[(static_cast<size_t>(z) * padded + y) * padded + x] < enough * full) return;
+    interior[b] = 1;
+  });
+  return interior;
+}
+
+std::vector<float> weigh_particles(const BinnedParticles& particles, const ColourKernel& kernel,
+                                   const std::vector<uint8_t>& interior) {
+  const float reach = particles.lattice.reach, step = 1 / reach;
+  std::vector<float> weight(particles.x.size(), 1.f);
+  tbb::enumerable_thread_specific<NearParticles> nears;
+  tbb::parallel_for(size_t{0}, particles.block.size(), [&](size_t b) {
+    if (interior[b]) return;
+    NearParticles& near = nears.local();
+    gather_near(particles, block_of(particles.block[b]), block_edge, reach, near);
+    const Pack two = pack(2.f), eight = pack(8.f);
+    for (uint32_t begin = particles.first[b]; begin < particles.first[b + 1]; begin += pack_width) {
+      const uint32_t count = std::min<uint32_t>(pack_width, particles.first[b + 1] - begin);
+      PointPack points;
+      for (uint32_t k = 0; k < pack_width; ++k) {
+        const uint32_t i = begin + std::min(k, count - 1);
+        points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
+      }
+      const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
+      SplineSum sum;
+      for_each_close(near, points, reach, [&](size_t j) {
+        const Pack dx = (x - near.x[j]) * step, dy = (y - near.y[j]) * step,
+                   dz = (z - near.z[j]) * step;
+        sum.add(multiply_add(dx, dx, multiply_add(dy, dy, dz * dz)), two, eight);
+      });
+      std::array<float, pack_width> colour;
+      store(colour.data(), sum.sum * kernel.scale());
+      for (uint32_t k = 0; k < count; ++k) weight[begin + k] = kernel.weight(colour[k]);
+    }
+  });
+  return weight;
+}
+
+ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,
+                           const std::vector<uint8_t>& interior, InteriorBlocks mode,
+                           double max_bytes) {
+  BlockSet set = blocks_in_reach(particles);
+  std::vector<BlockKey> wanted;
+  for (size_t b = 0; b < set.key.size(); ++b)
+    if (mode == InteriorBlocks::evaluate || b >= interior.size() || !interior[b])
+      wanted.push_back(set.key[b]);
+  ColourField field;
+  field.stats.candidates = set.key.size();
+  field.stats.interior = set.key.size() - wanted.size();
+  tbb::enumerable_thread_specific<NearParticles> nears;
+  while (!wanted.empty()) {
+    const size_t first_new = field.block.size();
+    check_memory(first_new + wanted.size(), max_bytes);
+    field.block.resize(first_new + wanted.size());
+    for (size_t k = 0; k < wanted.size(); ++k) {
+      if (set.map.insert(wanted[k], static_cast<uint32_t>(set.key.size()))) {
+        set.key.push_back(wanted[k]);
+        set.slot.push_back(BlockMap::none);
+      }
+      set.slot[set.map.find(wanted[k])] = static_cast<uint32_t>(first_new + k);
+      field.block[first_new + k].block = block_of(wanted[k]);
+    }
+    tbb::parallel_for(first_new, field.block.size(), [&](size_t f) {
+      evaluate_block(particles, kernel, field.block[f], nears.local());
+    });
+    wanted = contradicted(set, field.block, first_new);
+    field.stats.grown += wanted.size();
+    field.stats.closure_rounds += !wanted.empty();
+  }
+  field.stats.evaluated = field.block.size();
+  field.map = BlockMap(field.block.size());
+  field.order.resize(field.block.size());
+  for (uint32_t f = 0; f < field.block.size(); ++f) {
+    field.order[f] = f;
+    field.map.insert(key_of(field.block[f].block), f);
+  }
+  tbb::parallel_sort(field.order.begin(), field.order.end(), [&](uint32_t a, uint32_t b) {
+    return key_of(field.block[a].block) < key_of(field.block[b].block);
+  });
+  return field;
+}
+
+}  // namespace drench::surfacing

@@ -1,0 +1,43 @@
+#pragma once
+// Bumps of the size of a particle are smoothed away on the mesh; shape and volume stay.
+
+#include <array>
+#include <vector>
+
+#include "surfacing/extract.h"
+
+namespace drench::surfacing {
+
+/// The triangles around each vertex: of triangle (v, a, b) the pair {a, b}, sorted by a. On a
+/// closed manifold mesh the first entries are the vertex's neighbours, each once.
+struct VertexRings {
+  std::vector<uint32_t> first;  // vertices + 1
+  std::vector<std::array<uint32_t, 2>> wing;
+};
+VertexRings rings_of(const LatticeMesh& mesh);
+
+/// Connected parts of a mesh. A part is named by its place in the order of lowest vertex.
+struct Components {
+  std::vector<uint32_t> first;   // members of each, and the number of vertices
+  std::vector<uint32_t> vertex;  // grouped by part, ascending
+  size_t size() const { return first.size() - 1; }
+};
+Components components_of(const LatticeMesh& mesh);
+
+/// Volume of each part, voxel^3.
+std::vector<double> volumes_of(const LatticeMesh& mesh, const VertexRings& rings,
+                               const Components& parts);
+
+/// Unit normals, the area-weighted mean of the triangles around each vertex.
+std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
+
+/// Moves vertices by `passes` Laplacian passes (factor 1/2, uniform weights) forth, and as many
+/// over the displacement back: what the passes moved smoothly, the shrinkage of round shapes, is
+/// returned, and bumps stay removed. Each part then gets back the volume it had, exactly but for
+/// rounding: a small one (a drop) by scaling, others by an even shift along the normals.
+void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
+
+/// One pass of averaging unit normals over the ring.
+void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int passes);
+
+}  // namespace drench::surfacing

@@ -1,0 +1,209 @@
+#include "surfacing/surface.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/contract/error.h"
+#include "surfacing/extract.h"
+#include "surfacing/field.h"
+#include "surfacing/smooth.h"
+#include "surfacing/velocity.h"
+
+namespace drench {
+namespace {
+
+using namespace surfacing;
+
+void check_range(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  throw Error(fmt::format("surface.{} is {}; it must be from {} to {}", name, value, low, high));
+}
+
+void check_settings(const ParticleFrame& particles, const SurfaceSettings& settings) {
+  check_range("voxel", settings.voxel, 0.1, 2);
+  check_range("support", settings.support, std::max(1.0, settings.voxel), 6);
+  check_range("iso_value", settings.iso_value, 0.01, 0.99);
+  check_range("smoothing", settings.smoothing, 0, 1000);
+  check_range("memory_gib", settings.memory_gib, 1e-6, 1e6);
+  if (!(particles.spacing > 0) || !std::isfinite(particles.spacing))
+    throw Error(fmt::format("surfacing: the particle spacing is {} m; it must be above 0",
+                            particles.spacing));
+  const size_t n = particles.position.size();
+  if (particles.velocity.size() != n)
+    throw Error(fmt::format("surfacing: {} positions but {} velocities; a frame needs one each", n,
+                            particles.velocity.size()));
+  if (n >= UINT32_MAX)
+    throw Error(fmt::format("surfacing: {} particles; at most {} fit", n, UINT32_MAX - 1));
+}
+
+bool finite(V3f v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+struct Bounds {
+  static constexpr size_t none = ~size_t{0};
+  V3f low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
+  size_t bad_position = none, bad_velocity = none;  // the lowest index
+
+  void add(const ParticleFrame& particles, size_t i) {
+    const V3f p = particles.position[i];
+    if (!finite(p)) bad_position = std::min(bad_position, i);
+    if (!finite(particles.velocity[i])) bad_velocity = std::min(bad_velocity, i);
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], p[axis]);
+      high[axis] = std::max(high[axis], p[axis]);
+    }
+  }
+  static Bounds joined(Bounds a, const Bounds& b) {
+    a.bad_position = std::min(a.bad_position, b.bad_position);
+    a.bad_velocity = std::min(a.bad_velocity, b.bad_velocity);
+    for (int axis = 0; axis < 3; ++axis) {
+      a.low[axis] = std::min(a.low[axis], b.low[axis]);
+      a.high[axis] = std::max(a.high[axis], b.high[axis]);
+    }
+    return a;
+  }
+};
+
+Bounds bounds_of(const ParticleFrame& particles) {
+  const Bounds bounds = tbb::parallel_reduce(
+      tbb::blocked_range<size_t>(0, particles.position.size(), 16384), Bounds{},
+      [&](const auto& range, Bounds part) {
+        for (size_t i = range.begin(); i < range.end(); ++i) part.add(particles, i);
+        return part;
+      },
+      [](const Bounds& a, const Bounds& b) { return Bounds::joined(a, b); });
+  const auto complain = [&](size_t index, const char* what, V3f v) {
+    if (index == Bounds::none) return;
+    throw Error(fmt::format(
+        "surfacing: the {} of particle {} is ({}, {}, {}); the frame is damaged or the simulation "
+        "blew up, simulate it again",
+        what, index, v.x, v.y, v.z));
+  };
+  if (bounds.bad_position != Bounds::none)
+    complain(bounds.bad_position, "position", particles.position[bounds.bad_position]);
+  if (bounds.bad_velocity != Bounds::none)
+    complain(bounds.bad_velocity, "velocity", particles.velocity[bounds.bad_velocity]);
+  return bounds;
+}
+
+Lattice lattice_of(const ParticleFrame& particles, const SurfaceSettings& settings,
+                   const Bounds& bounds) {
+  Lattice lattice;
+  lattice.voxel = settings.voxel * particles.spacing;
+  lattice.reach = static_cast<float>(settings.support / settings.voxel);
+  lattice.voxels_per_spacing = static_cast<float>(1 / settings.voxel);
+  for (lattice.bins = 8; lattice.bins > 1; lattice.bins /= 2)  // bins of at least 0.7 spacings
+    if (block_edge * settings.voxel / lattice.bins > 0.7) break;
+  const double margin = block_edge * (lattice.ring() + 1);
+  for (int axis = 0; axis < 3; ++axis) {
+    lattice.origin[axis] = std::floor(bounds.low[axis] / lattice.voxel) - margin;
+    const double extent = lattice.to_voxels(bounds.high[axis], axis);
+    if (extent + margin < double(block_edge) * max_block) continue;
+    throw Error(fmt::format(
+        "surfacing: particles are spread over {:.4g} m along {}, {:.3g} voxels of {:.4g} m; at "
+        "most "
+        "2^24 voxels can be told apart. Remove particles that flew away, or raise surface.voxel",
+        bounds.high[axis] - bounds.low[axis], "xyz"[axis], extent, lattice.voxel));
+  }
+  return lattice;
+}
+
+/// Memory that the sorted particles take, bytes.
+double particle_bytes(size_t n) { return 36.0 * static_cast<double>(n); }
+
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Vertices in metres of the world, with their columns.
+TriangleMesh world_mesh(LatticeMesh mesh, const Lattice& lattice, std::vector<V3f> velocity,
+                        std::vector<V3f> normal) {
+  TriangleMesh result;
+  result.velocity = std::move(velocity);
+  result.normal = std::move(normal);
+  result.triangle = std::move(mesh.triangle);
+  result.position = std::move(mesh.position);
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, result.position.size()), [&](const auto& range) {
+    for (size_t v = range.begin(); v < range.end(); ++v)
+      for (int axis = 0; axis < 3; ++axis)
+        result.position[v][axis] = lattice.to_metres(result.position[v][axis], axis);
+  });
+  return result;
+}
+
+}  // namespace
+
+TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings) {
+  return surface_frame(particles, settings, InteriorBlocks::skip, nullptr);
+}
+
+TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings,
+                           InteriorBlocks mode, SurfaceStats* stats) {
+  SurfaceStats unused;
+  SurfaceStats& report = stats ? *stats : unused;
+  report = {};
+  report.particles = particles.position.size();
+  check_settings(particles, settings);
+  if (particles.position.empty()) return {};
+  const double max_bytes = settings.memory_gib * (1 << 30);
+  if (particle_bytes(report.particles) > max_bytes)
+    throw Error(fmt::format("surfacing: {} particles need {:.3g} GiB; surface.memory_gib is {}",
+                            report.particles, particle_bytes(report.particles) / (1 << 30),
+                            settings.memory_gib));
+  Stopwatch watch;
+  BinnedParticles binned =
+      bin_particles(particles.position, lattice_of(particles, settings, bounds_of(particles)));
+  report.occupied_blocks = binned.block.size();
+  report.bin_s = watch.lap();
+
+  const ColourKernel kernel{static_cast<float>(settings.support),
+                            static_cast<float>(settings.iso_value)};
+  const std::vector<uint8_t> interior = count_interior(binned);
+  binned.weight = weigh_particles(binned, kernel, interior);
+  report.weight_s = watch.lap();
+
+  const double left = max_bytes - particle_bytes(report.particles);
+  ColourField field = evaluate_field(binned, kernel, interior, mode, left);
+  report.interior_blocks = field.stats.interior;
+  report.evaluated_blocks = field.stats.evaluated;
+  report.grown_blocks = field.stats.grown;
+  report.closure_rounds = field.stats.closure_rounds;
+  report.field_s = watch.lap();
+
+  LatticeMesh mesh = extract_surface(
+      field, kernel.iso_value, left - static_cast<double>(field.block.size() * sizeof(FieldBlock)));
+  field = ColourField{};
+  report.extract_s = watch.lap();
+
+  const VertexRings rings = rings_of(mesh);
+  const Components parts = components_of(mesh);
+  smooth_mesh(mesh, rings, parts, settings.smoothing);
+  std::vector<V3f> normal = normals_of(mesh, rings);
+  smooth_normals(normal, rings, settings.smoothing > 0 ? 1 : 0);
+  report.components = parts.size();
+  report.vertices = mesh.position.size();
+  report.triangles = mesh.triangle.size();
+  if (stats)
+    for (const double volume : volumes_of(mesh, rings, parts))
+      report.volume += volume * std::pow(binned.lattice.voxel, 3);
+  report.smooth_s = watch.lap();
+
+  const float velocity_reach =
+      std::min(2.f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
+  std::vector<V3f> velocity = vertex_velocities(mesh, binned, particles.velocity, velocity_reach);
+  report.velocity_s = watch.lap();
+  return world_mesh(std::move(mesh), binned.lattice, std::move(velocity), std::move(normal));
+}
+
+}  // namespace drench
