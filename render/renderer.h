@@ -34,11 +34,12 @@ struct RenderStats {
 /// Path-traces one frame. The same bits for any thread count and tile order.
 /// @param progress  called with the finished share 0..1; may throw to stop.
 /// @throws Error for a map or texture that cannot be read, or a light or camera without extent.
-Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, RenderStats* stats = nullptr,
-                  const std::function<void(double)>& progress = {});
+Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
+                  RenderStats* stats = nullptr, const std::function<void(double)>& progress = {});
 
 /// Half RGBA, ZIP, chromaticities of ACEScg, and the given attributes as strings ("shot", "frame",
-/// "seed", "samples", "version", "key.*"); no times or dates, so that equal inputs give equal files.
+/// "seed", "samples", "version", "key.*"); no times or dates, so that equal inputs give equal
+/// files.
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
 /// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.
@@ -46,6 +47,7 @@ Film read_exr(const std::filesystem::path& path);
 
 /// Display-referred 8-bit sRGB of a film through the built-in view transform; 3 x width x height.
 std::vector<uint8_t> view_transform(const Film& film);
-WrittenFile write_png(const std::filesystem::path& path, int width, int height, const std::vector<uint8_t>& rgb);
+WrittenFile write_png(const std::filesystem::path& path, int width, int height,
+                      const std::vector<uint8_t>& rgb);
 
 }  // namespace drench

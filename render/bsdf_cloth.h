@@ -1,0 +1,70 @@
+#pragma once
+// Thin two-sided cloth: Lambertian reflection and Lambertian transmission. Without transmission it
+// is the diffuse ground.
+
+#include "render/sampling.h"
+
+namespace drench {
+
+struct ClothScatter {
+  V3f direction;  // unit
+  V3f weight;     // value x |cos| / pdf, per channel
+  float pdf = 0;  // per steradian; 0: absorbed
+};
+
+class ClothBsdf {
+ public:
+  /// @param outgoing  unit, away from the surface towards where the path came from
+  /// Normals are unit and of the same hemisphere.
+  ClothBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, const V3f& reflectance,
+            const V3f& transmittance)
+      : reflectance_(reflectance), transmittance_(transmittance) {
+    const float side = dot(outgoing, geometric) < 0 ? -1.f : 1.f;
+    geometric_ = geometric * side;
+    shading_ = shading * side;
+    const float r = largest(reflectance), t = largest(transmittance);
+    reflect_probability_ = r + t > 0 ? r / (r + t) : 1;
+  }
+
+  bool black() const { return is_black(reflectance_) && is_black(transmittance_); }
+
+  /// Value x |cos| for an incoming direction, and the density of `sample` for it.
+  V3f value(const V3f& incoming, float& pdf) const {
+    const float side = dot(incoming, geometric_) > 0 ? 1.f : -1.f;
+    const float cos = dot(incoming, shading_) * side;
+    pdf = 0;
+    if (!(cos > 0)) return V3f(0);
+    const float density = cos / kPi;
+    pdf = density * (side > 0 ? reflect_probability_ : 1 - reflect_probability_);
+    return (side > 0 ? reflectance_ : transmittance_) * (density * terminator(incoming, cos, side));
+  }
+
+  ClothScatter sample(float u_side, const V2f& u) const {
+    ClothScatter out;
+    const float side = u_side < reflect_probability_ ? 1.f : -1.f;
+    out.direction = Basis(shading_ * side).world(sample_cosine(u));
+    const float cos = dot(out.direction, shading_) * side;
+    // The smooth hemisphere reaches a little through the real surface: nothing comes from there.
+    if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
+    const float probability = side > 0 ? reflect_probability_ : 1 - reflect_probability_;
+    out.pdf = cos / kPi * probability;
+    out.weight = (side > 0 ? reflectance_ : transmittance_) *
+                 (terminator(out.direction, cos, side) / probability);
+    return out;
+  }
+
+ private:
+  /// Softens the edge of the shadow that flat triangles cast on themselves under smooth normals.
+  /// Chiang, Li, Burley 2019, "Taming the Shadow Terminator".
+  float terminator(const V3f& incoming, float cos, float side) const {
+    const float flat = dot(incoming, geometric_) * side;
+    const float g = flat / (cos * dot(geometric_, shading_));
+    if (g >= 1) return 1;
+    return g > 0 ? g * (1 + g * (1 - g)) : 0;
+  }
+
+  V3f geometric_, shading_, reflectance_, transmittance_;
+  float reflect_probability_ = 1;
+};
+
+}  // namespace drench

@@ -1,0 +1,43 @@
+#pragma once
+// A smooth interface between two dielectrics: Fresnel's equations and Snell's law.
+
+#include "render/vector.h"
+
+namespace drench {
+
+/// Where light goes at an interface, for radiance divided by the squared index ("basic radiance"),
+/// which refraction leaves unchanged: so no factor for the change of solid angle appears here.
+struct InterfaceSplit {
+  V3f reflected, refracted;  // unit directions
+  float reflectance = 1;     // Fresnel's, unpolarised; 1 is total reflection, without `refracted`
+};
+
+/// @param direction  unit, towards the surface
+/// @param normal     unit, dot(direction, normal) < 0
+/// @param eta        index beyond the surface over index before it
+inline InterfaceSplit split_at_interface(const V3f& direction, const V3f& normal, float eta) {
+  InterfaceSplit out;
+  const float cos_in = std::min(-dot(direction, normal), 1.f);
+  out.reflected = normalized(direction + normal * (2 * cos_in));
+  const float sin2_out = (1 - cos_in * cos_in) / (eta * eta);
+  if (sin2_out >= 1) return out;
+  const float cos_out = std::sqrt(1 - sin2_out);
+  const float parallel = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
+  const float perpendicular = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
+  out.reflectance = 0.5f * (parallel * parallel + perpendicular * perpendicular);
+  out.refracted = normalized(direction * (1 / eta) + normal * (cos_in / eta - cos_out));
+  return out;
+}
+
+/// Normal to shade with, on the side of `direction`'s origin. A smooth normal is used only if both
+/// outgoing directions then lie on the side of the real surface where they belong.
+inline V3f interface_normal(const V3f& direction, const V3f& geometric, const V3f& smooth) {
+  const float side = dot(direction, geometric) < 0 ? 1.f : -1.f;
+  const V3f n = smooth * side, g = geometric * side;
+  const float cos_in = -dot(direction, n);
+  if (!(cos_in > 0)) return g;
+  const V3f reflected = direction + n * (2 * cos_in);
+  return dot(reflected, g) > 0 ? n : g;
+}
+
+}  // namespace drench

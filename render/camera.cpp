@@ -1,0 +1,87 @@
+#include "render/camera.h"
+
+#include <fmt/format.h>
+
+#include "pipeline/contract/error.h"
+#include "render/sampling.h"
+
+namespace drench {
+
+namespace {
+
+void aim(CameraPose& pose, const V3f& toward, const V3f& world_up) {
+  pose.forward = normalized(toward);
+  pose.right = normalized(cross(pose.forward, world_up));
+  pose.up = cross(pose.right, pose.forward);
+}
+
+CameraPose pose_of(const Camera& camera, double frame) {
+  const V3d position = camera.position.at(frame), target = camera.target.at(frame);
+  const V3d toward = target - position;
+  const double distance = toward.length(), fov = camera.fov_deg.at(frame);
+  const double side = (toward % camera.up).length();
+  const auto fail = [&](const std::string& what) {
+    throw Error(fmt::format("camera at frame {}: {}", frame, what));
+  };
+  if (!(distance > 0) || !std::isfinite(distance))
+    fail("position and target are the same point, so it looks nowhere; move one of them");
+  if (!(side > 1e-6 * distance * camera.up.length()))
+    fail("it looks along its own up direction; choose another camera.up");
+  if (!(fov > 0 && fov < 180))
+    fail(fmt::format("fov_deg is {} but must lie between 0 and 180", fov));
+  const double focus = camera.focus_distance.at(frame), lens = camera.lens_radius.at(frame);
+  if (!(focus >= 0 && lens >= 0 && std::isfinite(focus) && std::isfinite(lens)))
+    fail("focus_distance and lens_radius must not be negative");
+
+  CameraPose pose;
+  pose.position = V3f(position);
+  aim(pose, V3f(toward / distance), V3f(camera.up));
+  pose.half_width = float(std::tan(fov * std::numbers::pi / 360));
+  pose.focus_distance = float(focus > 0 ? focus : distance);
+  pose.lens_radius = float(lens);
+  return pose;
+}
+
+bool same(const CameraPose& a, const CameraPose& b) {
+  return a.position == b.position && a.forward == b.forward && a.half_width == b.half_width &&
+         a.focus_distance == b.focus_distance && a.lens_radius == b.lens_radius;
+}
+
+}  // namespace
+
+ShutterCamera::ShutterCamera(const Camera& camera, double open, double close, int width, int height)
+    : open_(pose_of(camera, open)),
+      close_(pose_of(camera, close)),
+      world_up_(camera.up),
+      width_(float(width)),
+      height_(float(height)),
+      moves_(!same(open_, close_)) {}
+
+CameraPose ShutterCamera::pose_at(float time) const {
+  const auto mix = [time](const auto& a, const auto& b) { return a + (b - a) * time; };
+  CameraPose pose;
+  pose.position = mix(open_.position, close_.position);
+  aim(pose, mix(open_.forward, close_.forward), world_up_);
+  pose.half_width = mix(open_.half_width, close_.half_width);
+  pose.focus_distance = mix(open_.focus_distance, close_.focus_distance);
+  pose.lens_radius = mix(open_.lens_radius, close_.lens_radius);
+  return pose;
+}
+
+template <bool thin_lens>
+Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f& lens,
+                             float time) const {
+  const float scale = 2 * pose.half_width / width_;
+  const V3f through = pose.forward + pose.right * ((film.x - 0.5f * width_) * scale) -
+                      pose.up * ((film.y - 0.5f * height_) * scale);
+  if constexpr (!thin_lens) return {pose.position, normalized(through), time};
+  const V2f d = sample_disc(lens) * pose.lens_radius;
+  const V3f shift = pose.right * d.x + pose.up * d.y;
+  return {pose.position + shift, normalized(through * pose.focus_distance - shift), time};
+}
+
+template Ray ShutterCamera::from_pose<false>(const CameraPose&, const V2f&, const V2f&,
+                                             float) const;
+template Ray ShutterCamera::from_pose<true>(const CameraPose&, const V2f&, const V2f&, float) const;
+
+}  // namespace drench

@@ -1,0 +1,66 @@
+#pragma once
+// Light from infinitely far away all around: a constant, a gradient sky, or a latitude-longitude
+// map.
+
+#include <cstdint>
+#include <vector>
+
+#include "pipeline/contract/shot.h"
+#include "render/texture.h"
+
+namespace drench {
+
+/// Draws from a discrete distribution in constant time. Walker's alias method in Vose's form.
+class AliasTable {
+ public:
+  AliasTable() = default;
+  explicit AliasTable(const std::vector<float>& weights);  // >= 0; all zero gives an even draw
+
+  /// The drawn index; `u` is replaced by a fresh number in [0, 1).
+  uint32_t sample(float& u) const;
+  float probability(uint32_t index) const { return probability_[index]; }
+
+ private:
+  struct Bin {
+    float keep = 1;
+    uint32_t other = 0;
+  };
+  std::vector<Bin> bins_;
+  std::vector<float> probability_;
+};
+
+struct DirectionSample {
+  V3f direction;
+  float pdf = 0;  // per steradian
+};
+
+/// Maps have +Y at the top row and -Z in the middle column, +X to the right of it.
+class Environment {
+ public:
+  enum class Sampling { off, on };
+
+  /// @throws Error for a map that cannot be read or holds negative or infinite light.
+  Environment(const Light& light, Sampling sampling);
+
+  V3f radiance(const V3f& direction) const;
+  DirectionSample sample(const V2f& u) const;
+  float pdf(const V3f& direction) const;
+  /// Mean radiance over the sphere.
+  V3f mean() const { return mean_; }
+  bool is_map() const { return map_.width > 0; }
+
+ private:
+  void read_map(const Light& light);
+  void build_tables(int width, int height);
+  V2f to_map(const V3f& direction) const;
+  V3f from_map(const V2f& uv) const;
+
+  V3f scale_, horizon_, ground_, mean_;
+  float rotation_ = 0;  // turns of the map, 0..1
+  Texture map_;
+  int columns_ = 0, rows_ = 0;
+  AliasTable row_table_;
+  std::vector<AliasTable> column_tables_;
+};
+
+}  // namespace drench

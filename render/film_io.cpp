@@ -1,0 +1,173 @@
+// Films to and from OpenEXR, and 8-bit pictures to PNG.
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfChromaticitiesAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <fmt/format.h>
+#include <png.h>
+
+#include <cstring>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "render/color.h"
+#include "render/renderer.h"
+
+namespace drench {
+
+namespace {
+
+constexpr uint64_t kLargestPixels = uint64_t(1) << 27;  // 2 GiB as float RGBA
+/// No codec of OpenEXR packs much tighter than deflate's 1032 to 1, so a header that promises far
+/// more pixels than the file could hold is refused before memory is taken for them.
+constexpr uint64_t kLargestPacking = 4096;
+constexpr float kLargestHalf = 65504;
+
+[[noreturn]] void fail_read(const std::filesystem::path& path, const std::string& why) {
+  throw Error(fmt::format("{}: cannot read this EXR: {}; write it again or give another",
+                          path.string(), why));
+}
+
+/// Half by channel: rgba with values that no half holds brought to the nearest it does.
+struct HalfImage {
+  std::vector<half> rgba;
+  uint64_t clamped = 0;
+};
+
+HalfImage to_half(const Film& film) {
+  HalfImage out;
+  out.rgba.resize(film.rgba.size());
+  for (size_t k = 0; k < film.rgba.size(); ++k) {
+    const float value = film.rgba[k];
+    const bool fits = std::abs(value) <= kLargestHalf;
+    out.clamped += fits ? 0 : 1;
+    out.rgba[k] = fits ? value : std::isnan(value) ? 0.f : std::copysign(kLargestHalf, value);
+  }
+  return out;
+}
+
+void check_film(const Film& film) {
+  if (film.width <= 0 || film.height <= 0 ||
+      film.rgba.size() != size_t(4) * film.width * film.height)
+    throw Error(fmt::format("a film of {} x {} pixels with {} values cannot be written", film.width,
+                            film.height, film.rgba.size()));
+}
+
+/// The window of pixels that a header promises, checked against the file that made the promise.
+Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header& header) {
+  const Imath::Box2i window = header.dataWindow();
+  const int64_t width = int64_t(window.max.x) - window.min.x + 1;
+  const int64_t height = int64_t(window.max.y) - window.min.y + 1;
+  if (width <= 0 || height <= 0 || width > 1 << 20 || height > 1 << 20 ||
+      uint64_t(width * height) > kLargestPixels)
+    fail_read(path, fmt::format("{} x {} pixels (at most {})", width, height, kLargestPixels));
+  if (uint64_t(width * height) / kLargestPacking > std::filesystem::file_size(path))
+    fail_read(path, fmt::format("{} x {} pixels cannot come from {} bytes", width, height,
+                                std::filesystem::file_size(path)));
+  return window;
+}
+
+Film read_pixels(const std::filesystem::path& path) {
+  Imf::InputFile file(path.c_str());
+  const Imf::Header& header = file.header();
+  const Imath::Box2i window = checked_window(path, header);
+  Film film{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, {}};
+  for (const char* name : {"R", "G", "B"}) {
+    const Imf::Channel* channel = header.channels().findChannel(name);
+    if (!channel) fail_read(path, fmt::format("it has no channel {}", name));
+    if (channel->xSampling != 1 || channel->ySampling != 1)
+      fail_read(path, fmt::format("channel {} is subsampled", name));
+  }
+  film.rgba.resize(size_t(4) * film.width * film.height);
+  Imf::FrameBuffer buffer;
+  const size_t x_stride = 4 * sizeof(float), y_stride = x_stride * size_t(film.width);
+  const char* names[4] = {"R", "G", "B", "A"};
+  for (int c = 0; c < 4; ++c)
+    buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, film.rgba.data() + c, window, x_stride,
+                                             y_stride, 1, 1, c == 3 ? 1.0 : 0.0));
+  file.setFrameBuffer(buffer);
+  file.readPixels(window.min.y, window.max.y);
+
+  const Imf::Chromaticities from =
+      Imf::hasChromaticities(header) ? Imf::chromaticities(header) : rec709_chromaticities();
+  if (from == acescg_chromaticities()) return film;
+  const ColorMatrix matrix = color_conversion(from, acescg_chromaticities());
+  for (size_t p = 0; p < film.rgba.size(); p += 4) {
+    const V3f rgb = matrix({film.rgba[p], film.rgba[p + 1], film.rgba[p + 2]});
+    for (int c = 0; c < 3; ++c) film.rgba[p + c] = rgb[c];
+  }
+  return film;
+}
+
+}  // namespace
+
+WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
+                      const std::vector<std::pair<std::string, std::string>>& attributes) {
+  check_film(film);
+  HalfImage image = to_half(film);
+  if (image.clamped > 0)
+    log_warning("render", fmt::format("{} values beyond half clamped file={}", image.clamped,
+                                      path.filename().string()));
+  Imf::Header header(film.width, film.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::addChromaticities(header, acescg_chromaticities());
+  for (const auto& [name, value] : attributes) {
+    if (name.empty() || name.size() > 31 || header.find(name.c_str()) != header.end())
+      throw Error(
+          fmt::format("'{}' cannot name an EXR attribute: use 1 to 31 characters and no "
+                      "name of OpenEXR's own",
+                      name));
+    header.insert(name, Imf::StringAttribute(value));
+  }
+  Imf::FrameBuffer buffer;
+  const size_t x_stride = 4 * sizeof(half), y_stride = x_stride * size_t(film.width);
+  const char* names[4] = {"R", "G", "B", "A"};
+  for (int c = 0; c < 4; ++c) {
+    header.channels().insert(names[c], Imf::Channel(Imf::HALF));
+    buffer.insert(names[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(image.rgba.data() + c),
+                                       x_stride, y_stride));
+  }
+  return write_file_whole(path, [&](const std::filesystem::path& temporary) {
+    try {
+      Imf::OutputFile file(temporary.c_str(), header);
+      file.setFrameBuffer(buffer);
+      file.writePixels(film.height);
+    } catch (const std::exception& e) {
+      throw Error(fmt::format("{}: cannot write the frame: {}", path.string(), e.what()));
+    }
+  });
+}
+
+Film read_exr(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) fail_read(path, "there is no such file");
+  try {
+    return read_pixels(path);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    fail_read(path, e.what());
+  }
+}
+
+WrittenFile write_png(const std::filesystem::path& path, int width, int height,
+                      const std::vector<uint8_t>& rgb) {
+  if (width <= 0 || height <= 0 || rgb.size() != size_t(3) * width * height)
+    throw Error(fmt::format("{}: a picture of {} x {} pixels with {} bytes cannot be written",
+                            path.string(), width, height, rgb.size()));
+  return write_file_whole(path, [&](const std::filesystem::path& temporary) {
+    png_image image;
+    std::memset(&image, 0, sizeof image);
+    image.version = PNG_IMAGE_VERSION;
+    image.width = png_uint_32(width);
+    image.height = png_uint_32(height);
+    image.format = PNG_FORMAT_RGB;
+    if (!png_image_write_to_file(&image, temporary.c_str(), 0, rgb.data(), 0, nullptr))
+      throw Error(fmt::format("{}: cannot write the picture: {}", path.string(), image.message));
+  });
+}
+
+}  // namespace drench

@@ -1,0 +1,223 @@
+#include "render/lights.h"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "pipeline/contract/error.h"
+#include "render/color.h"
+#include "render/sampling.h"
+
+namespace drench {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+[[noreturn]] void fail(const Light& light, const std::string& what) {
+  throw Error(fmt::format("light '{}': {}", light.name, what));
+}
+
+void check_radiance(const Light& light) {
+  for (int c = 0; c < 3; ++c)
+    if (!(light.radiance[c] >= 0) || !std::isfinite(light.radiance[c]))
+      fail(light, fmt::format("radiance is {}, {}, {} but no part may be negative",
+                              light.radiance.x, light.radiance.y, light.radiance.z));
+}
+
+ShapeLight make_rectangle(const Light& light) {
+  const V3d normal = light.u % light.v;
+  const double area = 4 * normal.length();
+  if (!(area > 0) || !std::isfinite(area))
+    fail(light, "half edges u and v span no area; make them two different directions");
+  ShapeLight out;
+  out.type = LightType::rectangle;
+  out.radiance = light.radiance;
+  out.center = V3f(light.center);
+  out.u = V3f(light.u);
+  out.v = V3f(light.v);
+  out.normal = V3f(normal / normal.length());
+  const V3d across_u = light.v % normal, across_v = normal % light.u;
+  out.dual_u = V3f(across_u / (light.u ^ across_u));
+  out.dual_v = V3f(across_v / (light.v ^ across_v));
+  out.area = float(area);
+  return out;
+}
+
+ShapeLight make_sphere(const Light& light) {
+  if (!(light.radius > 0) || !std::isfinite(light.radius))
+    fail(light, fmt::format("radius is {} m; it must be positive", light.radius));
+  ShapeLight out;
+  out.type = LightType::sphere;
+  out.radiance = light.radiance;
+  out.center = V3f(light.center);
+  out.radius = float(light.radius);
+  out.area = 4 * kPi * out.radius * out.radius;
+  return out;
+}
+
+SunLight make_sun(const Light& light) {
+  if (!(light.angle_deg > 0 && light.angle_deg <= 180))
+    fail(light, fmt::format("angle_deg is {}; it must lie in (0, 180]", light.angle_deg));
+  if (!(light.direction.length() > 0)) fail(light, "direction has no length");
+  const double half = light.angle_deg * std::numbers::pi / 360;
+  SunLight out;
+  out.toward = V3f(-light.direction.normalized());
+  out.one_minus_cos = float(2 * std::pow(std::sin(half / 2), 2));
+  out.sin2 = float(std::pow(std::sin(half), 2));
+  out.radiance = light.radiance / float(std::numbers::pi * std::pow(std::sin(half), 2));
+  out.importance = luminance(light.radiance);
+  return out;
+}
+
+}  // namespace
+
+float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
+  const V3f to_center = center - origin;
+  if (type == LightType::rectangle) {
+    const float facing = dot(direction, normal);
+    if (!(facing < 0)) return kInfinity;  // it shines along its normal only
+    const float t = dot(to_center, normal) / facing;
+    if (!(t > 0)) return kInfinity;
+    const V3f p = direction * t - to_center;
+    return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
+  }
+  const float along = dot(to_center, direction);
+  const V3f nearest = to_center - direction * along;  // stays exact for far, small spheres
+  const float inside2 = radius * radius - dot(nearest, nearest);
+  if (!(inside2 >= 0) || dot(to_center, to_center) <= radius * radius) return kInfinity;
+  const float t = along - std::sqrt(inside2);
+  return t > 0 ? t : kInfinity;
+}
+
+LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
+  LightSample out;
+  out.radiance = radiance;
+  if (type == LightType::rectangle) {
+    const V3f to = center + u * (2 * u2.x - 1) + v * (2 * u2.y - 1) - from;
+    const float distance2 = dot(to, to);
+    out.distance = std::sqrt(distance2);
+    out.direction = to * (1 / out.distance);
+    const float facing = -dot(out.direction, normal);
+    if (facing > 0) out.pdf = distance2 / (area * facing);
+    return out;
+  }
+  const V3f to = center - from;
+  const float distance2 = dot(to, to), sin2 = radius * radius / distance2;
+  if (!(sin2 < 1)) return out;
+  const float one_minus_cos = sin2 / (1 + std::sqrt(1 - sin2));
+  const V3f local = sample_cone(u2, one_minus_cos);
+  const float distance = std::sqrt(distance2);
+  out.direction = Basis(to * (1 / distance)).world(local);
+  const float off_axis2 = distance2 * (local.x * local.x + local.y * local.y);
+  out.distance = distance * local.z - std::sqrt(std::max(0.f, radius * radius - off_axis2));
+  out.pdf = 1 / (2 * kPi * one_minus_cos);
+  return out;
+}
+
+float ShapeLight::pdf(const V3f& from, const V3f& direction, float distance) const {
+  if (type == LightType::rectangle) {
+    const float facing = -dot(direction, normal);
+    return facing > 0 ? distance * distance / (area * facing) : 0;
+  }
+  const V3f to = center - from;
+  const float sin2 = radius * radius / dot(to, to);
+  return sin2 < 1 ? (1 + std::sqrt(1 - sin2)) / (2 * kPi * sin2) : 0;
+}
+
+float ShapeLight::importance(const V3f& from) const {
+  const V3f away = from - center;
+  const float distance2 = dot(away, away);
+  if (type == LightType::sphere)
+    return distance2 > radius * radius ? luminance(radiance) * kPi * radius * radius / distance2
+                                       : 0;
+  const float height = dot(away, normal);
+  return height > 0
+             ? luminance(radiance) * area * height / (std::sqrt(distance2) * (distance2 + area))
+             : 0;
+}
+
+bool SunLight::covers(const V3f& direction) const {
+  const V3f off = cross(direction, toward);  // 1 - cos would lose the sun's digits
+  return dot(direction, toward) > 0 && dot(off, off) <= sin2;
+}
+
+Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment) {
+  for (const Light& light : lights) {
+    check_radiance(light);
+    switch (light.type) {
+      case LightType::rectangle:
+        shapes_.push_back(make_rectangle(light));
+        break;
+      case LightType::sphere:
+        shapes_.push_back(make_sphere(light));
+        break;
+      case LightType::sun:
+        suns_.push_back(make_sun(light));
+        break;
+      case LightType::environment:
+        if (environment_) fail(light, "a shot has one environment at most; remove one");
+        sample_environment_ =
+            sample_environment == SampleEnvironment::always ||
+            (sample_environment == SampleEnvironment::automatic && !light.map.empty());
+        environment_.emplace(
+            light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
+        environment_importance_ = kPi * luminance(environment_->mean());
+        break;
+    }
+  }
+}
+
+Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
+  Hit hit{-1, distance};
+  for (size_t k = 0; k < shapes_.size(); ++k) {
+    const float t = shapes_[k].intersect(origin, direction);
+    if (t < hit.distance) hit = {int(k), t};
+  }
+  return hit;
+}
+
+float Lights::importance(size_t index, const V3f& from) const {
+  if (index < shapes_.size()) return shapes_[index].importance(from);
+  if (index < environment_index()) return suns_[index - shapes_.size()].importance;
+  return environment_importance_;
+}
+
+float Lights::choice_probability(size_t index, const V3f& from) const {
+  const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
+  float total = 0;
+  for (size_t k = 0; k < count; ++k) total += importance(k, from);
+  return total > 0 ? importance(index, from) / total : 0;
+}
+
+float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const {
+  return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
+}
+
+LightSample Lights::sample(const V3f& from, float u_light, const V2f& u) const {
+  const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
+  float total = 0;
+  for (size_t k = 0; k < count; ++k) total += importance(k, from);
+  if (!(total > 0)) return {};
+  size_t chosen = 0;
+  float weight = importance(0, from), target = u_light * total;
+  while (target >= weight && chosen + 1 < count) {
+    target -= weight;
+    weight = importance(++chosen, from);
+  }
+  LightSample out;
+  if (chosen < shapes_.size()) {
+    out = shapes_[chosen].sample(from, u);
+  } else if (chosen < environment_index()) {
+    const SunLight& sun = suns_[chosen - shapes_.size()];
+    out = {Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos)), kInfinity, sun.radiance,
+           1 / (2 * kPi * sun.one_minus_cos)};
+  } else {
+    const DirectionSample d = environment_->sample(u);
+    out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf};
+  }
+  out.pdf *= weight / total;
+  return out;
+}
+
+}  // namespace drench

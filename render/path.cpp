@@ -1,0 +1,268 @@
+// The path loop: one camera sample, traced ray by ray.
+//
+// Radiance inside water is carried divided by the squared index (basic radiance), which stays
+// constant through interfaces. So lights inside water are given as basic radiance, and a camera
+// under water sees what one behind a flat glass port sees.
+
+#include "render/path.h"
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "render/bsdf_cloth.h"
+#include "render/bsdf_dielectric.h"
+
+namespace drench {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+/// Vertices before roulette may end a path, and the share that survives it at most on long
+/// specular paths: total reflection alone would go on for ever.
+constexpr int kRouletteStart = 3, kLongPath = 24;
+constexpr float kLongSurvival = 0.95f;
+
+/// Sampling dimensions after those of the camera: a block for every vertex of a branch.
+enum VertexDimension : uint32_t {
+  kLightChoice,
+  kLightPoint,
+  kScatterSide,
+  kScatterDirection,
+  kRoulette,
+  kVertexDimensions
+};
+constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
+
+/// Where a path stands: the ray about to be traced and what it carries.
+struct PathState {
+  Ray ray;
+  V3f throughput{1, 1, 1};
+  V3f vertex;           // where the ray comes from, before its offset
+  float bsdf_pdf = 0;   // density of its direction; 0: lights ahead have not been sampled from here
+  bool inside = false;  // in the fluid
+  bool specular_only = true;
+  int vertices = 0, diffuse = 0;
+  uint32_t branch = 0;
+};
+
+template <unsigned features>
+class PathTracer {
+  static constexpr bool kMoving = features & kMotionBlur;
+  static constexpr bool kWater = features & kDielectric;
+  static constexpr bool kLights = features & kSampledLights;
+
+ public:
+  PathTracer(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
+             uint64_t& rays)
+      : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays) {}
+
+  PathSample run(const V2f& film) {
+    const float time = kMoving ? sampler_.one(kTimeDimension) : 0.f;
+    const V2f lens = (features & kThinLens) ? sampler_.two(kLensDimension) : V2f(0);
+    PathState state;
+    state.ray =
+        scene_.camera().template ray<kMoving, (features & kThinLens) != 0>(film, lens, time);
+    state.vertex = state.ray.origin;
+    state.inside = kWater && settings_.camera_in_fluid;
+    walk(state);
+    while (kWater && has_pending_) {
+      has_pending_ = false;
+      PathState next = pending_;
+      walk(next);
+    }
+    return {radiance_, alpha_};
+  }
+
+ private:
+  void walk(PathState& state) {
+    for (bool going = true; going; ++state.vertices) {
+      if (!finite(state.ray.direction) || !finite(state.ray.origin)) return;
+      const Hit hit = scene_.intersect(
+          state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent);
+      ++rays_;
+      if (hit.kind == Hit::Kind::nothing || hit.kind == Hit::Kind::light) {
+        if constexpr (kWater)
+          if (state.inside && hit.kind == Hit::Kind::light) absorb(state, hit.distance);
+        add_emission(state, hit);
+        return;
+      }
+      const Surface surface = scene_.surface<kMoving>(state.ray, hit);
+      going = scatter(state, surface, hit.distance) && survives(state);
+    }
+  }
+
+  bool scatter(PathState& state, const Surface& surface, float distance) {
+    if constexpr (kWater) {
+      const bool interface = surface.material->type == MaterialType::dielectric;
+      // The side that was hit says for certain whether the way led through water.
+      if (interface) state.inside = dot(state.ray.direction, surface.geometric_normal) > 0;
+      if (state.inside) absorb(state, distance);
+      if (interface) return scatter_interface(state, surface);
+    }
+    return scatter_cloth(state, surface);
+  }
+
+  void absorb(PathState& state, float distance) {
+    const V3f a = scene_.fluid_absorption();
+    if (is_black(a)) return;
+    for (int c = 0; c < 3; ++c) state.throughput[c] *= std::exp(-a[c] * distance);
+  }
+
+  /// Weight of light found by a surface sample that light sampling finds with `light_pdf`.
+  float emission_weight(const PathState& state, float light_pdf) const {
+    if (state.bsdf_pdf == 0 || light_pdf == 0) return 1;
+    switch (settings_.estimator) {
+      case Estimator::mis:
+        return power_heuristic(state.bsdf_pdf, light_pdf);
+      case Estimator::light_only:
+        return 0;
+      case Estimator::bsdf_only:
+        return 1;
+    }
+    return 1;
+  }
+
+  void add_emission(const PathState& state, const Hit& hit) {
+    const Lights& lights = scene_.lights();
+    const V3f& direction = state.ray.direction;
+    if (hit.kind == Hit::Kind::light) {
+      const float pdf =
+          kLights && state.bsdf_pdf > 0
+              ? lights.shape_pdf(int(hit.index), state.vertex, direction, hit.distance)
+              : 0.f;
+      radiance_ +=
+          state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf);
+      return;
+    }
+    if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
+    radiance_ += state.throughput *
+                 lights.infinite_radiance(state.vertex, direction, state.bsdf_pdf > 0,
+                                          [&](float pdf) { return emission_weight(state, pdf); });
+  }
+
+  /// Continues the path along `direction` from the surface.
+  void depart(PathState& state, const Surface& surface, const V3f& direction) {
+    state.vertex = surface.position;
+    state.ray.origin = surface.leave(direction);
+    state.ray.direction = direction;
+  }
+
+  bool scatter_interface(PathState& state, const Surface& surface) {
+    const V3f d = state.ray.direction;
+    const float eta = state.inside ? 1 / surface.material->ior : surface.material->ior;
+    const V3f flat = state.inside ? -surface.geometric_normal : surface.geometric_normal;
+    InterfaceSplit split = split_at_interface(
+        d, interface_normal(d, surface.geometric_normal, surface.shading_normal), eta);
+    if (split.reflectance < 1 && !(dot(split.refracted, flat) < 0))
+      split = split_at_interface(d, flat, eta);
+    state.bsdf_pdf = 0;
+    bool reflect = split.reflectance >= 1;
+    if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
+      pending_ = state;
+      pending_.throughput *= split.reflectance;
+      pending_.branch = 1;
+      ++pending_.vertices;
+      depart(pending_, surface, split.reflected);
+      has_pending_ = true;
+      state.throughput *= 1 - split.reflectance;
+    } else if (!reflect) {
+      reflect = number(state, kScatterSide) < split.reflectance;
+    }
+    depart(state, surface, reflect ? split.reflected : split.refracted);
+    if (!reflect) state.inside = !state.inside;
+    return true;
+  }
+
+  bool scatter_cloth(PathState& state, const Surface& surface) {
+    if (++state.diffuse > settings_.depth) return false;
+    const ShadingMaterial& material = *surface.material;
+    const ClothBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                         material.reflectance_at(surface.uv), material.transmittance);
+    if (bsdf.black()) return false;
+    // Light from outside reaches a point in water only by refraction, which surface samples find.
+    const bool sample_lights = kLights && !(kWater && state.inside && !scene_.lights_in_fluid());
+    if (sample_lights && settings_.estimator != Estimator::bsdf_only)
+      add_direct(state, surface, bsdf);
+    const ClothScatter next =
+        bsdf.sample(number(state, kScatterSide), point(state, kScatterDirection));
+    if (!(next.pdf > 0)) return false;
+    depart(state, surface, next.direction);
+    state.throughput *= next.weight;
+    state.bsdf_pdf = sample_lights ? next.pdf : 0;
+    return true;
+  }
+
+  void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
+    const LightSample light = scene_.lights().sample(surface.position, number(state, kLightChoice),
+                                                     point(state, kLightPoint));
+    if (!(light.pdf > 0)) return;
+    float bsdf_pdf = 0;
+    const V3f value = bsdf.value(light.direction, bsdf_pdf);
+    if (is_black(value)) return;
+    const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
+    ++rays_;
+    if (scene_.occluded(shadow, light.distance)) return;
+    const float weight =
+        settings_.estimator == Estimator::light_only ? 1.f : power_heuristic(light.pdf, bsdf_pdf);
+    V3f found = state.throughput * value * light.radiance * (weight / light.pdf);
+    if constexpr (kWater)
+      if (state.inside && light.distance < kInfinity) {
+        const V3f a = scene_.fluid_absorption();
+        for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
+      }
+    if (finite(found)) radiance_ += found;
+  }
+
+  bool survives(PathState& state) {
+    if (state.vertices < kRouletteStart) return true;
+    float keep = std::min(largest(state.throughput), 1.f);
+    if (state.vertices >= kLongPath) keep = std::min(keep, kLongSurvival);
+    if (keep >= 1) return true;
+    if (!(number(state, kRoulette) < keep)) return false;
+    state.throughput *= 1 / keep;
+    return true;
+  }
+
+  uint32_t dimension(const PathState& state, VertexDimension which) const {
+    return kFirstVertexDimension + state.branch * kBranchStride +
+           uint32_t(state.vertices) * kVertexDimensions + which;
+  }
+  float number(const PathState& state, VertexDimension which) const {
+    return sampler_.one(dimension(state, which));
+  }
+  V2f point(const PathState& state, VertexDimension which) const {
+    return sampler_.two(dimension(state, which));
+  }
+
+  const Scene& scene_;
+  const PathSettings& settings_;
+  const Sampler& sampler_;
+  uint64_t& rays_;
+  V3f radiance_{0, 0, 0};
+  float alpha_ = 1;
+  PathState pending_;
+  bool has_pending_ = false;
+};
+
+template <unsigned features>
+PathSample trace(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
+                 const V2f& film, uint64_t& rays) {
+  PathSample sample = PathTracer<features>(scene, settings, sampler, rays).run(film);
+  if (!finite(sample.radiance)) sample.radiance = V3f(0);
+  return sample;
+}
+
+template <size_t... features>
+constexpr std::array<PathFunction, sizeof...(features)> table(std::index_sequence<features...>) {
+  return {&trace<unsigned(features)>...};
+}
+
+}  // namespace
+
+PathFunction path_function(unsigned features) {
+  static constexpr auto functions = table(std::make_index_sequence<kFeatureCount>{});
+  return functions[features % kFeatureCount];
+}
+
+}  // namespace drench

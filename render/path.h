@@ -1,0 +1,41 @@
+#pragma once
+// The path loop, compiled once for every set of features and chosen once for a frame.
+
+#include <cstdint>
+
+#include "render/scene.h"
+
+namespace drench {
+
+/// What the loop must be able to do for a frame. What is absent costs no branch.
+enum Feature : unsigned {
+  kMotionBlur = 1,     // something, or the camera, moves in the shutter
+  kDielectric = 2,     // water: refraction, absorption, medium on the path
+  kSampledLights = 4,  // lights are sampled, with multiple importance sampling
+  kThinLens = 8,
+  kFeatureCount = 16,  // combinations
+};
+
+/// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.
+enum CameraDimension : uint32_t { kFilterDimension, kLensDimension, kTimeDimension };
+
+struct PathSample {
+  V3f radiance;     // W/(sr m^2)
+  float alpha = 1;  // 0 where the camera sees nothing at all
+};
+
+struct PathSettings {
+  int depth = 8;
+  Estimator estimator = Estimator::mis;
+  FirstInterface first_interface = FirstInterface::one;
+  bool camera_in_fluid = false;
+};
+
+/// One camera sample. `film` in pixels; `rays` counts rays traced.
+using PathFunction = PathSample (*)(const Scene&, const PathSettings&, const Sampler&,
+                                    const V2f& film, uint64_t& rays);
+
+/// @param features  any of Feature, combined
+PathFunction path_function(unsigned features);
+
+}  // namespace drench

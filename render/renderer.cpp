@@ -1,0 +1,172 @@
+#include "render/renderer.h"
+
+#include <fmt/format.h>
+#include <immintrin.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <bit>
+#include <ctime>
+#include <mutex>
+
+#include "pipeline/contract/error.h"
+#include "render/filter.h"
+#include "render/options.h"
+#include "render/path.h"
+
+namespace drench {
+
+namespace {
+
+constexpr int kTile = 16;  // pixels a side
+
+double process_cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+/// Denormals to zero while a tile is rendered: Embree asks for it, and it is per thread.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned saved_;
+};
+
+void check_settings(const RenderSettings& r) {
+  constexpr int kLargest = 32768, kMostSamples = 1 << 20;
+  if (r.width < 1 || r.height < 1 || r.width > kLargest || r.height > kLargest)
+    throw Error(fmt::format("render: a picture of {} x {} pixels; each must lie in 1..{}", r.width,
+                            r.height, kLargest));
+  if (r.samples < 1 || r.samples > kMostSamples)
+    throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, kMostSamples));
+  if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
+}
+
+/// What every tile reads.
+struct Job {
+  const Scene& scene;
+  PathSettings path;
+  PathFunction trace;
+  PixelFilter filter;
+  PixelOrder order;
+  uint32_t seed, slots_log2;
+  int samples;
+};
+
+/// The mean of a pixel's samples, added in their order.
+void render_pixel(const Job& job, int x, int y, float* rgba, uint64_t& rays) {
+  double sum[4] = {0, 0, 0, 0};
+  for (int s = 0; s < job.samples; ++s) {
+    const Sampler sampler(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2,
+                          uint32_t(s));
+    const V2f film =
+        V2f(float(x) + 0.5f, float(y) + 0.5f) + job.filter.offset(sampler.two(kFilterDimension));
+    const PathSample sample = job.trace(job.scene, job.path, sampler, film, rays);
+    for (int c = 0; c < 3; ++c) sum[c] += sample.radiance[c];
+    sum[3] += sample.alpha;
+  }
+  for (int c = 0; c < 4; ++c) rgba[c] = float(sum[c] / job.samples);
+}
+
+/// Calls back with the finished share, one tile at a time.
+class Progress {
+ public:
+  Progress(const std::function<void(double)>& report, int tiles) : report_(report), tiles_(tiles) {}
+  void tile_done() {
+    if (!report_) return;
+    const std::lock_guard lock(mutex_);
+    report_(double(++done_) / tiles_);
+  }
+
+ private:
+  const std::function<void(double)>& report_;
+  std::mutex mutex_;
+  int tiles_, done_ = 0;
+};
+
+uint64_t render_tiles(const Job& job, Film& film, Progress& progress, int columns, int rows) {
+  std::atomic<uint64_t> rays{0};
+  const auto one_tile = [&](int tile) {
+    const FlushDenormals flush;
+    uint64_t tile_rays = 0;
+    const int x0 = tile % columns * kTile, y0 = tile / columns * kTile;
+    for (int y = y0; y < std::min(y0 + kTile, film.height); ++y)
+      for (int x = x0; x < std::min(x0 + kTile, film.width); ++x)
+        render_pixel(job, x, y, &film.rgba[4 * (size_t(y) * film.width + x)], tile_rays);
+    rays += tile_rays;
+    progress.tile_done();
+  };
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, columns * rows, 1),
+      [&](const tbb::blocked_range<int>& range) {
+        for (int tile = range.begin(); tile < range.end(); ++tile) one_tile(tile);
+      },
+      tbb::simple_partitioner{});
+  return rays;
+}
+
+}  // namespace
+
+PixelFilter::PixelFilter() {
+  constexpr int kSteps = 4096;
+  std::array<double, kSteps + 1> cdf{};
+  for (int k = 0; k < kSteps; ++k) {
+    const double t = 2 * std::numbers::pi * (k + 0.5) / kSteps;
+    cdf[k + 1] = cdf[k] + 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) -
+                 0.01168 * std::cos(3 * t);
+  }
+  int k = 0;
+  for (int q = 0; q <= kSize; ++q) {
+    const double target = cdf[kSteps] * q / kSize;
+    while (k + 1 < kSteps && cdf[k + 1] < target) ++k;
+    const double within = (target - cdf[k]) / (cdf[k + 1] - cdf[k]);
+    inverse_[q] = float(((k + std::clamp(within, 0., 1.)) / kSteps - 0.5) * kWidth);
+  }
+}
+
+Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
+                  const RenderOptions& options, RenderStats* stats,
+                  const std::function<void(double)>& progress) {
+  check_settings(shot.render);
+  const double cpu_start = process_cpu_seconds();
+  const Scene scene(shot, frame, geometry, options);
+  PathSettings path;
+  path.depth = shot.render.depth;
+  path.estimator = options.estimator;
+  path.first_interface = options.first_interface;
+  path.camera_in_fluid = scene.inside_fluid(scene.camera().open().position, 0);
+  const uint32_t samples = uint32_t(shot.render.samples);
+  const Job job{scene,
+                path,
+                path_function(scene.features() | options.force_features),
+                PixelFilter(),
+                options.pixel_order,
+                hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame))),
+                uint32_t(std::bit_width(samples - 1)),
+                int(samples)};
+  Film film{shot.render.width, shot.render.height, {}};
+  film.rgba.resize(size_t(4) * film.width * film.height);
+  const int columns = (film.width + kTile - 1) / kTile, rows = (film.height + kTile - 1) / kTile;
+  Progress report(progress, columns * rows);
+  const uint64_t rays = render_tiles(job, film, report, columns, rows);
+  if (stats) {
+    stats->camera_samples = uint64_t(film.width) * film.height * samples;
+    stats->rays = rays;
+    stats->cpu_s = process_cpu_seconds() - cpu_start;
+  }
+  return film;
+}
+
+Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, RenderStats* stats,
+                  const std::function<void(double)>& progress) {
+  return render_frame(shot, frame, geometry, RenderOptions{}, stats, progress);
+}
+
+}  // namespace drench

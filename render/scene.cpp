@@ -1,0 +1,345 @@
+#include "render/scene.h"
+
+#include <Imath/ImathBox.h>
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "pipeline/contract/error.h"
+#include "render/path.h"
+
+namespace drench {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kVisibleMotion = 0.1f;  // pixels
+/// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
+constexpr float kRelativeError = 16 * 0x1p-24f;
+constexpr float kSharedError = 2 * 0x1p-24f;
+
+EmbreeDevice make_device() {
+  // One instruction set on every machine, so that rays meet the same triangles everywhere.
+  EmbreeDevice device(rtcNewDevice("isa=avx2"));
+  if (!device) throw std::runtime_error("Embree could not be started with isa=avx2");
+  return device;
+}
+
+void check_embree(RTCDevice device) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error == RTC_ERROR_OUT_OF_MEMORY)
+    throw Error(
+        "the scene's ray-tracing structure does not fit into memory; use a coarser surface");
+  if (error != RTC_ERROR_NONE)
+    throw std::runtime_error(fmt::format("Embree reports error {}", int(error)));
+}
+
+void check_mesh(const TriangleMesh& mesh, const std::string& what) {
+  const auto fail = [&](const std::string& why) {
+    throw Error(fmt::format("{}: {}; make the mesh anew", what, why));
+  };
+  const size_t n = mesh.position.size();
+  if (!mesh.velocity.empty() && mesh.velocity.size() != n)
+    fail(fmt::format("{} velocities for {} vertices", mesh.velocity.size(), n));
+  if (!mesh.normal.empty() && mesh.normal.size() != n)
+    fail(fmt::format("{} normals for {} vertices", mesh.normal.size(), n));
+  if (!mesh.uv.empty() && mesh.uv.size() != n)
+    fail(fmt::format("{} texture coordinates for {} vertices", mesh.uv.size(), n));
+  for (size_t k = 0; k < n; ++k)
+    if (!finite(mesh.position[k]) || (!mesh.velocity.empty() && !finite(mesh.velocity[k])))
+      fail(fmt::format("vertex {} is not finite", k));
+  for (size_t k = 0; k < mesh.triangle.size(); ++k)
+    if (std::max({mesh.triangle[k].x, mesh.triangle[k].y, mesh.triangle[k].z}) >= n)
+      fail(fmt::format("triangle {} names a vertex beyond the {} there are", k, n));
+}
+
+/// Vertex normals weighted by area.
+std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
+  std::vector<V3f> normal(mesh.position.size(), V3f(0));
+  for (const auto& t : mesh.triangle) {
+    const V3f& a = mesh.position[t.x];
+    const V3f n = cross(mesh.position[t.y] - a, mesh.position[t.z] - a);
+    for (uint32_t v : {t.x, t.y, t.z}) normal[v] += n;
+  }
+  for (V3f& n : normal) n = dot(n, n) > 0 ? normalized(n) : V3f(0, 1, 0);
+  return normal;
+}
+
+/// Surfaces that should touch the ground end a little above or below it, and a film of air under
+/// water mirrors. The lowest part of the fluid, one spacing high, is stretched to end one spacing
+/// below the ground: contact without a gap, continuous above.
+void press_onto_ground(std::vector<V3f>& position, float ground, float spacing) {
+  for (V3f& p : position) {
+    const float height = p.y - ground;
+    if (height < spacing) p.y -= spacing - std::max(height, -spacing);
+  }
+}
+
+}  // namespace
+
+V3f Surface::leave(const V3f& direction) const {
+  const float reach = dot(absolute(geometric_normal), error);
+  return position + geometric_normal * (dot(direction, geometric_normal) > 0 ? reach : -reach);
+}
+
+Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
+             const RenderOptions& options)
+    : open_(shot.render.motion_blur ? shot.camera.shutter_open : 0),
+      close_(shot.render.motion_blur ? shot.camera.shutter_close : 0),
+      fps_(shot.timeline.fps),
+      camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
+      lights_(shot.light, options.environment == EnvironmentSampling::always
+                              ? Lights::SampleEnvironment::always
+                          : options.environment == EnvironmentSampling::never
+                              ? Lights::SampleEnvironment::never
+                              : Lights::SampleEnvironment::automatic),
+      device_(make_device()) {
+  if (!(close_ >= open_)) throw Error("camera: shutter_close lies before shutter_open; swap them");
+  if (shot.ground.present) {
+    has_ground_ = true;
+    ground_center_ =
+        V3f(float(shot.ground.center.x), float(shot.ground.height), float(shot.ground.center.z));
+    ground_half_size_ = float(shot.ground.half_size);
+    ground_material_ = add_material(shot, shot.ground.material);
+    if (materials_[ground_material_].type == MaterialType::dielectric)
+      throw Error(
+          fmt::format("ground: material '{}' is a dielectric, which needs a closed surface; "
+                      "use a diffuse one",
+                      shot.ground.material));
+  }
+  if (!geometry.fluid.triangle.empty()) add_fluid(shot, geometry.fluid);
+  for (const ClothFrame& cloth : geometry.cloth) {
+    if (cloth.mesh.triangle.empty()) continue;
+    std::string material = "cotton";
+    for (const Cloth& c : shot.cloth)
+      if (c.name == cloth.name) material = c.material;
+    const uint32_t index = add_material(shot, material);
+    if (materials_[index].type == MaterialType::dielectric)
+      throw Error(
+          fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
+                      "surface; use a cloth or diffuse one",
+                      cloth.name, material));
+    add_object(cloth.mesh, fmt::format("cloth '{}'", cloth.name), index);
+  }
+  assemble();
+  find_features();
+}
+
+uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
+  materials_.push_back(find_material(shot, name));
+  return uint32_t(materials_.size() - 1);
+}
+
+void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
+  const uint32_t material = add_material(shot, shot.fluid.material);
+  add_object(mesh, "fluid surface", material);
+  if (materials_[material].type != MaterialType::dielectric) return;
+  fluid_ = int(objects_.size()) - 1;
+  fluid_absorption_ = materials_[material].absorption;
+  SceneObject& fluid = objects_.back();
+  if (has_ground_)
+    for (std::vector<V3f>* p : {&fluid.position, &fluid.position_close})
+      press_onto_ground(*p, ground_center_.y, float(shot.fluid.spacing));
+
+  Imath::Box3f bounds;
+  for (const std::vector<V3f>* positions : {&fluid.position, &fluid.position_close})
+    for (const V3f& p : *positions) bounds.extendBy(p);
+  for (const ShapeLight& light : lights_.shapes()) {
+    V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
+    if (light.type == LightType::sphere) reach = V3f(light.radius);
+    lights_in_fluid_ |= bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
+  }
+}
+
+bool Scene::moves_visibly(const TriangleMesh& mesh) const {
+  if (mesh.velocity.empty() || close_ == open_) return false;
+  const float shutter = float((close_ - open_) / fps_);  // s
+  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  for (size_t k = 0; k < mesh.position.size(); ++k) {
+    const float distance = (mesh.position[k] - camera_.open().position).length();
+    if (mesh.velocity[k].length() > limit * distance) return true;
+  }
+  return false;
+}
+
+void Scene::add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material) {
+  check_mesh(mesh, what);
+  SceneObject object;
+  object.triangle = mesh.triangle;
+  object.normal = mesh.normal.empty() ? smooth_normals(mesh) : mesh.normal;
+  object.uv = mesh.uv;
+  object.material = material;
+  const auto at = [&](double frames) {
+    std::vector<V3f> moved = mesh.position;
+    const float dt = float(frames / fps_);
+    if (dt != 0 && !mesh.velocity.empty())
+      for (size_t k = 0; k < moved.size(); ++k) moved[k] += mesh.velocity[k] * dt;
+    moved.push_back(V3f(0));
+    return moved;
+  };
+  if (moves_visibly(mesh)) {
+    object.position = at(open_);
+    object.position_close = at(close_);
+  } else {
+    object.position = at(0);
+  }
+  objects_.push_back(std::move(object));
+}
+
+void Scene::build(SceneObject& object) {
+  EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  const size_t vertices = object.position.size() - 1;
+  rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
+  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                             object.position.data(), 0, sizeof(V3f), vertices);
+  if (object.moves())
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 1, RTC_FORMAT_FLOAT3,
+                               object.position_close.data(), 0, sizeof(V3f), vertices);
+  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             object.triangle.data(), 0, 3 * sizeof(uint32_t),
+                             object.triangle.size());
+  rtcSetGeometryMask(geometry.get(), 0xffffffffu);
+  rtcCommitGeometry(geometry.get());
+  object.scene.reset(rtcNewScene(device_.get()));
+  if (materials_[object.material].type == MaterialType::dielectric)
+    rtcSetSceneFlags(object.scene.get(), RTC_SCENE_FLAG_ROBUST);
+  // High quality would split triangles differently for different thread counts.
+  rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
+  rtcAttachGeometry(object.scene.get(), geometry.get());
+  rtcJoinCommitScene(object.scene.get());
+  check_embree(device_.get());
+}
+
+void Scene::assemble() {
+  if (objects_.empty()) return;
+  scene_.reset(rtcNewScene(device_.get()));
+  for (SceneObject& object : objects_) {
+    build(object);
+    EmbreeGeometry instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(instance.get(), object.scene.get());
+    rtcSetGeometryMask(instance.get(), 0xffffffffu);
+    rtcCommitGeometry(instance.get());
+    rtcAttachGeometry(scene_.get(), instance.get());
+  }
+  rtcJoinCommitScene(scene_.get());
+  check_embree(device_.get());
+}
+
+void Scene::find_features() {
+  bool moving = camera_.moves();
+  for (const SceneObject& object : objects_) moving |= object.moves();
+  features_ = (moving ? kMotionBlur : 0u) | (fluid_ >= 0 ? kDielectric : 0u) |
+              (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u);
+}
+
+float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
+  const float t = (ground_center_.y - origin.y) / direction.y;
+  if (!(t > 0)) return kInfinity;  // also the ray that starts on it, at 0, and the parallel one
+  const V3f p = origin + direction * t - ground_center_;
+  return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
+}
+
+Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
+  Hit hit;
+  hit.distance = kInfinity;
+  if (has_ground_) {
+    hit.distance = ground_distance(ray.origin, ray.direction);
+    if (hit.distance < kInfinity) hit.kind = Hit::Kind::ground;
+  }
+  const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
+  if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
+  if (!scene_) return hit;
+  RTCRayHit query;
+  query.ray = {ray.origin.x,
+               ray.origin.y,
+               ray.origin.z,
+               0,
+               ray.direction.x,
+               ray.direction.y,
+               ray.direction.z,
+               ray.time,
+               hit.distance,
+               0xffffffffu,
+               0,
+               0};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embree_intersect(scene_.get(), query, coherence);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
+  return {Hit::Kind::object, query.ray.tfar, query.hit.instID[0],
+          query.hit.primID,  query.hit.u,    query.hit.v};
+}
+
+bool Scene::occluded(const Ray& ray, float distance) const {
+  const float reach = distance * (1 - 1e-4f);
+  if (has_ground_ && ground_distance(ray.origin, ray.direction) < reach) return true;
+  if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
+  if (!scene_) return false;
+  RTCRay query{ray.origin.x,
+               ray.origin.y,
+               ray.origin.z,
+               0,
+               ray.direction.x,
+               ray.direction.y,
+               ray.direction.z,
+               ray.time,
+               reach,
+               0xffffffffu,
+               0,
+               0};
+  embree_occluded(scene_.get(), query);
+  return query.tfar < 0;
+}
+
+template <bool moving>
+Surface Scene::surface(const Ray& ray, const Hit& hit) const {
+  Surface s;
+  if (hit.kind == Hit::Kind::ground) {
+    s.position = ray.origin + ray.direction * hit.distance;
+    s.position.y = ground_center_.y;  // exactly: rays leave it without an offset
+    s.error = V3f(0);
+    s.geometric_normal = s.shading_normal = V3f(0, 1, 0);
+    s.uv = {s.position.x, s.position.z};
+    s.material = &materials_[ground_material_];
+    return s;
+  }
+  const SceneObject& object = objects_[hit.index];
+  const auto& t = object.triangle[hit.triangle];
+  V3f a = object.position[t.x], b = object.position[t.y], c = object.position[t.z];
+  if constexpr (moving)
+    if (object.moves()) {
+      a += (object.position_close[t.x] - a) * ray.time;
+      b += (object.position_close[t.y] - b) * ray.time;
+      c += (object.position_close[t.z] - c) * ray.time;
+    }
+  const float w = 1 - hit.u - hit.v;
+  s.position = a * w + b * hit.u + c * hit.v;
+  const V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
+  s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  s.geometric_normal = normalized(cross(b - a, c - a));
+  s.shading_normal =
+      normalized(object.normal[t.x] * w + object.normal[t.y] * hit.u + object.normal[t.z] * hit.v);
+  if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
+  if (!object.uv.empty())
+    s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
+  s.material = &materials_[object.material];
+  return s;
+}
+
+template Surface Scene::surface<false>(const Ray&, const Hit&) const;
+template Surface Scene::surface<true>(const Ray&, const Hit&) const;
+
+bool Scene::inside_fluid(const V3f& point, float time) const {
+  if (fluid_ < 0) return false;
+  // The mesh is closed and outward: a point is inside if the first side met is an inner one.
+  RTCRayHit query;
+  query.ray = {point.x, point.y, point.z, 0, 0, 1, 0, time, kInfinity, 0xffffffffu, 0, 0};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  embree_intersect(objects_[fluid_].scene.get(), query, Coherence::incoherent);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  Hit hit{Hit::Kind::object, query.ray.tfar, uint32_t(fluid_),
+          query.hit.primID,  query.hit.u,    query.hit.v};
+  return surface<true>({point, V3f(0, 1, 0), time}, hit).geometric_normal.y > 0;
+}
+
+}  // namespace drench

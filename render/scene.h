@@ -1,0 +1,95 @@
+#pragma once
+// Everything a ray can meet in one frame: Embree scenes of the fluid and the cloth, the ground, the
+// lights, and which features of the path loop the frame needs.
+
+#include "pipeline/contract/frames.h"
+#include "render/camera.h"
+#include "render/embree.h"
+#include "render/lights.h"
+#include "render/material.h"
+#include "render/options.h"
+
+namespace drench {
+
+/// One mesh, at shutter open and, if it moves, at shutter close.
+struct SceneObject {
+  std::vector<Imath::Vec3<uint32_t>> triangle;
+  std::vector<V3f> position, position_close;  // m; the last entry is padding for Embree
+  std::vector<V3f> normal;                    // unit, per vertex; empty: flat
+  std::vector<V2f> uv;                        // may be empty
+  uint32_t material = 0;
+  EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
+
+  bool moves() const { return !position_close.empty(); }
+};
+
+/// What a ray met first.
+struct Hit {
+  enum class Kind { nothing, light, ground, object };
+  Kind kind = Kind::nothing;
+  float distance = 0;  // m; infinity for nothing
+  uint32_t index = 0;  // of the light or object
+  uint32_t triangle = 0;
+  float u = 0, v = 0;  // barycentric weights of vertices 1 and 2
+};
+
+/// A point of a surface.
+struct Surface {
+  V3f position, error;   // m; |computed - exact| <= error per axis
+  V3f geometric_normal;  // unit, outward
+  V3f shading_normal;    // unit, in the hemisphere of geometric_normal
+  V2f uv;
+  const ShadingMaterial* material = nullptr;
+
+  /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error.
+  V3f leave(const V3f& direction) const;
+};
+
+class Scene {
+ public:
+  /// @throws Error for a mesh, material, light or camera that cannot be rendered.
+  Scene(const Shot& shot, int frame, const FrameGeometry& geometry, const RenderOptions& options);
+
+  Hit intersect(const Ray& ray, Coherence coherence) const;
+  /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
+  bool occluded(const Ray& ray, float distance) const;
+  template <bool moving>
+  Surface surface(const Ray& ray, const Hit& hit) const;
+  /// Whether a point lies inside the fluid.
+  bool inside_fluid(const V3f& point, float time) const;
+
+  const ShutterCamera& camera() const { return camera_; }
+  const Lights& lights() const { return lights_; }
+  V3f fluid_absorption() const { return fluid_absorption_; }  // 1/m
+  bool lights_in_fluid() const { return lights_in_fluid_; }
+  unsigned features() const { return features_; }
+
+ private:
+  void add_fluid(const Shot& shot, const TriangleMesh& mesh);
+  void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
+  uint32_t add_material(const Shot& shot, const std::string& name);
+  void build(SceneObject& object);
+  void assemble();
+  void find_features();
+  bool moves_visibly(const TriangleMesh& mesh) const;
+  float ground_distance(const V3f& origin, const V3f& direction) const;
+
+  double open_ = 0, close_ = 0;  // shutter relative to the frame, frames
+  double fps_ = 24;
+  ShutterCamera camera_;
+  Lights lights_;
+  EmbreeDevice device_;
+  std::vector<ShadingMaterial> materials_;
+  std::vector<SceneObject> objects_;
+  EmbreeScene scene_;  // instances of the objects' scenes; null without objects
+  bool has_ground_ = false;
+  V3f ground_center_;
+  float ground_half_size_ = 0;
+  uint32_t ground_material_ = 0;
+  int fluid_ = -1;  // index of the dielectric object
+  V3f fluid_absorption_{0, 0, 0};
+  bool lights_in_fluid_ = false;
+  unsigned features_ = 0;
+};
+
+}  // namespace drench
