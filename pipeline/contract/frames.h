@@ -22,11 +22,11 @@ struct ParticleFrame {
 /// A triangle mesh: the fluid's surface (closed, outward) or a sheet of cloth (open).
 /// Vertex columns have the length of `position`, or are empty where noted.
 struct TriangleMesh {
-  std::vector<Imath::V3f> position;        // m, world
-  std::vector<Imath::V3f> velocity;        // m/s
-  std::vector<Imath::V3f> normal;          // unit, or empty
-  std::vector<Imath::V2f> uv;              // cloth: texture and rest plane, or empty
-  std::vector<Imath::V3f> rest_position;   // cloth: m, at rest, or empty
+  std::vector<Imath::V3f> position;             // m, world
+  std::vector<Imath::V3f> velocity;             // m/s
+  std::vector<Imath::V3f> normal;               // unit, or empty
+  std::vector<Imath::V2f> uv;                   // cloth: texture and rest plane, or empty
+  std::vector<Imath::V3f> rest_position;        // cloth: m, at rest, or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
 };
 

@@ -9,14 +9,15 @@
 namespace drench {
 
 /// Writes 16-bit positions in voxels of 2 spacings, half velocities and the columns present, Blosc.
-/// Equal frames give equal bytes (the header's random UUID becomes a digest of the content), for any
-/// thread count. Order of particles is kept only up to `id`.
+/// Equal frames give equal bytes (the header's random UUID becomes a digest of the content), for
+/// any thread count. Order of particles is kept only up to `id`.
 WrittenFile write_particles(const std::filesystem::path& path, const ParticleFrame& frame);
 
 /// Particles sorted by id when the file has ids. @throws Error if damaged or not such a file.
 ParticleFrame read_particles(const std::filesystem::path& path);
 
 /// Narrow-band level set of a closed mesh, band of 3 voxels a side.
-WrittenFile write_level_set(const std::filesystem::path& path, const TriangleMesh& mesh, double voxel);
+WrittenFile write_level_set(const std::filesystem::path& path, const TriangleMesh& mesh,
+                            double voxel);
 
 }  // namespace drench

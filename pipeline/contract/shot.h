@@ -74,18 +74,20 @@ struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kep
 };
 
 struct Fluid {
-  double spacing = 0.01;             // m, a
-  double support_ratio = 2;          // support radius / spacing
-  double rest_density = 1000;        // kg/m^3
-  double kinematic_viscosity = 1e-6; // m^2/s
+  double spacing = 0.01;               // m, a
+  double support_ratio = 2;            // support radius / spacing
+  double rest_density = 1000;          // kg/m^3
+  double kinematic_viscosity = 1e-6;   // m^2/s
   double artificial_viscosity = 0.05;  // alpha of Monaghan 1992, dimensionless; 0 is none
-  double sound_speed = 0;            // m/s; 0: ten times the largest speed expected
+  double sound_speed = 0;              // m/s; 0: ten times the largest speed expected
   std::string material = "water";
   std::vector<FluidBox> box;
   std::vector<FluidSphere> sphere;
   std::vector<FluidEmitter> emitter;
   std::vector<FluidDrops> drops;
-  bool present() const { return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty()); }
+  bool present() const {
+    return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty());
+  }
 };
 
 struct ClothPin {  // vertices held where they start; exactly one of the two forms is given
@@ -100,17 +102,20 @@ struct Cloth {
   V2i cells{64, 64};
   std::filesystem::path mesh_file;  // PLY or OBJ triangles, absolute after reading
   std::vector<ClothPin> pin;
-  V3d velocity{0, 0, 0};        // m/s at the start
-  double areal_density = 0.2;   // kg/m^2
+  V3d velocity{0, 0, 0};            // m/s at the start
+  double areal_density = 0.2;       // kg/m^2
   double adjacent_stiffness = 400;  // N/m, the 2-D modulus k_adj
   double diagonal_stiffness = 200;  // N/m, k_diag; isotropic when k_adj = 2 k_diag
-  double damping = 0.5;         // 1/s, rate of eq (3): d = exp(-damping dt)
-  double spring_damping = 0.02; // fraction of critical, along each spring; momentum is kept
-  double thickness = 0.001;     // m
+  double damping = 0.5;             // 1/s, rate of eq (3): d = exp(-damping dt)
+  double spring_damping = 0.02;     // fraction of critical, along each spring; momentum is kept
+  double thickness = 0.001;         // m
   std::string material = "cotton";
 };
 
-enum class CouplingScheme { exact, paper };  // exact: mended; paper: Harada et al. 2007 as published
+enum class CouplingScheme {
+  exact,
+  paper
+};  // exact: mended; paper: Harada et al. 2007 as published
 
 struct Coupling {
   CouplingScheme scheme = CouplingScheme::exact;
@@ -128,9 +133,9 @@ struct SurfaceSettings {
 /// A keyframed thin-lens camera, looking along -Z of its own frame.
 struct Camera {
   Animated<V3d> position{V3d(0, 1, 3)}, target{V3d(0, 0.5, 0)};  // m
-  Animated<double> fov_deg{40.0};         // horizontal
-  Animated<double> focus_distance{0.0};   // m; 0: distance to target
-  Animated<double> lens_radius{0.0};      // m; 0: pinhole
+  Animated<double> fov_deg{40.0};                                // horizontal
+  Animated<double> focus_distance{0.0};                          // m; 0: distance to target
+  Animated<double> lens_radius{0.0};                             // m; 0: pinhole
   V3d up{0, 1, 0};
   double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
 };
@@ -140,14 +145,14 @@ enum class LightType { rectangle, sphere, sun, environment };
 struct Light {
   LightType type = LightType::rectangle;
   std::string name = "light";
-  V3f radiance{1, 1, 1};       // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
-  V3d center{0, 3, 0};         // rectangle, sphere, m
+  V3f radiance{1, 1, 1};           // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
+  V3d center{0, 3, 0};             // rectangle, sphere, m
   V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
-  double radius = 0.1;         // sphere, m
-  V3d direction{0, -1, 0};     // sun: the way its light travels
-  double angle_deg = 0.53;     // sun: apparent diameter
-  std::filesystem::path map;   // environment: latitude-longitude EXR; empty: constant
-  double rotation_deg = 0;     // environment, about Y
+  double radius = 0.1;             // sphere, m
+  V3d direction{0, -1, 0};         // sun: the way its light travels
+  double angle_deg = 0.53;         // sun: apparent diameter
+  std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
+  double rotation_deg = 0;         // environment, about Y
 };
 
 enum class MaterialType { dielectric, cloth, diffuse };
@@ -155,13 +160,13 @@ enum class MaterialType { dielectric, cloth, diffuse };
 struct Material {
   std::string name;
   MaterialType type = MaterialType::diffuse;
-  V3f reflectance{0.5f, 0.5f, 0.5f};    // diffuse, cloth
-  V3f transmittance{0, 0, 0};           // cloth: diffuse transmission; reflectance + it <= 1
-  double ior = 1.333;                   // dielectric
-  V3f absorption{0, 0, 0};              // dielectric, 1/m
-  std::filesystem::path texture;        // diffuse, cloth: PNG, JPEG or EXR, multiplies reflectance
-  bool checker = false;                 // diffuse: built-in checker of checker_size
-  double checker_size = 0.1;            // m
+  V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth
+  V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
+  double ior = 1.333;                 // dielectric
+  V3f absorption{0, 0, 0};            // dielectric, 1/m
+  std::filesystem::path texture;      // diffuse, cloth: PNG, JPEG or EXR, multiplies reflectance
+  bool checker = false;               // diffuse: built-in checker of checker_size
+  double checker_size = 0.1;          // m
 };
 
 /// A horizontal plane that the renderer draws under the scene.

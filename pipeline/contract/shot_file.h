@@ -11,15 +11,17 @@
 namespace drench {
 
 struct ShotOptions {
-  std::string quality = "final";          // applies [quality.NAME]; final is the shot as written
-  std::vector<std::string> set;           // "section.key=value", value in TOML
+  std::string quality = "final";  // applies [quality.NAME]; final is the shot as written
+  std::vector<std::string> set;   // "section.key=value", value in TOML
 };
 
 /// Reads and checks a shot. Paths inside are relative to the shot's folder.
-/// @throws Error naming file, line, key, value, limits and, for an unknown key, the nearest valid one.
+/// @throws Error naming file, line, key, value, limits and, for an unknown key, the nearest valid
+/// one.
 Shot read_shot(const std::filesystem::path& file, const ShotOptions& options = {});
 /// The same from text; `file` is only named in errors and used to resolve paths.
-Shot parse_shot(const std::string& text, const std::filesystem::path& file, const ShotOptions& options = {});
+Shot parse_shot(const std::string& text, const std::filesystem::path& file,
+                const ShotOptions& options = {});
 
 /// The resolved shot as TOML, every key of the table present, in the table's order: shot.lock.toml.
 /// parse_shot(lock) gives the same shot.

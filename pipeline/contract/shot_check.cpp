@@ -1,0 +1,387 @@
+#include "pipeline/contract/shot_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pipeline/contract/error.h"
+
+namespace drench {
+
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double most_particles = 2e8;  // about 20 GB of state
+constexpr double most_frames = 1e6;
+constexpr double most_cells = 1e6;     // grid cells along one axis
+constexpr double most_vertices = 4e6;  // of one sheet
+
+std::string text_of(const V3d& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
+
+class Checker {
+ public:
+  Checker(const Shot& shot, const ShotSources& sources) : shot_(shot), sources_(sources) {}
+
+  void check() const {
+    check_time();
+    check_domain();
+    check_fluid();
+    for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
+    check_names();
+    if (!shot_.fluid.present() && shot_.cloth.empty()) {
+      fail("fluid",
+           "the shot has neither fluid nor cloth, so there is nothing to simulate; add a "
+           "[[fluid.box]] or a [[cloth]]");
+    }
+    check_particles();
+    check_camera();
+    for (size_t i = 0; i < shot_.light.size(); ++i) check_light(i);
+    for (size_t i = 0; i < shot_.material.size(); ++i) check_material(i);
+    check_material_uses();
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& key, const std::string& text) const {
+    throw Error(fmt::format("{}: {}", sources_.at(key), text));
+  }
+
+  void check_time() const {
+    const Timeline& time = shot_.timeline;
+    if (time.first > time.last) {
+      fail("shot.frames", fmt::format("shot.frames is [{}, {}]; the first frame stands after the "
+                                      "last. Write [{}, {}]",
+                                      time.first, time.last, time.last, time.first));
+    }
+    const double count = double(time.last) - time.first + 1;
+    if (count > most_frames) {
+      fail("shot.frames", fmt::format("shot.frames is [{}, {}], {:.0f} frames; at most {:.0f} are "
+                                      "allowed. Split the shot",
+                                      time.first, time.last, count, most_frames));
+    }
+  }
+
+  void check_corners(const std::string& path, const V3d& min, const V3d& max) const {
+    for (int i = 0; i < 3; ++i) {
+      if (min[i] >= max[i]) {
+        fail(path + ".min",
+             fmt::format("{0}.min is {1} and {0}.max is {2}; in {3} min must be less than max. "
+                         "Exchange or widen them",
+                         path, text_of(min), text_of(max), "xyz"[i]));
+      }
+    }
+  }
+
+  void check_domain() const {
+    const Domain& domain = shot_.domain;
+    check_corners("domain", domain.min, domain.max);
+    for (int i = 0; i < 3; ++i) {
+      const double cells = (domain.max[i] - domain.min[i]) / shot_.fluid.spacing;
+      if (shot_.fluid.present() && cells > most_cells) {
+        fail("fluid.spacing",
+             fmt::format(
+                 "fluid.spacing is {} m but the domain is {} m long in {}: {:.3g} spacings, "
+                 "at most {:.0f} are allowed. Use a larger spacing or a smaller domain",
+                 shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i], cells, most_cells));
+      }
+    }
+  }
+
+  /// Fluid must start between the walls; half a spacing is the rounding of a lattice.
+  void check_inside(const std::string& path, const V3d& min, const V3d& max) const {
+    const Domain& domain = shot_.domain;
+    const double slack = 0.5 * shot_.fluid.spacing + 1e-9;
+    for (int i = 0; i < 3; ++i) {
+      if (domain.axis[size_t(i)] == Axis::open) continue;
+      if (min[i] < domain.min[i] - slack || max[i] > domain.max[i] + slack) {
+        fail(path, fmt::format("{} reaches from {} to {} m in {}, beyond the domain's walls at {} "
+                               "and {} m. Move it, or widen [domain]",
+                               path, min[i], max[i], "xyz"[i], domain.min[i], domain.max[i]));
+      }
+    }
+  }
+
+  void check_not_zero(const std::string& key, const V3d& v) const {
+    if (!(v.length() > 1e-9)) {
+      fail(key, fmt::format("{} is {}, which has no direction; give it a length other than 0", key,
+                            text_of(v)));
+    }
+  }
+
+  void check_positive(const std::string& key, double value, std::string_view unit,
+                      std::string_view why) const {
+    if (!(value > 0)) {
+      fail(key, fmt::format("{} is {}{}; {}. Use a value above 0", key, value, unit, why));
+    }
+  }
+
+  void check_fluid() const {
+    const Fluid& fluid = shot_.fluid;
+    if (fluid.support_ratio < 1.2) {
+      fail("fluid.support_ratio",
+           fmt::format("support radius is {} m (support_ratio {}) but fluid.spacing is {} m; "
+                       "particles would have no neighbours. Use support_ratio = 2.0 ({} m), at "
+                       "least 1.2",
+                       fluid.support_ratio * fluid.spacing, fluid.support_ratio, fluid.spacing,
+                       2 * fluid.spacing));
+    }
+    for (size_t i = 0; i < fluid.box.size(); ++i) check_box(i);
+    for (size_t i = 0; i < fluid.sphere.size(); ++i) {
+      const FluidSphere& sphere = fluid.sphere[i];
+      const std::string path = fmt::format("fluid.sphere[{}]", i);
+      check_positive(path + ".radius", sphere.radius, " m", "the sphere would hold no fluid");
+      check_inside(path, sphere.center - V3d(sphere.radius), sphere.center + V3d(sphere.radius));
+    }
+    for (size_t i = 0; i < fluid.emitter.size(); ++i) check_emitter(i);
+    for (size_t i = 0; i < fluid.drops.size(); ++i) check_drops(i);
+  }
+
+  void check_box(size_t i) const {
+    const FluidBox& box = shot_.fluid.box[i];
+    const std::string path = fmt::format("fluid.box[{}]", i);
+    check_corners(path, box.min, box.max);
+    for (int k = 0; k < 3; ++k) {
+      if (std::round((box.max[k] - box.min[k]) / shot_.fluid.spacing) < 1) {
+        fail(path, fmt::format("{} is {} m thick in {}, less than half of fluid.spacing ({} m), so "
+                               "it holds no particle. Use a smaller spacing or a thicker box",
+                               path, box.max[k] - box.min[k], "xyz"[k], shot_.fluid.spacing));
+      }
+    }
+    check_inside(path, box.min, box.max);
+  }
+
+  void check_emitter(size_t i) const {
+    const FluidEmitter& emitter = shot_.fluid.emitter[i];
+    const std::string path = fmt::format("fluid.emitter[{}]", i);
+    check_positive(path + ".radius", emitter.radius, " m", "the inlet has no area");
+    check_positive(path + ".speed", emitter.speed, " m/s", "nothing would flow");
+    check_not_zero(path + ".direction", emitter.direction);
+    if (emitter.start >= emitter.stop) {
+      fail(path + ".start", fmt::format("{0}.start is {1} s and {0}.stop is {2} s; it would stop "
+                                        "before it starts. Exchange them",
+                                        path, emitter.start, emitter.stop));
+    }
+    check_inside(path, emitter.center, emitter.center);
+  }
+
+  void check_drops(size_t i) const {
+    const FluidDrops& drops = shot_.fluid.drops[i];
+    const std::string path = fmt::format("fluid.drops[{}]", i);
+    for (int k = 0; k < 3; ++k) {
+      if (drops.min[k] > drops.max[k]) {
+        fail(path + ".min",
+             fmt::format("{0}.min is {1} and {0}.max is {2}; in {3} min exceeds max. Exchange them",
+                         path, text_of(drops.min), text_of(drops.max), "xyz"[k]));
+      }
+    }
+    check_positive(path + ".radius", drops.radius, " m", "a drop would hold no fluid");
+    check_positive(path + ".count", drops.count, "", "there would be no drop");
+    check_inside(path, drops.min - V3d(drops.radius), drops.max + V3d(drops.radius));
+  }
+
+  /// Largest number of particles that the sources may give, from their volumes.
+  double particles_of_sources() const {
+    const Fluid& fluid = shot_.fluid;
+    const Timeline& time = shot_.timeline;
+    const double end = shot_.preroll + (double(time.last) - time.first) / time.fps;
+    const double unit = fluid.spacing * fluid.spacing * fluid.spacing;
+    const auto ball = [](double radius) { return 4 * pi / 3 * radius * radius * radius; };
+    double count = 0;
+    for (const FluidBox& box : fluid.box) {
+      const V3d size = box.max - box.min;
+      count += size.x * size.y * size.z / unit;
+    }
+    for (const FluidSphere& sphere : fluid.sphere) count += ball(sphere.radius) / unit;
+    for (const FluidEmitter& e : fluid.emitter) {
+      const double flows = std::max(0.0, std::min(e.stop, end) - e.start);
+      count += pi * e.radius * e.radius * e.speed * flows / unit;
+    }
+    for (const FluidDrops& drops : fluid.drops) {
+      count += drops.particles > 0 ? drops.particles : drops.count * ball(drops.radius) / unit;
+    }
+    return count;
+  }
+
+  void check_particles() const {
+    const double count = particles_of_sources();
+    if (count > most_particles) {
+      fail("fluid.spacing",
+           fmt::format("fluid.spacing is {} m, which gives about {:.3g} particles; at most {:.3g} "
+                       "are allowed. Use at least {:.2g} m, or less fluid",
+                       shot_.fluid.spacing, count, most_particles,
+                       1.01 * shot_.fluid.spacing * std::cbrt(count / most_particles)));
+    }
+  }
+
+  void check_cloth(size_t i) const {
+    const Cloth& cloth = shot_.cloth[i];
+    const std::string path = fmt::format("cloth[{}]", i);
+    const double vertices = (cloth.cells.x + 1.0) * (cloth.cells.y + 1.0);
+    if (cloth.mesh_file.empty()) {
+      const double area = cloth.u.cross(cloth.v).length();
+      if (!(area > 1e-12)) {
+        fail(path + ".u", fmt::format("{0}.u is {1} and {0}.v is {2}; the sheet has no area. Give "
+                                      "two edges that are not parallel",
+                                      path, text_of(cloth.u), text_of(cloth.v)));
+      }
+      if (vertices > most_vertices) {
+        fail(path + ".cells",
+             fmt::format("{}.cells is [{}, {}], {:.3g} vertices; at most {:.3g} "
+                         "are allowed. Use fewer cells",
+                         path, cloth.cells.x, cloth.cells.y, vertices, most_vertices));
+      }
+    }
+    if (!(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
+      fail(
+          path + ".adjacent_stiffness",
+          fmt::format("{0}.adjacent_stiffness and {0}.diagonal_stiffness are both 0; nothing would "
+                      "hold the sheet together. Set one above 0",
+                      path));
+    }
+    for (size_t k = 0; k < cloth.pin.size(); ++k) {
+      check_pin(cloth, fmt::format("{}.pin[{}]", path, k), cloth.pin[k], vertices);
+    }
+  }
+
+  void check_pin(const Cloth& cloth, const std::string& path, const ClothPin& pin,
+                 double vertices) const {
+    if (pin.vertices.empty() != pin.box.has_value()) {
+      fail(path, fmt::format("{} needs either vertices = [...] or box = {{min, max}}, and not both",
+                             path));
+    }
+    for (const uint32_t vertex : pin.vertices) {
+      if (cloth.mesh_file.empty() && vertex >= vertices) {
+        fail(path,
+             fmt::format("{}.vertices holds {}, but the {} x {} grid of \"{}\" has vertices 0 "
+                         "to {:.0f}",
+                         path, vertex, cloth.cells.x, cloth.cells.y, cloth.name, vertices - 1));
+      }
+    }
+  }
+
+  template <class T>
+  void check_distinct(const std::vector<T>& things, const std::string& section) const {
+    for (size_t i = 0; i < things.size(); ++i) {
+      for (size_t j = 0; j < i; ++j) {
+        if (things[i].name != things[j].name) continue;
+        const std::string key = fmt::format("{}[{}].name", section, i);
+        fail(key, fmt::format("two things of [[{}]] are named \"{}\"; the other one stands at {}. "
+                              "Give each its own name",
+                              section, things[i].name,
+                              sources_.at(fmt::format("{}[{}].name", section, j))));
+      }
+    }
+  }
+
+  void check_names() const {
+    check_distinct(shot_.cloth, "cloth");
+    check_distinct(shot_.light, "light");
+    check_distinct(shot_.material, "material");
+  }
+
+  void check_camera() const {
+    const Camera& camera = shot_.camera;
+    if (camera.shutter_open > camera.shutter_close) {
+      fail(
+          "camera.shutter_open",
+          fmt::format("camera.shutter_open is {} and camera.shutter_close is {}; the shutter would "
+                      "close before it opens. Exchange them",
+                      camera.shutter_open, camera.shutter_close));
+    }
+    check_not_zero("camera.up", camera.up);
+    std::set<double> frames;
+    for (const auto& [frame, value] : camera.position.keys) frames.insert(frame);
+    for (const auto& [frame, value] : camera.target.keys) frames.insert(frame);
+    for (const double frame : frames) {
+      const V3d view = camera.target.at(frame) - camera.position.at(frame);
+      if (!(view.length() > 1e-6)) {
+        fail("camera.target", fmt::format("camera.position and camera.target are both {} at frame "
+                                          "{}; the camera looks nowhere. Move one of them",
+                                          text_of(camera.target.at(frame)), frame));
+      }
+      if (view.normalized().cross(camera.up.normalized()).length() < 1e-6) {
+        fail("camera.up", fmt::format("camera.up is {}, along the view at frame {}, so the picture "
+                                      "has no upright. Use another up, for example [0, 0, -1]",
+                                      text_of(camera.up), frame));
+      }
+    }
+  }
+
+  void check_light(size_t i) const {
+    const Light& light = shot_.light[i];
+    const std::string path = fmt::format("light[{}]", i);
+    if (light.type == LightType::rectangle && !(light.u.cross(light.v).length() > 1e-12)) {
+      fail(path, fmt::format("{0}.u is {1} and {0}.v is {2}; the light has no area. Give two half "
+                             "edges that are not parallel",
+                             path, text_of(light.u), text_of(light.v)));
+    }
+    if (light.type == LightType::sphere) {
+      check_positive(path + ".radius", light.radius, " m", "the light has no area");
+    }
+    if (light.type == LightType::sun) check_not_zero(path + ".direction", light.direction);
+  }
+
+  void check_material(size_t i) const {
+    const Material& material = shot_.material[i];
+    for (int c = 0; c < 3; ++c) {
+      const double sum = double(material.reflectance[c]) + material.transmittance[c];
+      if (sum > 1 + 1e-5) {  // float rounding of two shares
+        fail(fmt::format("material[{}].reflectance", i),
+             fmt::format("material \"{}\" reflects {:.4g} and transmits {:.4g} of the {}; together "
+                         "more light than arrives. Keep the sum at most 1",
+                         material.name, material.reflectance[c], material.transmittance[c],
+                         c == 0   ? "red"
+                         : c == 1 ? "green"
+                                  : "blue"));
+      }
+    }
+  }
+
+  void check_use(const std::string& key, const std::string& name, MaterialType refused,
+                 std::string_view user, std::string_view advice) const {
+    const auto found = std::find_if(shot_.material.begin(), shot_.material.end(),
+                                    [&](const Material& m) { return m.name == name; });
+    if (found == shot_.material.end()) {
+      std::vector<std::string> names;
+      for (const Material& material : shot_.material) names.push_back(material.name);
+      fail(key, fmt::format("{} is \"{}\", which no [[material]] defines; there are {}. Add one or "
+                            "use one of these",
+                            key, name, fmt::join(names, ", ")));
+    }
+    if (found->type == refused) {
+      fail(key, fmt::format("{} is \"{}\", a material that {} cannot have. {}", key, name, user,
+                            advice));
+    }
+  }
+
+  void check_material_uses() const {
+    check_use("fluid.material", shot_.fluid.material, MaterialType::cloth, "a closed volume",
+              "Use type dielectric or diffuse");
+    for (size_t i = 0; i < shot_.cloth.size(); ++i) {
+      check_use(fmt::format("cloth[{}].material", i), shot_.cloth[i].material,
+                MaterialType::dielectric, "an open sheet", "Use type cloth or diffuse");
+    }
+    check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
+              "Use type diffuse");
+  }
+
+  const Shot& shot_;
+  const ShotSources& sources_;
+};
+
+}  // namespace
+
+std::string ShotSources::at(const std::string& key) const {
+  for (std::string path = key; !path.empty();) {
+    const auto found = where.find(path);
+    if (found != where.end()) return found->second;
+    const size_t cut = path.find_last_of(".[");
+    path.resize(cut == std::string::npos ? 0 : cut);
+  }
+  return file;
+}
+
+void check_shot(const Shot& shot, const ShotSources& sources) { Checker(shot, sources).check(); }
+
+}  // namespace drench

@@ -1,0 +1,502 @@
+#include "pipeline/contract/shot_table.h"
+
+#include <algorithm>
+#include <type_traits>
+
+namespace drench::shot_table {
+
+namespace {
+
+template <class T>
+struct Member;
+template <class Owner_, class Value_>
+struct Member<Value_ Owner_::*> {
+  using Owner = Owner_;
+  using Value = Value_;
+};
+
+template <auto First, auto... Rest>
+void* field_of(void* owner) {
+  auto& value = static_cast<typename Member<decltype(First)>::Owner*>(owner)->*First;
+  if constexpr (sizeof...(Rest) > 0) {
+    return field_of<Rest...>(&value);
+  } else {
+    return &value;
+  }
+}
+
+template <auto First, auto... Rest>
+struct LastMember : LastMember<Rest...> {};
+template <auto Only>
+struct LastMember<Only> : Member<decltype(Only)> {};
+
+template <class T>
+constexpr Kind kind_of() {
+  if constexpr (std::is_same_v<T, bool>) return Kind::boolean;
+  if constexpr (std::is_same_v<T, int>) return Kind::integer;
+  if constexpr (std::is_same_v<T, uint32_t>) return Kind::natural;
+  if constexpr (std::is_same_v<T, double>) return Kind::number;
+  if constexpr (std::is_same_v<T, std::string>) return Kind::name;
+  if constexpr (std::is_same_v<T, std::filesystem::path>) return Kind::path;
+  if constexpr (std::is_same_v<T, V3d>) return Kind::vector;
+  if constexpr (std::is_same_v<T, V3f>) return Kind::colour;
+  if constexpr (std::is_same_v<T, V2i>) return Kind::cells;
+  if constexpr (std::is_same_v<T, Timeline>) return Kind::frames;
+  if constexpr (std::is_same_v<T, Animated<double>>) return Kind::number_track;
+  if constexpr (std::is_same_v<T, Animated<V3d>>) return Kind::vector_track;
+  if constexpr (std::is_same_v<T, std::vector<uint32_t>>) return Kind::vertices;
+  if constexpr (std::is_same_v<T, std::optional<std::pair<V3d, V3d>>>) return Kind::box;
+  static_assert(!std::is_enum_v<T> || sizeof(T) == sizeof(int));
+  return Kind::choice;
+}
+
+struct Row : Parameter {
+  Row needed() const {
+    Row row = *this;
+    row.required = true;
+    return row;
+  }
+  Row one_of(std::vector<std::string_view> names) const {
+    Row row = *this;
+    row.choices = std::move(names);
+    return row;
+  }
+  Row identity() const {
+    Row row = *this;
+    row.fixed = true;
+    return row;
+  }
+  Row only(unsigned bits) const {
+    Row row = *this;
+    row.types = bits;
+    return row;
+  }
+  Row as(Kind other) const {
+    Row row = *this;
+    row.kind = other;
+    return row;
+  }
+};
+
+template <auto... Members>
+Row row(std::string_view section, std::string_view key, std::string_view unit, Limits limits,
+        unsigned stages, std::string_view description) {
+  Row row;
+  row.section = section;
+  row.key = key;
+  row.kind = kind_of<typename LastMember<Members...>::Value>();
+  row.unit = unit;
+  row.limits = limits;
+  row.stages = stages;
+  row.description = description;
+  row.field = field_of<Members...>;
+  return row;
+}
+
+template <size_t I>
+void* axis_field(void* domain) {
+  return &static_cast<Domain*>(domain)->axis[I];
+}
+
+template <size_t I>
+Row axis_row(std::string_view key, std::string_view description) {
+  Row row;
+  row.section = "domain";
+  row.key = key;
+  row.kind = Kind::choice;
+  row.stages = simulate;
+  row.description = description;
+  row.field = axis_field<I>;
+  return row.one_of({"open", "walls"});
+}
+
+Row grid_pins_row() {
+  Row row;
+  row.section = "cloth";
+  row.key = "pins";
+  row.kind = Kind::grid_pins;
+  row.stages = simulate;
+  row.description =
+      "held vertices of a grid: one or an array of these names; u0 is the edge where u starts. "
+      "Turned "
+      "into [[cloth.pin]] vertices";
+  return row.one_of({"corners", "edge_u0", "edge_u1", "edge_v0", "edge_v1", "rim"});
+}
+
+constexpr Limits none{};
+constexpr Limits place{-1e5, 1e5};      // m: beyond, float steps are wider than a millimetre
+constexpr Limits speed{-1000, 1000};    // m/s
+constexpr Limits seeds{0, 4294967295};  // uint32_t
+constexpr Limits share{0, 1};
+constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
+constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
+
+std::vector<Parameter> shot_rows() {
+  return {
+      row<&Shot::name>("shot", "name", "", none, render,
+                       "name in file names and headers; the file's stem unless given")
+          .as(Kind::text),
+      row<&Shot::timeline>(
+          "shot", "frames", "frame", {-9999999, 9999999}, simulate,
+          "[first, last], inclusive; the first is the initial state. Only the first "
+          "is part of a simulation's identity"),
+      row<&Shot::timeline, &Timeline::fps>("shot", "fps", "1/s", {0.01, 1e5}, simulate | render,
+                                           "frames a second"),
+      row<&Shot::preroll>("shot", "preroll", "s", {0, 1000}, simulate,
+                          "time simulated before the first frame"),
+      row<&Shot::seed>("shot", "seed", "", seeds, simulate,
+                       "of everything drawn by chance in the simulation"),
+      row<&Shot::gravity>("shot", "gravity", "m/s^2", speed, simulate,
+                          "acceleration of everything"),
+      row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
+                            "fixed step; 0 chooses the largest stable one, step by step"),
+
+      row<&Domain::min>("domain", "min", "m", place, simulate, "lower corner; walls stand here"),
+      row<&Domain::max>("domain", "max", "m", place, simulate, "upper corner; walls stand here"),
+      axis_row<0>("x", "both ends of the x axis"),
+      axis_row<1>("y", "both ends of the y axis"),
+      axis_row<2>("z", "both ends of the z axis"),
+  };
+}
+
+std::vector<Parameter> fluid_rows() {
+  return {
+      row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh,
+                           "distance a of particles at rest; a particle has mass rest_density a^3"),
+      row<&Fluid::support_ratio>("fluid", "support_ratio", "", {0, 6}, simulate,
+                                 "support radius of the kernels / spacing"),
+      row<&Fluid::rest_density>("fluid", "rest_density", "kg/m^3", {1, 1e5}, simulate, "at rest"),
+      row<&Fluid::kinematic_viscosity>("fluid", "kinematic_viscosity", "m^2/s", {0, 1000}, simulate,
+                                       "of the fluid; water has 1e-6"),
+      row<&Fluid::artificial_viscosity>("fluid", "artificial_viscosity", "", {0, 10}, simulate,
+                                        "alpha of Monaghan 1992; 0 is none"),
+      row<&Fluid::sound_speed>("fluid", "sound_speed", "m/s", {0, 1e4}, simulate,
+                               "stiffness; 0 chooses ten times the largest speed expected"),
+      row<&Fluid::material>("fluid", "material", "", none, render, "name of a [[material]]"),
+
+      row<&FluidBox::min>("fluid.box", "min", "m", place, simulate, "lower corner").needed(),
+      row<&FluidBox::max>("fluid.box", "max", "m", place, simulate, "upper corner").needed(),
+      row<&FluidBox::velocity>("fluid.box", "velocity", "m/s", speed, simulate, "at the start"),
+
+      row<&FluidSphere::center>("fluid.sphere", "center", "m", place, simulate, "centre").needed(),
+      row<&FluidSphere::radius>("fluid.sphere", "radius", "m", {0, 1e4}, simulate, "radius")
+          .needed(),
+      row<&FluidSphere::velocity>("fluid.sphere", "velocity", "m/s", speed, simulate,
+                                  "at the start"),
+
+      row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
+                                 "centre of the round inlet")
+          .needed(),
+      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
+                                    "the way the fluid leaves; any length but 0"),
+      row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
+          .needed(),
+      row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
+                                "at the inlet")
+          .needed(),
+      row<&FluidEmitter::start>("fluid.emitter", "start", "s", {0, 1e9}, simulate,
+                                "after the simulation's start"),
+      row<&FluidEmitter::stop>("fluid.emitter", "stop", "s", {0, 1e9}, simulate,
+                               "after the simulation's start"),
+
+      row<&FluidDrops::min>("fluid.drops", "min", "m", place, simulate,
+                            "lower corner of the centres")
+          .needed(),
+      row<&FluidDrops::max>("fluid.drops", "max", "m", place, simulate,
+                            "upper corner of the centres")
+          .needed(),
+      row<&FluidDrops::velocity>("fluid.drops", "velocity", "m/s", speed, simulate, "at the start"),
+      row<&FluidDrops::radius>("fluid.drops", "radius", "m", {0, 1e4}, simulate, "of a drop")
+          .needed(),
+      row<&FluidDrops::count>("fluid.drops", "count", "", {0, 1e6}, simulate, "number of drops")
+          .needed(),
+      row<&FluidDrops::particles>(
+          "fluid.drops", "particles", "", {0, 2e8}, simulate,
+          "exactly so many particles in all; 0: as many as the radius holds"),
+  };
+}
+
+std::vector<Parameter> cloth_rows() {
+  return {
+      row<&Cloth::name>(
+          "cloth", "name", "", none, simulate | render,
+          "name of the sheet, part of its file names; cloth, cloth2, ... unless given")
+          .identity(),
+      row<&Cloth::corner>("cloth", "corner", "m", place, simulate, "grid: where u and v start"),
+      row<&Cloth::u>("cloth", "u", "m", place, simulate, "grid: one edge"),
+      row<&Cloth::v>("cloth", "v", "m", place, simulate, "grid: the other edge"),
+      row<&Cloth::cells>(
+          "cloth", "cells", "", {1, 4096}, simulate,
+          "grid: [along u, along v]; vertex j (cells_u + 1) + i stands at i along u"),
+      row<&Cloth::mesh_file>("cloth", "mesh", "", none, simulate,
+                             "PLY or OBJ file of triangles instead of a grid"),
+      grid_pins_row(),
+      row<&Cloth::velocity>("cloth", "velocity", "m/s", speed, simulate, "at the start"),
+      row<&Cloth::areal_density>("cloth", "areal_density", "kg/m^2", {1e-4, 1e4}, simulate,
+                                 "mass of an area; cotton has about 0.2"),
+      row<&Cloth::adjacent_stiffness>("cloth", "adjacent_stiffness", "N/m", {0, 1e9}, simulate,
+                                      "two-dimensional modulus of the springs along edges"),
+      row<&Cloth::diagonal_stiffness>(
+          "cloth", "diagonal_stiffness", "N/m", {0, 1e9}, simulate,
+          "of the springs along both diagonals; half of adjacent_stiffness is isotropic"),
+      row<&Cloth::damping>("cloth", "damping", "1/s", {0, 1e4}, simulate,
+                           "rate at which velocity is lost"),
+      row<&Cloth::spring_damping>("cloth", "spring_damping", "", {0, 1}, simulate,
+                                  "along each spring, fraction of critical; keeps momentum"),
+      row<&Cloth::thickness>("cloth", "thickness", "m", {1e-6, 1}, simulate, "thickness"),
+      row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
+
+      row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
+                               "indices of vertices held where they start"),
+      row<&ClothPin::box>(
+          "cloth.pin", "box", "m", place, simulate,
+          "{min = [x, y, z], max = [x, y, z]}: every vertex inside it at the start"),
+
+      row<&Coupling::scheme>("coupling", "scheme", "", none, simulate,
+                             "exact, or paper: Harada, Koshizuka, Kawaguchi 2007 as published")
+          .one_of({"exact", "paper"}),
+  };
+}
+
+std::vector<Parameter> surface_and_camera_rows() {
+  return {
+      row<&SurfaceSettings::voxel>("surface", "voxel", "", {0.05, 4}, mesh,
+                                   "edge of a grid cell / spacing"),
+      row<&SurfaceSettings::support>("surface", "support", "", {1, 8}, mesh,
+                                     "support radius of the kernel / spacing"),
+      row<&SurfaceSettings::iso_value>("surface", "iso_value", "", {0.01, 0.99}, mesh,
+                                       "of the colour field on the surface"),
+      row<&SurfaceSettings::smoothing>("surface", "smoothing", "", {0, 1000}, mesh,
+                                       "passes over the mesh; they keep its volume"),
+      row<&SurfaceSettings::level_set>("surface", "level_set", "", none, mesh,
+                                       "also write the surface as an OpenVDB level set"),
+      row<&SurfaceSettings::memory_gib>(
+          "surface", "memory_gib", "GiB", {0.01, 4096}, no_stage,
+          "a grid that would need more is refused; no part of the result"),
+
+      row<&Camera::position>("camera", "position", "m", place, render, "may be animated"),
+      row<&Camera::target>("camera", "target", "m", place, render, "looked at; may be animated"),
+      row<&Camera::fov_deg>("camera", "fov_deg", "deg", {0.1, 170}, render,
+                            "horizontal field of view; may be animated"),
+      row<&Camera::focus_distance>("camera", "focus_distance", "m", {0, 1e6}, render,
+                                   "0: the distance to the target; may be animated"),
+      row<&Camera::lens_radius>("camera", "lens_radius", "m", {0, 10}, render,
+                                "0: a pinhole; may be animated"),
+      row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
+      row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
+                                 "relative to the frame"),
+      row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
+                                  "relative to the frame"),
+      row<&Camera::position>("camera", "interp", "", none, render,
+                             "between the keys of every animated value of the camera")
+          .as(Kind::track_mode)
+          .one_of({"linear", "smooth", "step"}),
+  };
+}
+
+std::vector<Parameter> look_rows() {
+  return {
+      row<&Light::type>("light", "type", "", none, render, "kind of light")
+          .one_of({"rectangle", "sphere", "sun", "environment"})
+          .needed()
+          .identity(),
+      row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
+          .identity(),
+      row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
+                            "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
+                            "environment with a map, its factor"),
+      row<&Light::center>("light", "center", "m", place, render, "centre").only(rectangle | sphere),
+      row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
+          .only(rectangle),
+      row<&Light::v>("light", "v", "m", place, render, "half edge").only(rectangle),
+      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere),
+      row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
+          .only(sun),
+      row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
+          .only(sun),
+      row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")
+          .only(environment),
+      row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
+          .only(environment),
+
+      row<&Material::name>("material", "name", "", none, render, "built-in ones may be redefined")
+          .needed()
+          .identity(),
+      row<&Material::type>("material", "type", "", none, render, "how light meets it")
+          .one_of({"dielectric", "cloth", "diffuse"})
+          .identity(),
+      row<&Material::reflectance>("material", "reflectance", "", share, render,
+                                  "diffuse reflection")
+          .only(cloth_type | diffuse),
+      row<&Material::transmittance>("material", "transmittance", "", share, render,
+                                    "diffuse transmission; with reflectance at most 1")
+          .only(cloth_type),
+      row<&Material::ior>("material", "ior", "", {1, 4}, render, "index of refraction")
+          .only(dielectric),
+      row<&Material::absorption>("material", "absorption", "1/m", {0, 1e6}, render, "in the volume")
+          .as(Kind::spectrum)
+          .only(dielectric),
+      row<&Material::texture>("material", "texture", "", none, render,
+                              "PNG, JPEG or EXR that multiplies reflectance")
+          .only(cloth_type | diffuse),
+      row<&Material::checker>("material", "checker", "", none, render, "built-in checker")
+          .only(diffuse),
+      row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,
+                                   "edge of one of its squares")
+          .only(diffuse),
+
+      row<&Ground::present>("ground", "present", "", none, render,
+                            "a horizontal plane that is drawn; true when [ground] is written"),
+      row<&Ground::height>("ground", "height", "m", place, render, "its y"),
+      row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
+      row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
+      row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),
+
+      row<&RenderSettings::width>("render", "width", "pixel", {1, 16384}, render, "of a frame"),
+      row<&RenderSettings::height>("render", "height", "pixel", {1, 16384}, render, "of a frame"),
+      row<&RenderSettings::samples>("render", "samples", "", {1, 1e6}, render,
+                                    "camera samples a pixel"),
+      row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
+                                  "diffuse bounces; specular ones end by chance"),
+      row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,
+                                        "from the stored velocities, over the shutter"),
+      row<&RenderSettings::seed>("render", "seed", "", seeds, render, "of the samples"),
+  };
+}
+
+// ---- sections
+
+template <auto MemberPointer>
+Section single(std::string_view name, std::string_view description) {
+  Section section;
+  section.name = name;
+  section.description = description;
+  section.count = [](void*) { return size_t(1); };
+  section.at = [](void* owner, size_t) { return field_of<MemberPointer>(owner); };
+  return section;
+}
+
+template <auto MemberPointer>
+Section repeated(std::string_view name, std::string_view parent, std::string_view description) {
+  using Owner = typename Member<decltype(MemberPointer)>::Owner;
+  Section section;
+  section.name = name;
+  section.parent = parent;
+  section.description = description;
+  section.repeated = true;
+  section.count = [](void* owner) { return (static_cast<Owner*>(owner)->*MemberPointer).size(); };
+  section.at = [](void* owner, size_t i) -> void* {
+    return &(static_cast<Owner*>(owner)->*MemberPointer)[i];
+  };
+  section.append = [](void* owner) { (static_cast<Owner*>(owner)->*MemberPointer).emplace_back(); };
+  return section;
+}
+
+template <class Object>
+Section named(Section section) {
+  section.name_of = [](void* object) -> const std::string* {
+    return &static_cast<Object*>(object)->name;
+  };
+  return section;
+}
+
+template <class Object>
+Section typed(Section section) {
+  section.type_of = [](void* object) { return int(static_cast<Object*>(object)->type); };
+  return named<Object>(section);
+}
+
+Section whole_shot() {
+  Section section;
+  section.name = "shot";
+  section.description = "Time, chance and gravity.";
+  section.count = [](void*) { return size_t(1); };
+  section.at = [](void* owner, size_t) { return owner; };
+  return section;
+}
+
+}  // namespace
+
+const std::vector<Section>& sections() {
+  static const std::vector<Section> table{
+      whole_shot(),
+      single<&Shot::domain>("domain", "The space of the simulation and its walls."),
+      single<&Shot::fluid>("fluid", "The fluid. Without sources there is none."),
+      repeated<&Fluid::box>("fluid.box", "fluid", "A block of fluid at the start."),
+      repeated<&Fluid::sphere>("fluid.sphere", "fluid", "A ball of fluid at the start."),
+      repeated<&Fluid::emitter>("fluid.emitter", "fluid", "A round inlet."),
+      repeated<&Fluid::drops>("fluid.drops", "fluid",
+                              "Drops with centres drawn evenly in a box and kept apart."),
+      named<Cloth>(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
+      repeated<&Cloth::pin>("cloth.pin", "cloth",
+                            "Vertices held where they start: a list or a box."),
+      single<&Shot::coupling>("coupling", "How fluid and cloth push each other."),
+      single<&Shot::surface>("surface", "The surface built around the particles."),
+      single<&Shot::camera>("camera", "A thin-lens camera that looks along -Z of its own frame."),
+      typed<Light>(repeated<&Shot::light>("light", "", "A light.")),
+      typed<Material>(repeated<&Shot::material>(
+          "material", "", "A material; water, cotton and ground are built in.")),
+      single<&Shot::ground>("ground", "A plane under the scene; the simulation does not know it."),
+      single<&Shot::render>("render", "The picture."),
+  };
+  return table;
+}
+
+const std::vector<Parameter>& parameters() {
+  static const std::vector<Parameter> table = [] {
+    std::vector<Parameter> all;
+    for (const auto& part :
+         {shot_rows(), fluid_rows(), cloth_rows(), surface_and_camera_rows(), look_rows()}) {
+      all.insert(all.end(), part.begin(), part.end());
+    }
+    return all;
+  }();
+  return table;
+}
+
+const Section* find_section(std::string_view name) {
+  for (const Section& section : sections()) {
+    if (section.name == name) return &section;
+  }
+  return nullptr;
+}
+
+const Parameter* find_parameter(std::string_view section, std::string_view key) {
+  for (const Parameter& parameter : parameters()) {
+    if (parameter.section == section && parameter.key == key) return &parameter;
+  }
+  return nullptr;
+}
+
+std::vector<const Parameter*> parameters_of(std::string_view section) {
+  std::vector<const Parameter*> rows;
+  for (const Parameter& parameter : parameters()) {
+    if (parameter.section == section) rows.push_back(&parameter);
+  }
+  return rows;
+}
+
+bool applies(const Parameter& parameter, const Section& section, void* object) {
+  if (section.type_of == nullptr) return true;
+  return (parameter.types >> section.type_of(object) & 1u) != 0;
+}
+
+const std::vector<Material>& built_in_materials() {
+  static const std::vector<Material> materials = [] {
+    Material water, cotton, ground;
+    water.name = "water";
+    water.type = MaterialType::dielectric;
+    // Pure water, Pope and Fry 1997, at about 600, 540 and 450 nm: red goes first.
+    water.absorption = {0.22f, 0.047f, 0.0092f};
+    cotton.name = "cotton";
+    cotton.type = MaterialType::cloth;
+    cotton.reflectance = {0.55f, 0.53f, 0.50f};
+    cotton.transmittance = {0.20f, 0.19f, 0.17f};
+    ground.name = "ground";
+    ground.reflectance = {0.35f, 0.35f, 0.35f};
+    return std::vector<Material>{water, cotton, ground};
+  }();
+  return materials;
+}
+
+}  // namespace drench::shot_table
