@@ -1,0 +1,76 @@
+# Sourced by run, test, bench: installs what is missing, configures and builds. Debian 12 names; also
+# right on Debian 13 and Ubuntu 24.04 where they exist. Needs `root` set to the repository.
+
+# libboost-iostreams-dev brings the Boost headers that OpenVDB's own include.
+# What the build needs, each with a file that shows it is there: asking dpkg would miss a library that
+# came another way, and takes longer.
+drench_packages=(
+  "g++:/usr/bin/g++"
+  "cmake:/usr/bin/cmake"
+  "ninja-build:/usr/bin/ninja"
+  "ccache:/usr/bin/ccache"
+  "libopenvdb-dev:/usr/include/openvdb/openvdb.h"
+  "libboost-iostreams-dev:/usr/include/boost/iostreams/stream.hpp"
+  "libembree-dev:/usr/include/embree3/rtcore.h /usr/include/embree4/rtcore.h"
+  "libopenexr-dev:/usr/include/OpenEXR/ImfRgbaFile.h"
+  "libimath-dev:/usr/include/Imath/ImathVec.h"
+  "libtbb-dev:/usr/include/tbb/task_arena.h"
+  "libpng-dev:/usr/include/png.h"
+  "libjpeg62-turbo-dev:/usr/include/jpeglib.h"
+  "libgtest-dev:/usr/include/gtest/gtest.h"
+  "libcli11-dev:/usr/include/CLI/CLI.hpp"
+  "libtomlplusplus-dev:/usr/include/toml++/toml.h /usr/include/toml++/toml.hpp"
+  "nlohmann-json3-dev:/usr/include/nlohmann/json.hpp"
+  "libspdlog-dev:/usr/include/spdlog/spdlog.h"
+  "libfmt-dev:/usr/include/fmt/format.h"
+  "libxxhash-dev:/usr/include/xxhash.h"
+  "ffmpeg:/usr/bin/ffmpeg"
+)
+
+drench_missing_packages() {
+  local entry package files file found
+  for entry in "${drench_packages[@]}"; do
+    package=${entry%%:*}
+    read -r -a files <<< "${entry#*:}"
+    found=no
+    for file in "${files[@]}"; do
+      if [[ -e $file ]]; then found=yes; fi
+    done
+    if [[ $found == no ]]; then printf '%s\n' "$package"; fi
+  done
+}
+
+drench_install() {
+  local missing as_root=()
+  mapfile -t missing < <(drench_missing_packages)
+  if ((${#missing[@]} == 0)); then return 0; fi
+  if ! command -v apt-get > /dev/null; then
+    printf 'drench: missing, and no apt-get to install them: %s\n' "${missing[*]}" >&2
+    return 1
+  fi
+  if ((EUID != 0)); then
+    if ! command -v sudo > /dev/null; then
+      printf 'drench: missing: %s\nInstall them as root: apt-get install %s\n' \
+        "${missing[*]}" "${missing[*]}" >&2
+      return 1
+    fi
+    as_root=(sudo)
+  fi
+  printf 'drench: installing %s\n' "${missing[*]}" >&2
+  "${as_root[@]}" apt-get update -qq >&2
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2
+  mapfile -t missing < <(drench_missing_packages)
+  if ((${#missing[@]} > 0)); then
+    printf 'drench: still missing after the installation: %s\n' "${missing[*]}" >&2
+    return 1
+  fi
+}
+
+# Configures once and builds; a second time this takes as long as ninja needs to see that nothing changed.
+drench_build() {
+  if [[ ! -f $root/build/build.ninja ]]; then
+    cmake --preset release -S "$root" >&2
+  fi
+  cmake --build "$root/build" -j"$(nproc)" --target "$@" >&2
+}

@@ -1,0 +1,43 @@
+#pragma once
+// Restart files of a simulation: every tenth frame, the last three, and one on stop.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipeline/driver/manifest.h"
+#include "pipeline/driver/stages.h"
+#include "pipeline/driver/wanted.h"
+
+namespace drench {
+
+/// Writes, finds and removes checkpoints of one simulation. The folder's lock is held.
+class CheckpointKeeper {
+ public:
+  /// @param keys  of frames first ... last, simulation_keys().
+  CheckpointKeeper(std::filesystem::path folder, Manifest& manifest, int first,
+                   std::vector<Key> keys, int every, int kept);
+
+  /// Removes checkpoints of other keys and files that no record names.
+  void remove_stale();
+  /// After `frame` was committed: writes a checkpoint if one is due, then removes old ones.
+  void after_frame(const Simulation& simulation, int frame);
+  /// On stop: the state may stand between `frame`, which is committed, and the next.
+  void on_stop(const Simulation& simulation, int frame);
+  /// "frame 1031 (out/.../frame.1031.ckpt)", or "none".
+  std::string last_good() const;
+
+ private:
+  std::vector<Record> on_frames() const;  // sorted by frame
+  void write(const Simulation& simulation, int frame, const std::string& file);
+  void remove(const std::string& file);
+  void remove_unlisted();
+
+  const std::filesystem::path folder_;
+  Manifest& manifest_;
+  const int first_;
+  const std::vector<Key> keys_;
+  const int every_, kept_;
+};
+
+}  // namespace drench

@@ -1,0 +1,145 @@
+#include "pipeline/driver/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <new>
+
+#include "build_id.h"
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/driver/commands.h"
+#include "pipeline/driver/process.h"
+
+namespace drench {
+
+namespace {
+
+enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
+
+struct Arguments {
+  ShotArguments shot;
+  std::filesystem::path folder, name;
+  bool verbose = false;
+};
+
+void add_common(CLI::App& command, Arguments& arguments) {
+  command.add_flag("--json", arguments.shot.json, "machine-readable to stdout");
+  command.add_flag("-v,--verbose", arguments.verbose, "also say what is skipped");
+  command.add_flag("-q,--quiet", arguments.shot.quiet, "warnings and errors only");
+}
+
+void add_shot_options(CLI::App& command, Arguments& arguments) {
+  ShotArguments& shot = arguments.shot;
+  static const std::map<std::string, Device> devices{
+      {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}};
+  command.add_option("SHOT", shot.shot, "shot file (TOML)")->required();
+  command.add_option("--out", shot.out, "output folder; default out/<shot>/<quality>");
+  command.add_option("--frames", shot.frames, "1001-1048, 1001-1048x2, or a list of these");
+  command.add_option("--device", shot.device, "auto, cpu or cuda")
+      ->transform(CLI::CheckedTransformer(devices, CLI::ignore_case));
+  command.add_option("--threads", shot.threads, "cores to use; default all")
+      ->check(CLI::Range(1, 4096));
+  command.add_option("--memory", shot.memory_gib, "GiB; a run that needs more stops")
+      ->check(CLI::Range(0.01, 1e6));
+  command.add_option("--set", shot.set, "section.key=value; may be given again")
+      ->allow_extra_args(false);
+  command.add_option("--quality", shot.quality, "a [quality.NAME] of the shot; default final");
+  add_common(command, arguments);
+}
+
+using Steps = std::vector<Step>;
+
+CLI::App* add_make(CLI::App& app, Arguments& arguments, const std::string& name,
+                   const std::string& what, const std::string& example, const Steps& steps) {
+  CLI::App* command = app.add_subcommand(name, what);
+  add_shot_options(*command, arguments);
+  command->footer(fmt::format("Example: drench {} {}", name, example));
+  command->callback([&arguments, steps] { make_command(arguments.shot, steps); });
+  return command;
+}
+
+void add_commands(CLI::App& app, Arguments& arguments) {
+  add_make(app, arguments, "run", "all stages, overlapped where they can be",
+           "shots/pour.toml --quality preview", all_steps());
+  add_make(app, arguments, "simulate", "a shot to cache", "shots/pour.toml --frames 1001-1024",
+           {Step::simulate});
+  add_make(app, arguments, "mesh", "caches to fluid surfaces", "shots/pour.toml --frames 1010",
+           {Step::mesh});
+  add_make(app, arguments, "render", "meshes to EXR frames, a contact sheet and a movie",
+           "shots/pour.toml --set render.samples=256",
+           {Step::render, Step::contact_sheet, Step::movie});
+
+  CLI::App* plan = app.add_subcommand("plan", "what would run and what is skipped, with reasons");
+  add_shot_options(*plan, arguments);
+  plan->footer("Example: drench plan shots/pour.toml --set camera.fov_deg=30");
+  plan->callback([&arguments] { plan_command(arguments.shot); });
+
+  CLI::App* clean = app.add_subcommand("clean", "remove frames beyond the shot's range");
+  add_shot_options(*clean, arguments);
+  clean->footer("Example: drench clean shots/pour.toml --quality preview");
+  clean->callback([&arguments] { clean_command(arguments.shot); });
+
+  CLI::App* verify = app.add_subcommand("verify", "check every file against the manifest");
+  verify->add_option("DIR", arguments.folder, "output folder")->required();
+  add_common(*verify, arguments);
+  verify->footer("Example: drench verify out/pour/preview");
+  verify->callback([&arguments] { verify_command(arguments.folder, arguments.shot.json); });
+
+  CLI::App* init = app.add_subcommand("init", "write a commented starting shot");
+  init->add_option("NAME", arguments.name, "shot to write, with or without .toml")->required();
+  add_common(*init, arguments);
+  init->footer("Example: drench init shots/rain");
+  init->callback([&arguments] { init_command(arguments.name); });
+}
+
+void say(const char* kind, const char* text) {
+  std::fprintf(stderr, "drench: %s%s\n", kind, text);
+}
+
+int parse_and_run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app("Shots of fluid and cloth, from physics to film frames.", "drench");
+  app.set_version_flag("--version", fmt::format("drench {}", build_id::version));
+  app.require_subcommand(1);
+  app.footer("Example: drench run shots/pour.toml --quality preview");
+  app.parse_complete_callback([&arguments] {
+    if (arguments.verbose) set_log_level(LogLevel::verbose);
+    if (arguments.shot.quiet) set_log_level(LogLevel::quiet);
+  });
+  add_commands(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? done : user_error;  // --help and --version are no errors
+  }
+  return done;
+}
+
+}  // namespace
+
+int drench_program(int argc, char** argv) {
+  install_signal_handlers();
+  try {
+    return parse_and_run(argc, argv);
+  } catch (const Stopped& stop) {
+    say("", stop.what());
+    return stopped;
+  } catch (const Error& error) {
+    say("", error.what());
+    return user_error;
+  } catch (const std::bad_alloc&) {
+    say("", "not enough memory; close other programs, or make the scene smaller (fluid.spacing, "
+            "surface.voxel, render size)");
+    return user_error;
+  } catch (const std::exception& bug) {
+    say("this is a bug in drench, please report it: ", bug.what());
+    return our_bug;
+  }
+}
+
+}  // namespace drench

@@ -1,0 +1,269 @@
+#include "pipeline/driver/commands.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/driver/device.h"
+#include "pipeline/driver/execute.h"
+#include "pipeline/driver/frame_range.h"
+#include "pipeline/driver/layout.h"
+#include "pipeline/driver/plan.h"
+#include "pipeline/driver/process.h"
+
+namespace drench {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+/// A shot, what it wants and where it goes.
+struct Job {
+  Shot shot;
+  fs::path folder;
+  Wanted wanted;
+};
+
+Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
+  Job job;
+  job.shot = read_shot(arguments.shot, {.quality = arguments.quality, .set = arguments.set});
+  job.folder = arguments.out.empty() ? fs::path("out") / job.shot.name / arguments.quality
+                                     : arguments.out;
+  std::vector<int> frames = arguments.frames.empty()
+                                ? all_frames(job.shot.timeline)
+                                : parse_frames(arguments.frames, job.shot.timeline);
+  job.wanted = want(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
+  return job;
+}
+
+void print(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
+    throw Error("standard output: cannot be written; is the disk full or the reader gone?");
+  }
+}
+
+void report_beyond(const Plan& plan, const ShotArguments& arguments) {
+  if (plan.beyond.empty()) return;
+  log_info("driver",
+           fmt::format("{} files belong to frames or sheets the shot no longer has, the first is "
+                       "{}; `drench clean {}` removes them",
+                       plan.beyond.size(), plan.beyond.front(), arguments.shot.string()));
+}
+
+/// shot.lock.toml: the resolved shot, kept with what was made from it.
+void write_shot_lock(const Job& job, Manifest& manifest) {
+  const std::string text = shot_lock(job.shot);
+  const Digest digest = hash_bytes(text.data(), text.size());
+  const std::string file(layout::shot_lock);
+  const std::optional<Record> before = manifest.find(file);
+  if (before && before->digest == digest && has_recorded_digest(job.folder, *before)) return;
+  Record record = record_of_file(job.folder, write_file_whole(job.folder / file, text));
+  record.step = "shot";
+  record.key = digest;
+  manifest.add(record);
+}
+
+[[noreturn]] void abandon() {
+  log_info("driver", "stopped while a frame was in work; it is made again next time");
+  constexpr int stopped_exit_code = 75;
+  ::_exit(stopped_exit_code);
+}
+
+struct Counts {
+  int ran = 0, skipped = 0;
+};
+
+Counts count_of(const Plan& plan) {
+  Counts counts;
+  for (const Task& task : plan.tasks) ++(task.action == Action::skip ? counts.skipped : counts.ran);
+  return counts;
+}
+
+void report_done(const Job& job, const ShotArguments& arguments, const Plan& first, bool nothing) {
+  const Counts counts = count_of(first);
+  if (arguments.json) {
+    print(json{{"shot", job.shot.name},
+               {"folder", job.folder.string()},
+               {"frames", job.wanted.frames},
+               {"nothing_to_do", nothing},
+               {"planned", nothing ? 0 : counts.ran},
+               {"skipped", counts.skipped}}
+              .dump() +
+          "\n");
+  }
+  if (nothing) {
+    log_info("driver", fmt::format("nothing to do: all {} steps of {} are up to date",
+                                   counts.skipped, job.folder.string()));
+  } else {
+    log_info("driver", fmt::format("done: {} frames in {}", job.wanted.frames.size(),
+                                   job.folder.string()));
+  }
+}
+
+void refuse_problems(const Job& job, const Plan& plan) {
+  for (const std::string& warning : plan.warnings) log_warning("driver", warning);
+  if (!plan.problems.empty()) {
+    throw Error(fmt::format("{}: {}", job.folder.string(), plan.problems.front()));
+  }
+}
+
+ExecuteOptions execute_options(const ShotArguments& arguments) {
+  ExecuteOptions options;
+  options.threads = arguments.threads;
+  options.memory_gib = arguments.memory_gib;
+  options.stop_requested = [] { return stop_requested(); };
+  options.abandon = abandon;
+  return options;
+}
+
+/// Plans and executes until nothing is left; a damaged input found on the way is planned again.
+Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
+  constexpr int attempts = 5;  // every attempt drops a damaged file: more means a failing disk
+  Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style());
+  const std::unique_ptr<Stages> stages =
+      shot_stages(job.shot, job.folder, {arguments.device, arguments.memory_gib});
+  for (int attempt = 1;; ++attempt) {
+    const Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest),
+                                job.shot.timeline.last);
+    refuse_problems(job, plan);
+    if (attempt == 1) report_beyond(plan, arguments);
+    if (plan.nothing_to_do()) return plan;
+    write_shot_lock(job, manifest);
+    try {
+      execute(job.wanted, plan, job.folder, manifest, *stages, progress,
+              execute_options(arguments));
+      return plan;
+    } catch (const PlanAgain& found) {
+      if (attempt == attempts) {
+        throw Error(fmt::format("{}: files keep changing or failing ({}); check the disk",
+                                job.folder.string(), found.what()));
+      }
+      log_warning("driver", fmt::format("{}; it is made again", found.what()));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Step> all_steps() {
+  return {Step::simulate, Step::mesh, Step::render, Step::contact_sheet, Step::movie};
+}
+
+void make_command(const ShotArguments& arguments, const std::vector<Step>& steps) {
+  std::optional<tbb::global_control> limit;
+  if (arguments.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism, size_t(arguments.threads));
+  }
+  const ArithmeticMode mode;
+  const Job job = job_of(arguments, steps);
+  const FolderLock lock(job.folder);
+  remove_leftovers(job.folder);
+  Manifest manifest(job.folder / layout::manifest);
+  if (manifest.damaged_lines() > 0) {
+    log_warning("driver", fmt::format("{}: {} damaged records dropped; what they named is checked "
+                                      "or made again",
+                                      (job.folder / layout::manifest).string(),
+                                      manifest.damaged_lines()));
+  }
+  manifest.open_for_append();
+  const Plan plan = make_all(job, arguments, manifest);
+  report_done(job, arguments, plan, plan.nothing_to_do());
+}
+
+void plan_command(const ShotArguments& arguments) {
+  const Job job = job_of(arguments, all_steps());
+  const Manifest manifest(job.folder / layout::manifest);
+  const Plan plan =
+      make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  print(arguments.json ? plan_json(plan) + "\n" : plan_text(plan));
+}
+
+void clean_command(const ShotArguments& arguments) {
+  const Job job = job_of(arguments, all_steps());
+  if (!fs::exists(job.folder / layout::manifest)) {
+    throw Error(fmt::format("{}: holds no manifest; nothing was made here. Give the --out or "
+                            "--quality it was made with",
+                            job.folder.string()));
+  }
+  const FolderLock lock(job.folder);
+  remove_leftovers(job.folder);
+  Manifest manifest(job.folder / layout::manifest);
+  manifest.open_for_append();
+  const int last = arguments.frames.empty() ? job.shot.timeline.last : job.wanted.frames.back();
+  const Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), last);
+  for (const std::string& file : plan.beyond) {
+    manifest.drop(file);
+    std::error_code code;
+    fs::remove(job.folder / file, code);
+    if (code) {
+      throw Error(fmt::format("{}: cannot be removed: {}", (job.folder / file).string(),
+                              system_reason(code.value())));
+    }
+  }
+  if (arguments.json) print(json{{"removed", plan.beyond}}.dump() + "\n");
+  log_info("driver", fmt::format("removed {} files", plan.beyond.size()));
+}
+
+void verify_command(const fs::path& folder, bool as_json) {
+  if (!fs::exists(folder / layout::manifest)) {
+    throw Error(fmt::format("{}: holds no manifest.jsonl; give the output folder of a run",
+                            folder.string()));
+  }
+  // Without the lock (another driver at work, a read-only folder) it only reports.
+  std::unique_ptr<FolderLock> lock;
+  try {
+    lock = std::make_unique<FolderLock>(folder);
+  } catch (const Error& error) {
+    log_info("verify", fmt::format("only looking: {}", error.what()));
+  }
+  Manifest manifest(folder / layout::manifest);
+  const std::map<std::string, Record> records = manifest.records();
+  std::vector<std::string> bad;
+  for (const auto& [file, record] : records) {
+    if (!has_recorded_digest(folder, record)) bad.push_back(file);
+  }
+  const std::vector<std::string> unlisted = unlisted_files(folder, manifest);
+  if (lock && !bad.empty()) {
+    manifest.open_for_append();
+    for (const std::string& file : bad) manifest.drop(file);
+  }
+  if (as_json) {
+    print(json{{"files", records.size()},
+               {"bad", bad},
+               {"unlisted", unlisted},
+               {"damaged_records", manifest.damaged_lines()}}
+              .dump() +
+          "\n");
+  } else {
+    std::string text;
+    for (const std::string& file : bad) text += fmt::format("missing or damaged  {}\n", file);
+    for (const std::string& file : unlisted) text += fmt::format("not listed          {}\n", file);
+    text += fmt::format("{} files, {} missing or damaged\n", records.size(), bad.size());
+    print(text);
+  }
+  if (bad.empty()) return;
+  throw Error(fmt::format("{}: {} of {} files are missing or damaged, the first is {}; `drench run` "
+                          "makes them again",
+                          folder.string(), bad.size(), records.size(), bad.front()));
+}
+
+void init_command(const fs::path& name) {
+  fs::path file = name;
+  if (file.extension() != ".toml") file += ".toml";
+  if (file.stem().empty()) throw Error(fmt::format("'{}': names no shot", name.string()));
+  if (fs::exists(file)) {
+    throw Error(fmt::format("{}: exists already; it was left as it is. Choose another name",
+                            file.string()));
+  }
+  write_file_whole(file, starting_shot(file.stem().string()));
+  log_info("driver", fmt::format("wrote {}; `drench run {}` makes its frames", file.string(),
+                                 file.string()));
+}
+
+}  // namespace drench

@@ -1,0 +1,43 @@
+#pragma once
+// The subcommands: read the shot, call the library, report. They throw; main alone catches.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/driver/wanted.h"
+#include "sim/simulator.h"
+
+namespace drench {
+
+/// Options of every command that takes a shot.
+struct ShotArguments {
+  std::filesystem::path shot;
+  std::filesystem::path out;   // empty: out/<shot>/<quality>
+  std::string frames;          // empty: all of the shot
+  Device device = Device::automatic;
+  int threads = 0;             // 0: all cores
+  double memory_gib = 0;       // 0: no limit
+  std::vector<std::string> set;
+  std::string quality = "final";
+  bool json = false;
+  bool quiet = false;
+};
+
+/// run, simulate, mesh, render: brings the output folder up to date as far as `steps` go.
+/// @throws Error, Stopped.
+void make_command(const ShotArguments& arguments, const std::vector<Step>& steps);
+/// Prints what make_command would do. Never writes.
+void plan_command(const ShotArguments& arguments);
+/// Removes frames outside the shot's range and files of sheets it no longer has.
+void clean_command(const ShotArguments& arguments);
+/// Hashes every file. @throws Error if one is missing or damaged; the next run makes those again.
+void verify_command(const std::filesystem::path& folder, bool json);
+/// Writes NAME.toml, a commented starting shot. @throws Error if it exists.
+void init_command(const std::filesystem::path& name);
+
+/// Every step, in order.
+std::vector<Step> all_steps();
+
+}  // namespace drench

@@ -1,0 +1,410 @@
+#include "pipeline/driver/execute.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <semaphore>
+#include <set>
+#include <thread>
+
+#include "build_id.h"
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/driver/channel.h"
+#include "pipeline/driver/checkpoints.h"
+#include "pipeline/driver/layout.h"
+#include "pipeline/driver/process.h"
+#include "pipeline/driver/stats_file.h"
+
+namespace drench {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr size_t queued_frames = 2;
+constexpr int stage_threads = 3;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+class Executor {
+ public:
+  Executor(const Wanted& wanted, const Plan& plan, const fs::path& folder, Manifest& manifest,
+           Stages& stages, Progress& progress, const ExecuteOptions& options);
+  void run();
+
+ private:
+  void simulate_frames();
+  void produce(int frame);
+  void start_simulation();
+  void advance_to(int frame);
+  void mesh_frames();
+  void make_mesh(int frame);
+  void render_frames();
+  void make_image(int frame);
+  void make_dailies(Step step);
+
+  void commit(const std::vector<WrittenFile>& files, Step step, int frame, const Key& key);
+  void finished(Step step, int frame, Clock::time_point start, const StageReport& report);
+  void check_input(const std::string& file);
+  std::optional<KnownFile> look_up(const std::string& file) const;
+  Attributes attributes_of(int frame, const Key& key) const;
+
+  bool stopping() const {
+    return failed_ || (options_.stop_requested && options_.stop_requested());
+  }
+  void fail(std::exception_ptr error);
+  void guard(void (Executor::*work)());
+  void watch();
+  /// Runs one frame of one stage in that stage's arena, when fewer than `threads` others compute.
+  template <class Work>
+  void compute(tbb::task_arena& arena, const Work& work);
+
+  const Wanted& wanted_;
+  const Plan& plan_;
+  const fs::path folder_;
+  Manifest& manifest_;
+  Stages& stages_;
+  Progress& progress_;
+  const ExecuteOptions& options_;
+  const Lookup lookup_;
+  StatsFile stats_;
+
+  std::set<int> to_simulate_;
+  std::vector<Key> keys_;
+  CheckpointKeeper checkpoints_;
+  std::unique_ptr<Simulation> simulation_;
+  int committed_ = 0;  // frame of the last commit of simulation_, or of the state it started with
+  bool has_committed_ = false;
+
+  Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
+  tbb::task_arena simulate_arena_, mesh_arena_, render_arena_;
+  std::counting_semaphore<stage_threads> slots_;
+  std::atomic<bool> failed_{false};
+  std::atomic<int> running_{0};
+  std::atomic<bool> simulating_{false};
+  std::mutex error_mutex_;
+  std::exception_ptr error_;
+};
+
+int slots(int threads) { return threads > 0 ? std::min(threads, stage_threads) : stage_threads; }
+int arena_size(int threads) { return threads > 0 ? threads : tbb::task_arena::automatic; }
+
+Executor::Executor(const Wanted& wanted, const Plan& plan, const fs::path& folder,
+                   Manifest& manifest, Stages& stages, Progress& progress,
+                   const ExecuteOptions& options)
+    : wanted_(wanted),
+      plan_(plan),
+      folder_(folder),
+      manifest_(manifest),
+      stages_(stages),
+      progress_(progress),
+      options_(options),
+      lookup_([this](const std::string& file) { return look_up(file); }),
+      stats_(folder / layout::stats),
+      keys_(simulation_keys(wanted, wanted.frames.back())),
+      checkpoints_(folder, manifest, wanted.first, keys_, options.checkpoint_every,
+                   options.checkpoints_kept),
+      simulate_arena_(arena_size(options.threads)),
+      mesh_arena_(arena_size(options.threads)),
+      render_arena_(arena_size(options.threads)),
+      slots_(slots(options.threads)) {
+  for (const Task& task : plan.tasks) {
+    if (task.step == Step::simulate && task.action == Action::run) to_simulate_.insert(task.frame);
+  }
+}
+
+std::optional<KnownFile> Executor::look_up(const std::string& file) const {
+  const std::optional<Record> record = manifest_.find(file);
+  if (!record) return {};
+  return KnownFile{*record, state_of(folder_, *record)};
+}
+
+void Executor::fail(std::exception_ptr error) {
+  {
+    const std::scoped_lock lock(error_mutex_);
+    if (!error_) error_ = error;
+  }
+  failed_ = true;
+  to_mesh_.close();
+  to_render_.close();
+}
+
+void Executor::guard(void (Executor::*work)()) {
+  try {
+    (this->*work)();
+  } catch (const Stopped&) {
+    // Asked for: run() says so when every stage has ended.
+  } catch (...) {
+    fail(std::current_exception());
+  }
+  --running_;
+}
+
+template <class Work>
+void Executor::compute(tbb::task_arena& arena, const Work& work) {
+  slots_.acquire();
+  try {
+    arena.initialize();
+    const ArithmeticMode mode(arena);
+    arena.execute(work);
+  } catch (...) {
+    slots_.release();
+    throw;
+  }
+  slots_.release();
+}
+
+void Executor::commit(const std::vector<WrittenFile>& files, Step step, int frame,
+                      const Key& key) {
+  for (const WrittenFile& written : files) {
+    Record record = record_of_file(folder_, written);
+    record.step = step_name(step);
+    record.frame = frame;
+    record.key = key.digest;
+    record.parts = key.parts;
+    const std::optional<Record> before = manifest_.find(record.file);
+    if (before && before->key == record.key && before->digest != record.digest) {
+      log_warning("driver", fmt::format("{} came out different from the same inputs; what follows "
+                                        "from it is made again",
+                                        record.file));
+    }
+    manifest_.add(record);
+  }
+}
+
+void Executor::finished(Step step, int frame, Clock::time_point start, const StageReport& report) {
+  const double seconds = seconds_since(start);
+  stats_.add(step_name(step), frame, seconds, report.json);
+  progress_.done(step, frame, seconds, report.line);
+}
+
+void Executor::check_input(const std::string& file) {
+  const std::optional<Record> record = manifest_.find(file);
+  if (record && has_recorded_digest(folder_, *record)) return;
+  manifest_.drop(file);
+  throw PlanAgain(fmt::format("{} is missing or damaged", file));
+}
+
+// ---- simulate ----
+
+void Executor::start_simulation() {
+  checkpoints_.remove_stale();
+  compute(simulate_arena_, [&] { simulation_ = stages_.start_simulation(); });
+  const std::string& file = plan_.simulation.checkpoint;
+  if (file.empty()) return;
+  check_input(file);
+  try {
+    compute(simulate_arena_, [&] { simulation_->read_checkpoint(folder_ / file); });
+  } catch (const Error& error) {
+    manifest_.drop(file);
+    throw PlanAgain(fmt::format("{} cannot be used: {}", file, error.what()));
+  }
+  if (simulation_->frame() != plan_.simulation.from) {
+    manifest_.drop(file);
+    throw PlanAgain(fmt::format("{} holds frame {}, not {}", file, simulation_->frame(),
+                                plan_.simulation.from));
+  }
+  if (!to_simulate_.contains(plan_.simulation.from)) {
+    committed_ = plan_.simulation.from;  // its files are there and right
+    has_committed_ = true;
+  }
+  log_info("sim", fmt::format("continues from frame {}", plan_.simulation.from));
+}
+
+void Executor::advance_to(int frame) {
+  while (simulation_->frame() < frame) {
+    const Clock::time_point start = Clock::now();
+    StageReport report;
+    try {
+      compute(simulate_arena_,
+              [&] { report = simulation_->advance([this] { return !stopping(); }); });
+    } catch (const Error& error) {
+      throw Error(fmt::format("{}\nLast good checkpoint: {}. No file of frame {} was written.",
+                              error.what(), checkpoints_.last_good(), simulation_->frame() + 1));
+    }
+    finished(Step::simulate, simulation_->frame(), start, report);
+  }
+}
+
+void Executor::produce(int frame) {
+  if (!simulation_) start_simulation();
+  advance_to(frame);
+  std::vector<WrittenFile> files;
+  compute(simulate_arena_, [&] { files = simulation_->write_frame(folder_); });
+  commit(files, Step::simulate, frame, keys_.at(size_t(frame - wanted_.first)));
+  committed_ = frame;
+  has_committed_ = true;
+  checkpoints_.after_frame(*simulation_, frame);
+  if (frame == wanted_.first || frame == plan_.simulation.from) {
+    progress_.not_needed(Step::simulate, frame);  // a state that was there costs no time
+  }
+}
+
+void Executor::simulate_frames() {
+  const auto keep_work = [this] {
+    if (!simulation_ || !has_committed_ || simulation_->frame() != committed_) return;
+    checkpoints_.on_stop(*simulation_, committed_);
+  };
+  try {
+    const int begin = to_simulate_.empty() ? wanted_.frames.front() : wanted_.first;
+    size_t next = 0;
+    for (int frame = begin; frame <= wanted_.frames.back(); ++frame) {
+      if (stopping()) break;
+      if (to_simulate_.contains(frame)) produce(frame);
+      if (next >= wanted_.frames.size() || wanted_.frames[next] != frame) continue;
+      ++next;
+      if (!to_mesh_.push(frame)) break;
+    }
+  } catch (const Stopped&) {
+    keep_work();
+    throw;
+  }
+  if (stopping()) keep_work();
+  to_mesh_.finish();
+}
+
+// ---- mesh and render ----
+
+void Executor::make_mesh(int frame) {
+  const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
+  if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame));
+  if (!decision->make) return progress_.not_needed(Step::mesh, frame);
+  const Clock::time_point start = Clock::now();
+  check_input(layout::particles(frame));
+  StageReport report;
+  compute(mesh_arena_, [&] { report = stages_.mesh(folder_, frame); });
+  commit(report.files, Step::mesh, frame, decision->key);
+  finished(Step::mesh, frame, start, report);
+}
+
+void Executor::mesh_frames() {
+  while (const std::optional<int> frame = to_mesh_.pop()) {
+    if (wanted_.may(Step::mesh) && wanted_.fluid) make_mesh(*frame);
+    if (!to_render_.push(*frame)) return;
+  }
+  to_render_.finish();
+}
+
+Attributes Executor::attributes_of(int frame, const Key& key) const {
+  // Only what the key covers: equal inputs give equal files.
+  Attributes attributes{{"shot", wanted_.shot},
+                        {"frame", std::to_string(frame)},
+                        {"version", std::string(build_id::version)},
+                        {"key.render", key.digest.hex()}};
+  for (const std::string& file : render_inputs(wanted_, frame)) {
+    if (const auto record = manifest_.find(file)) {
+      attributes.emplace_back(fmt::format("key.{}", file), record->digest.hex());
+    }
+  }
+  return attributes;
+}
+
+void Executor::make_image(int frame) {
+  const std::optional<Decision> decision = decide_render(wanted_, frame, lookup_);
+  if (!decision) throw PlanAgain(fmt::format("the meshes of frame {} are missing", frame));
+  if (!decision->make) return progress_.not_needed(Step::render, frame);
+  const Clock::time_point start = Clock::now();
+  for (const std::string& file : render_inputs(wanted_, frame)) check_input(file);
+  StageReport report;
+  const auto share = [&](double finished) {
+    if (stopping()) throw Stopped("stopped while rendering");
+    progress_.share(Step::render, finished);
+  };
+  compute(render_arena_, [&] {
+    report = stages_.render(folder_, frame, attributes_of(frame, decision->key), share);
+  });
+  commit(report.files, Step::render, frame, decision->key);
+  finished(Step::render, frame, start, report);
+}
+
+void Executor::render_frames() {
+  while (const std::optional<int> frame = to_render_.pop()) {
+    if (wanted_.may(Step::render)) make_image(*frame);
+  }
+}
+
+void Executor::make_dailies(Step step) {
+  if (!wanted_.may(step)) return;
+  const auto planned = std::find_if(plan_.tasks.begin(), plan_.tasks.end(),
+                                    [&](const Task& task) { return task.step == step; });
+  if (planned == plan_.tasks.end() || planned->action == Action::skip) return;
+  const std::optional<Decision> decision = decide_dailies(wanted_, step, lookup_);
+  if (!decision) throw PlanAgain("a rendered frame is missing");
+  if (!decision->make) return progress_.not_needed(step, 0);
+  const Clock::time_point start = Clock::now();
+  for (const int frame : wanted_.frames) check_input(layout::image(wanted_.shot, frame));
+  StageReport report;
+  compute(render_arena_, [&] {
+    report = step == Step::movie
+                 ? stages_.movie(folder_, wanted_.frames, [this] { return !stopping(); })
+                 : stages_.contact_sheet(folder_, wanted_.frames);
+  });
+  commit(report.files, step, 0, decision->key);
+  finished(step, 0, start, report);
+}
+
+// ---- all together ----
+
+void Executor::watch() {
+  const auto limit = uint64_t(options_.memory_gib * double(1 << 30));
+  std::optional<Clock::time_point> stop_time;
+  while (running_ > 0) {
+    if (stopping()) {
+      to_mesh_.close();
+      to_render_.close();
+      if (!stop_time) stop_time = Clock::now();
+    }
+    const bool asked = options_.stop_requested && options_.stop_requested();
+    // Never while a checkpoint may be in the writing.
+    if (asked && !simulating_ && seconds_since(*stop_time) > options_.patience_s) {
+      if (options_.abandon) options_.abandon();
+    }
+    if (limit > 0 && !stopping() && resident_memory() > limit) {
+      fail(std::make_exception_ptr(Error(
+          fmt::format("{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was "
+                      "stopped with a checkpoint. Give more, or a larger spacing",
+                      folder_.string(), double(resident_memory()) / double(1 << 30),
+                      options_.memory_gib))));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+void Executor::run() {
+  progress_.start(plan_);
+  running_ = stage_threads;
+  simulating_ = true;
+  std::thread simulating([this] {
+    guard(&Executor::simulate_frames);
+    simulating_ = false;
+  });
+  std::thread meshing([this] { guard(&Executor::mesh_frames); });
+  std::thread rendering([this] { guard(&Executor::render_frames); });
+  watch();
+  simulating.join();
+  meshing.join();
+  rendering.join();
+  if (!stopping()) {
+    make_dailies(Step::contact_sheet);
+    if (!stopping()) make_dailies(Step::movie);
+  }
+  progress_.finish();
+  if (error_) std::rethrow_exception(error_);
+  if (stopping()) throw Stopped("stopped on request; the same command continues");
+}
+
+}  // namespace
+
+void execute(const Wanted& wanted, const Plan& plan, const fs::path& folder, Manifest& manifest,
+             Stages& stages, Progress& progress, const ExecuteOptions& options) {
+  Executor(wanted, plan, folder, manifest, stages, progress, options).run();
+}
+
+}  // namespace drench

@@ -1,0 +1,39 @@
+#pragma once
+// Runs a plan in one process: a thread and a TBB arena for each stage, at most two frames queued
+// between stages. A frame is meshed when its caches are committed and rendered when its mesh is.
+
+#include <filesystem>
+#include <functional>
+#include <stdexcept>
+
+#include "pipeline/driver/plan.h"
+#include "pipeline/driver/progress.h"
+#include "pipeline/driver/stages.h"
+
+namespace drench {
+
+struct ExecuteOptions {
+  int threads = 0;            // 0: all cores
+  double memory_gib = 0;      // 0: no limit; above it the run stops with a checkpoint
+  int checkpoint_every = 10;  // frames
+  int checkpoints_kept = 3;
+  std::function<bool()> stop_requested;  // asked often; nothing: never
+  double patience_s = 8;  // after a stop: how long to wait for a mesh that cannot be interrupted
+  std::function<void()> abandon;  // called when that is over; everything committed is safe
+};
+
+/// A file that should have been there is missing or damaged. Its record is dropped already: plan again.
+class PlanAgain : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Brings the folder to what is wanted.
+/// @param manifest  open for append, the folder's lock held.
+/// @throws Stopped after a stop request, with a checkpoint written; PlanAgain; Error of a stage, after
+///         the simulation wrote a checkpoint so that none of its work is lost.
+void execute(const Wanted& wanted, const Plan& plan, const std::filesystem::path& folder,
+             Manifest& manifest, Stages& stages, Progress& progress,
+             const ExecuteOptions& options);
+
+}  // namespace drench

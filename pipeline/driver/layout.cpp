@@ -1,0 +1,19 @@
+#include "pipeline/driver/layout.h"
+
+#include <fmt/format.h>
+
+namespace drench::layout {
+
+std::string particles(int frame) { return fmt::format("sim/particles.{:04d}.vdb", frame); }
+std::string cloth(const std::string& name, int frame) {
+  return fmt::format("sim/cloth.{}.{:04d}.ply", name, frame);
+}
+std::string checkpoint(int frame) { return fmt::format("sim/checkpoint/frame.{:04d}.ckpt", frame); }
+std::string fluid_mesh(int frame) { return fmt::format("mesh/fluid.{:04d}.ply", frame); }
+std::string level_set(int frame) { return fmt::format("mesh/fluid.{:04d}.vdb", frame); }
+std::string image(const std::string& shot, int frame) {
+  return fmt::format("render/{}.{:04d}.exr", shot, frame);
+}
+std::string movie(const std::string& shot) { return shot + ".mp4"; }
+
+}  // namespace drench::layout

@@ -1,0 +1,3 @@
+#include "pipeline/driver/command_line.h"
+
+int main(int argc, char** argv) { return drench::drench_program(argc, argv); }

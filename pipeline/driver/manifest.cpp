@@ -1,0 +1,170 @@
+#include "pipeline/driver/manifest.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/error.h"
+
+namespace drench {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+// The last member of every line; what stands before it is what the checksum covers.
+constexpr std::string_view check_mark = ",\"check\":\"";
+
+std::string with_check(const json& object) {
+  std::string text = object.dump(-1, ' ', false, json::error_handler_t::replace);
+  text.pop_back();  // the closing brace comes after the checksum
+  const std::string check = hash_bytes(text.data(), text.size()).hex();
+  return fmt::format("{}{}{}\"}}", text, check_mark, check);
+}
+
+std::string drop_line(const std::string& file) {
+  return with_check(json{{"file", file}, {"dropped", true}});
+}
+
+/// The object of a line whose checksum holds.
+std::optional<json> checked(std::string_view line) {
+  const size_t mark = line.rfind(check_mark);
+  if (mark == std::string_view::npos) return {};
+  const std::string_view body = line.substr(0, mark);
+  const std::string check = hash_bytes(body.data(), body.size()).hex();
+  if (line.substr(mark) != fmt::format("{}{}\"}}", check_mark, check)) return {};
+  json object = json::parse(line.begin(), line.end(), nullptr, false);
+  if (!object.is_object()) return {};
+  return object;
+}
+
+std::optional<Record> record_of(const json& object) {
+  try {
+    Record record;
+    record.file = object.at("file").get<std::string>();
+    record.step = object.at("step").get<std::string>();
+    record.frame = object.at("frame").get<int>();
+    record.size = object.at("size").get<uint64_t>();
+    record.digest = Digest::from_hex(object.at("digest").get<std::string>());
+    record.mtime_ns = object.at("mtime_ns").get<int64_t>();
+    record.key = Digest::from_hex(object.at("key").get<std::string>());
+    record.parts = object.at("parts").get<KeyParts>();
+    // A record must not name a file outside its folder.
+    const fs::path path(record.file);
+    if (record.file.empty() || path.is_absolute()) return {};
+    for (const fs::path& part : path) {
+      if (part == "..") return {};
+    }
+    return record;
+  } catch (const json::exception&) {
+    return {};
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+}  // namespace
+
+std::string manifest_line(const Record& record) {
+  return with_check(json{{"file", record.file},
+                         {"step", record.step},
+                         {"frame", record.frame},
+                         {"size", record.size},
+                         {"digest", record.digest.hex()},
+                         {"mtime_ns", record.mtime_ns},
+                         {"key", record.key.hex()},
+                         {"parts", record.parts}});
+}
+
+std::optional<Record> parse_manifest_line(std::string_view line) {
+  const std::optional<json> object = checked(line);
+  return object ? record_of(*object) : std::nullopt;
+}
+
+Manifest::Manifest(fs::path file) : file_(std::move(file)) {
+  std::error_code code;
+  if (!fs::exists(file_, code)) return;
+  const std::string text = read_text(file_, uint64_t(1) << 32);
+  for (size_t begin = 0; begin < text.size();) {
+    const size_t end = text.find('\n', begin);
+    if (end == std::string::npos) {  // the writer was killed in the middle of this line
+      ++damaged_lines_;
+      break;
+    }
+    const std::optional<json> object = checked(std::string_view(text).substr(begin, end - begin));
+    const std::optional<Record> record = object ? record_of(*object) : std::nullopt;
+    if (record) {
+      records_[record->file] = *record;
+    } else if (object && object->contains("dropped") && object->at("file").is_string()) {
+      records_.erase(object->at("file").get<std::string>());
+    } else {
+      ++damaged_lines_;
+    }
+    begin = good_size_ = end + 1;
+  }
+}
+
+Manifest::~Manifest() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void Manifest::open_for_append() {
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (descriptor_ < 0 || ::ftruncate(descriptor_, off_t(good_size_)) != 0 ||
+      ::lseek(descriptor_, off_t(good_size_), SEEK_SET) < 0) {
+    throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(errno)));
+  }
+}
+
+void Manifest::append(std::string line) {
+  if (descriptor_ < 0) throw std::logic_error("manifest: append before open_for_append");
+  line += '\n';
+  for (size_t done = 0; done < line.size();) {
+    const ssize_t count = ::write(descriptor_, line.data() + done, line.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int reason = count < 0 ? errno : ENOSPC;
+      // The next record must not be glued to half a line.
+      if (::ftruncate(descriptor_, off_t(good_size_)) == 0) {
+        (void)::lseek(descriptor_, off_t(good_size_), SEEK_SET);
+      }
+      throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(reason)));
+    }
+    done += size_t(count);
+  }
+  if (::fdatasync(descriptor_) != 0) {
+    throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(errno)));
+  }
+  good_size_ += line.size();
+}
+
+void Manifest::add(const Record& record) {
+  const std::scoped_lock lock(mutex_);
+  append(manifest_line(record));
+  records_[record.file] = record;
+}
+
+void Manifest::drop(const std::string& file) {
+  const std::scoped_lock lock(mutex_);
+  if (!records_.contains(file)) return;
+  append(drop_line(file));
+  records_.erase(file);
+}
+
+std::optional<Record> Manifest::find(const std::string& file) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = records_.find(file);
+  return found == records_.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::map<std::string, Record> Manifest::records() const {
+  const std::scoped_lock lock(mutex_);
+  return records_;
+}
+
+}  // namespace drench

@@ -1,0 +1,62 @@
+#pragma once
+// An output folder: its lock, its manifest, and whether its files still are what the manifest says.
+//
+// A file is trusted when its size and modification time are those recorded: reading hundreds of MB
+// to find out that nothing is to be done would take longer than half a second. The time is a hint in
+// one direction only: where it or the size differs, the file is hashed, and the digest decides. The
+// hint cannot see a disk that flips bits in place. That is found where a stage reads the file (the
+// digest of every input is checked before use) and by `drench verify`, which hashes everything.
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pipeline/driver/manifest.h"
+
+namespace drench {
+
+/// Kernel lock on an output folder (flock): released by the kernel when its process ends, however it
+/// ends, so that none is ever stale.
+class FolderLock {
+ public:
+  /// Makes the folder if needed. @throws Error if another driver holds it, saying who, or the folder
+  /// cannot be written.
+  explicit FolderLock(const std::filesystem::path& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
+enum class FileState { intact, missing, changed };
+
+/// A record and what became of its file.
+struct KnownFile {
+  Record record;
+  FileState state = FileState::intact;
+};
+using Snapshot = std::map<std::string, KnownFile>;  // by file name
+
+/// What the record says against the file in `folder`: size and time first, the digest where they
+/// differ. Never writes.
+FileState state_of(const std::filesystem::path& folder, const Record& record);
+Snapshot take_snapshot(const std::filesystem::path& folder, const Manifest& manifest);
+
+/// Hashes the whole file. @return false if it is missing, unreadable or has another digest.
+bool has_recorded_digest(const std::filesystem::path& folder, const Record& record);
+
+/// The record of a file just written into `folder`.
+Record record_of_file(const std::filesystem::path& folder, const WrittenFile& written);
+
+/// Files under `folder` that the manifest does not list, relative, sorted; the driver's own
+/// (manifest, stats, lock) are left out.
+std::vector<std::string> unlisted_files(const std::filesystem::path& folder,
+                                        const Manifest& manifest);
+
+/// Removes what killed runs left half-written. Call with the lock held.
+void remove_leftovers(const std::filesystem::path& folder);
+
+}  // namespace drench

@@ -1,0 +1,168 @@
+#include "pipeline/driver/stages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/particles_file.h"
+#include "pipeline/driver/contact_sheet.h"
+#include "pipeline/driver/layout.h"
+#include "pipeline/driver/movie.h"
+#include "render/renderer.h"
+#include "surfacing/surface.h"
+
+namespace drench {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+StageReport report_of(const StepReport& step, const std::string& device) {
+  StageReport report;
+  report.json = json{{"device", device},
+                     {"steps", step.steps},
+                     {"cloth_substeps", step.cloth_substeps},
+                     {"time", step.time},
+                     {"smallest_dt", step.smallest_dt},
+                     {"largest_dt", step.largest_dt},
+                     {"limit", step.limit},
+                     {"particles", step.particles},
+                     {"near", step.near},
+                     {"max_speed", step.max_speed},
+                     {"mean_compression", step.mean_compression},
+                     {"max_compression", step.max_compression},
+                     {"kinetic_energy", step.kinetic_energy},
+                     {"guard_hits", step.guard_hits}}
+                    .dump();
+  report.line = fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
+                            step.steps, step.cloth_substeps, step.limit, step.particles,
+                            step.max_speed);
+  return report;
+}
+
+class ShotSimulation final : public Simulation {
+ public:
+  ShotSimulation(const Shot& shot, const SimulatorOptions& options)
+      : simulator_(shot, options), fluid_(shot.fluid.present()) {}
+
+  int frame() const override { return simulator_.frame(); }
+  StageReport advance(const std::function<bool()>& keep_going) override {
+    const StepReport step = simulator_.advance_frame(keep_going);
+    return report_of(step, simulator_.device_name());
+  }
+  std::vector<WrittenFile> write_frame(const fs::path& folder) const override {
+    std::vector<WrittenFile> files;
+    if (fluid_) {
+      files.push_back(write_particles(folder / layout::particles(frame()), simulator_.particles()));
+    }
+    for (const ClothFrame& cloth : simulator_.cloth()) {
+      files.push_back(write_mesh(folder / layout::cloth(cloth.name, frame()), cloth.mesh));
+    }
+    return files;
+  }
+  WrittenFile write_checkpoint(const fs::path& file) const override {
+    return simulator_.write_checkpoint(file);
+  }
+  void read_checkpoint(const fs::path& file) override { simulator_.read_checkpoint(file); }
+
+ private:
+  Simulator simulator_;
+  bool fluid_;
+};
+
+class ShotStages final : public Stages {
+ public:
+  ShotStages(const Shot& shot, fs::path folder, const StageOptions& options)
+      : shot_(shot), folder_(std::move(folder)), options_(options) {
+    if (options.memory_gib > 0) {
+      shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
+    }
+  }
+
+  std::unique_ptr<Simulation> start_simulation() override {
+    SimulatorOptions options;
+    options.device = options_.device;
+    options.checkpoint_dir = folder_ / "sim/checkpoint";
+    return std::make_unique<ShotSimulation>(shot_, options);
+  }
+
+  StageReport mesh(const fs::path& folder, int frame) override {
+    const ParticleFrame particles = read_particles(folder / layout::particles(frame));
+    const TriangleMesh surface = surface_frame(particles, shot_.surface);
+    StageReport report;
+    report.files.push_back(write_mesh(folder / layout::fluid_mesh(frame), surface));
+    if (shot_.surface.level_set) {
+      report.files.push_back(write_level_set(folder / layout::level_set(frame), surface,
+                                             shot_.surface.voxel * particles.spacing));
+    }
+    report.json = json{{"particles", particles.position.size()},
+                       {"vertices", surface.position.size()},
+                       {"triangles", surface.triangle.size()}}
+                      .dump();
+    report.line = fmt::format("particles={} triangles={}", particles.position.size(),
+                              surface.triangle.size());
+    return report;
+  }
+
+  StageReport render(const fs::path& folder, int frame, const Attributes& attributes,
+                     const std::function<void(double)>& progress) override {
+    FrameGeometry geometry;
+    if (shot_.fluid.present()) geometry.fluid = read_mesh(folder / layout::fluid_mesh(frame));
+    for (const Cloth& cloth : shot_.cloth) {
+      geometry.cloth.push_back({cloth.name, read_mesh(folder / layout::cloth(cloth.name, frame))});
+    }
+    RenderStats stats;
+    const Film film = render_frame(shot_, frame, geometry, &stats, progress);
+    Attributes all = attributes;
+    all.emplace_back("seed", std::to_string(shot_.render.seed));
+    all.emplace_back("samples", std::to_string(shot_.render.samples));
+    StageReport report;
+    report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, all));
+    report.json =
+        json{{"camera_samples", stats.camera_samples}, {"rays", stats.rays}, {"cpu_s", stats.cpu_s}}
+            .dump();
+    report.line = fmt::format("camera_samples={} rays={}", stats.camera_samples, stats.rays);
+    return report;
+  }
+
+  StageReport contact_sheet(const fs::path& folder, const std::vector<int>& frames) override {
+    StageReport report;
+    report.files.push_back(write_contact_sheet(folder / layout::contact_sheet,
+                                               images(folder, frames)));
+    return report;
+  }
+
+  StageReport movie(const fs::path& folder, const std::vector<int>& frames,
+                    const std::function<bool()>& keep_going) override {
+    StageReport report;
+    report.files.push_back(write_movie(folder / layout::movie(shot_.name), images(folder, frames),
+                                       shot_.timeline.fps, keep_going));
+    return report;
+  }
+
+ private:
+  std::vector<NumberedImage> images(const fs::path& folder, const std::vector<int>& frames) const {
+    std::vector<NumberedImage> result;
+    for (const int frame : frames) {
+      result.push_back({frame, folder / layout::image(shot_.name, frame)});
+    }
+    return result;
+  }
+
+  Shot shot_;
+  fs::path folder_;
+  StageOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Stages> shot_stages(const Shot& shot, const fs::path& folder,
+                                    const StageOptions& options) {
+  return std::make_unique<ShotStages>(shot, folder, options);
+}
+
+}  // namespace drench

@@ -1,0 +1,64 @@
+#pragma once
+// What the executor drives: one simulation, and a frame of meshing or rendering. Every call reads
+// files and writes files; nothing is handed on in memory. shot_stages() binds the real libraries.
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/shot.h"
+#include "sim/simulator.h"
+
+namespace drench {
+
+/// What a call did: members of a JSON object for stats.jsonl, key=value pairs for the log.
+struct StageReport {
+  std::string json = "{}";
+  std::string line;
+  std::vector<WrittenFile> files;
+};
+
+/// The state of one simulation; begins at the shot's first frame or before it.
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+  virtual int frame() const = 0;
+  /// To the next frame. @throws Stopped when keep_going says so; Error on blow-up.
+  virtual StageReport advance(const std::function<bool()>& keep_going) = 0;
+  virtual std::vector<WrittenFile> write_frame(const std::filesystem::path& folder) const = 0;
+  virtual WrittenFile write_checkpoint(const std::filesystem::path& file) const = 0;
+  virtual void read_checkpoint(const std::filesystem::path& file) = 0;
+};
+
+using Attributes = std::vector<std::pair<std::string, std::string>>;
+
+class Stages {
+ public:
+  virtual ~Stages() = default;
+  virtual std::unique_ptr<Simulation> start_simulation() = 0;
+  virtual StageReport mesh(const std::filesystem::path& folder, int frame) = 0;
+  /// @param progress  called with the finished share; may throw Stopped.
+  virtual StageReport render(const std::filesystem::path& folder, int frame,
+                             const Attributes& attributes,
+                             const std::function<void(double)>& progress) = 0;
+  virtual StageReport contact_sheet(const std::filesystem::path& folder,
+                                    const std::vector<int>& frames) = 0;
+  /// @param keep_going  asked between frames; false throws Stopped.
+  virtual StageReport movie(const std::filesystem::path& folder, const std::vector<int>& frames,
+                            const std::function<bool()>& keep_going) = 0;
+};
+
+struct StageOptions {
+  Device device = Device::automatic;
+  double memory_gib = 0;  // 0: the shot's own limit of surfacing grids stands
+};
+
+/// The simulator, the surfacing and the renderer of a shot in an output folder.
+std::unique_ptr<Stages> shot_stages(const Shot& shot, const std::filesystem::path& folder,
+                                    const StageOptions& options);
+
+}  // namespace drench

@@ -1,0 +1,176 @@
+#include "pipeline/driver/wanted.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "build_id.h"
+#include "pipeline/contract/error.h"
+#include "pipeline/driver/layout.h"
+#include "pipeline/driver/movie.h"
+
+namespace drench {
+
+namespace {
+
+std::string short_hex(const Digest& digest) { return digest.hex().substr(0, 8); }
+
+/// A digest of each top-level section of the resolved shot: names what changed, decides nothing.
+KeyParts sections_of(const Shot& shot, std::initializer_list<std::string_view> names) {
+  const toml::table lock = toml::parse(shot_lock(shot));
+  KeyParts parts;
+  for (const std::string_view name : names) {
+    const toml::node* node = lock.get(name);
+    if (!node) continue;
+    std::ostringstream text;
+    node->visit([&](const auto& value) { text << value; });
+    const std::string bytes = text.str();
+    parts[std::string(name)] = short_hex(hash_bytes(bytes.data(), bytes.size()));
+  }
+  return parts;
+}
+
+/// Collects what a stage depends on into one digest and names its parts.
+class StageKeyBuilder {
+ public:
+  StageKeyBuilder(std::string_view stage, std::string_view build, KeyParts sections)
+      : parts_(std::move(sections)) {
+    hasher_.text(stage).text(build);
+    parts_["program"] = std::string(build.substr(0, 8));
+  }
+  StageKeyBuilder& settings(const Digest& digest) {
+    hasher_.digest(digest);
+    return *this;
+  }
+  StageKeyBuilder& number(std::string_view name, double value) {
+    hasher_.text(name).value(value);
+    return *this;
+  }
+  StageKeyBuilder& device(const std::string& name) {
+    hasher_.text(name);
+    parts_["device"] = name;
+    return *this;
+  }
+  StageKeyBuilder& file(const std::filesystem::path& path) {
+    if (path.empty()) return *this;
+    const Digest digest = hash_file(path);
+    hasher_.digest(digest);
+    parts_[path.filename().string()] = short_hex(digest);
+    return *this;
+  }
+  StageKey finish() { return {hasher_.finish(), std::move(parts_)}; }
+
+ private:
+  Hasher hasher_;
+  KeyParts parts_;
+};
+
+StageKey simulate_key(const Shot& shot, const std::string& device_class) {
+  StageKeyBuilder builder("simulate", build_id::simulate,
+                          sections_of(shot, {"shot", "domain", "fluid", "cloth", "coupling"}));
+  builder.settings(stage_settings_digest(shot, Stage::simulate))
+      .number("fps", shot.timeline.fps)
+      .number("first", shot.timeline.first)
+      .device(device_class);
+  for (const Cloth& cloth : shot.cloth) builder.file(cloth.mesh_file);
+  return builder.finish();
+}
+
+StageKey render_key(const Shot& shot) {
+  StageKeyBuilder builder(
+      "render", build_id::render,
+      sections_of(shot, {"camera", "light", "material", "ground", "render"}));
+  builder.settings(stage_settings_digest(shot, Stage::render))
+      .number("fps", shot.timeline.fps)
+      .number("first", shot.timeline.first);
+  for (const Light& light : shot.light) builder.file(light.map);
+  for (const Material& material : shot.material) builder.file(material.texture);
+  return builder.finish();
+}
+
+}  // namespace
+
+std::string_view step_name(Step step) {
+  switch (step) {
+    case Step::simulate: return "simulate";
+    case Step::mesh: return "mesh";
+    case Step::render: return "render";
+    case Step::contact_sheet: return "contact sheet";
+    case Step::movie: return "movie";
+  }
+  return "";
+}
+
+bool Wanted::may(Step step) const {
+  return std::find(steps.begin(), steps.end(), step) != steps.end();
+}
+
+Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
+            const std::string& device_class) {
+  Wanted wanted;
+  wanted.shot = shot.name;
+  wanted.first = shot.timeline.first;
+  wanted.frames = std::move(frames);
+  wanted.steps = std::move(steps);
+  wanted.fluid = shot.fluid.present();
+  wanted.level_set = wanted.fluid && shot.surface.level_set;
+  for (const Cloth& cloth : shot.cloth) wanted.cloth.push_back(cloth.name);
+  wanted.simulate = simulate_key(shot, device_class);
+  wanted.mesh = StageKeyBuilder("mesh", build_id::mesh, sections_of(shot, {"surface"}))
+                    .settings(stage_settings_digest(shot, Stage::mesh))
+                    .finish();
+  wanted.render = render_key(shot);
+  wanted.dailies = StageKeyBuilder("dailies", build_id::dailies, {})
+                       .number("fps", shot.timeline.fps)
+                       .finish();
+  wanted.has_ffmpeg = find_ffmpeg().has_value();
+  return wanted;
+}
+
+std::vector<std::string> simulated_files(const Wanted& wanted, int frame) {
+  std::vector<std::string> files;
+  if (wanted.fluid) files.push_back(layout::particles(frame));
+  for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
+  return files;
+}
+
+std::vector<std::string> mesh_files(const Wanted& wanted, int frame) {
+  std::vector<std::string> files;
+  if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
+  if (wanted.level_set) files.push_back(layout::level_set(frame));
+  return files;
+}
+
+std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
+  std::vector<std::string> files;
+  if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
+  for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
+  return files;
+}
+
+std::vector<Key> simulation_keys(const Wanted& wanted, int last) {
+  std::vector<Key> keys;
+  Digest before;
+  for (int frame = wanted.first; frame <= last; ++frame) {
+    Hasher hasher;
+    hasher.text("simulate").digest(wanted.simulate.digest).value(frame).digest(before);
+    before = hasher.finish();
+    keys.push_back({before, wanted.simulate.parts});
+  }
+  return keys;
+}
+
+Key step_key(const StageKey& stage, Step step, int frame, const InputDigests& inputs) {
+  Key key{{}, stage.parts};
+  Hasher hasher;
+  hasher.text(step_name(step)).digest(stage.digest).value(frame);
+  for (const auto& [name, digest] : inputs) {
+    hasher.text(name).digest(digest);
+    key.parts[name] = short_hex(digest);
+  }
+  key.digest = hasher.finish();
+  return key;
+}
+
+}  // namespace drench

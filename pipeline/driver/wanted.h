@@ -1,0 +1,65 @@
+#pragma once
+// What a shot wants made, and the keys that say whether it is: everything a step depends on, hashed.
+//
+//   simulate(f) = H(stage, f, simulate(f - 1))        stage = settings, input files, build, device
+//   mesh(f)     = H(stage, f, digest of particles)    digests, not keys: inputs that come out the
+//   render(f)   = H(stage, f, digests of meshes)      same stop a change from spreading further
+
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot_file.h"
+#include "pipeline/driver/manifest.h"
+
+namespace drench {
+
+enum class Step { simulate, mesh, render, contact_sheet, movie };
+std::string_view step_name(Step step);
+
+/// What a stage depends on besides the files of the stage before.
+struct StageKey {
+  Digest digest;   // settings, build, device class, contents of files the shot names
+  KeyParts parts;  // the same by name, short digests, to say what changed
+};
+
+/// The state an output folder should be brought to. Plain data: planning does no input or output.
+struct Wanted {
+  std::string shot;           // file stem
+  int first = 1001;           // of the shot's timeline: where simulation starts
+  std::vector<int> frames;    // to deliver, sorted, at least one
+  std::vector<Step> steps;    // steps that may run; a later one alone takes what lies there
+  bool fluid = false;         // false: nothing to mesh
+  bool level_set = false;     // mesh also writes a VDB
+  std::vector<std::string> cloth;  // names of the sheets
+  StageKey simulate, mesh, render, dailies;  // dailies: contact sheet and movie
+  bool has_ffmpeg = false;
+
+  bool may(Step step) const;
+};
+
+/// Hashes the settings and the files that the shot names (cloth meshes, maps, textures).
+/// @param device_class  "cpu" or "cuda": their simulations differ in bits.
+/// @throws Error if a named file cannot be read.
+Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
+            const std::string& device_class);
+
+/// Files a frame of the simulation consists of: particles if there is fluid, one for each sheet.
+std::vector<std::string> simulated_files(const Wanted& wanted, int frame);
+std::vector<std::string> mesh_files(const Wanted& wanted, int frame);
+/// Files that rendering a frame reads.
+std::vector<std::string> render_inputs(const Wanted& wanted, int frame);
+
+/// A key and what it is made of.
+struct Key {
+  Digest digest;
+  KeyParts parts;
+};
+
+/// Keys of frames first ... last of the simulation, in order.
+std::vector<Key> simulation_keys(const Wanted& wanted, int last);
+/// Key of a step made from files: their names and digests in order.
+using InputDigests = std::vector<std::pair<std::string, Digest>>;
+Key step_key(const StageKey& stage, Step step, int frame, const InputDigests& inputs);
+
+}  // namespace drench
