@@ -77,7 +77,8 @@ Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f&
   if constexpr (!thin_lens) return {pose.position, normalized(through), time};
   const V2f d = sample_disc(lens) * pose.lens_radius;
   const V3f shift = pose.right * d.x + pose.up * d.y;
-  return {pose.position + shift, normalized(through * pose.focus_distance - shift), time};
+  // Divided by the focus distance, so that a lens of radius 0 gives the pinhole's bits.
+  return {pose.position + shift, normalized(through - shift * (1 / pose.focus_distance)), time};
 }
 
 template Ray ShutterCamera::from_pose<false>(const CameraPose&, const V2f&, const V2f&,

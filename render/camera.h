@@ -30,7 +30,7 @@ class ShutterCamera {
   template <bool moving, bool thin_lens>
   Ray ray(const V2f& film, const V2f& lens, float time) const {
     if constexpr (moving)
-      return from_pose<thin_lens>(pose_at(time), film, lens, time);
+      return from_pose<thin_lens>(moves_ ? pose_at(time) : open_, film, lens, time);
     else
       return from_pose<thin_lens>(open_, film, lens, time);
   }

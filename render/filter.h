@@ -19,7 +19,7 @@ class PixelFilter {
   V2f offset(const V2f& u) const { return {inverse(u.x), inverse(u.y)}; }
 
  private:
-  static constexpr int kSize = 256;
+  static constexpr int kSize = 1024;
   float inverse(float u) const {
     const float x = u * kSize;
     const int k = std::min(int(x), kSize - 1);

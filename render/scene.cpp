@@ -155,9 +155,16 @@ bool Scene::moves_visibly(const TriangleMesh& mesh) const {
   if (mesh.velocity.empty() || close_ == open_) return false;
   const float shutter = float((close_ - open_) / fps_);  // s
   const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
-  for (size_t k = 0; k < mesh.position.size(); ++k) {
-    const float distance = (mesh.position[k] - camera_.open().position).length();
-    if (mesh.velocity[k].length() > limit * distance) return true;
+  for (const auto& t : mesh.triangle) {
+    const V3f &a = mesh.position[t.x], &b = mesh.position[t.y], &c = mesh.position[t.z];
+    const V3f middle = (a + b + c) / 3;
+    const float reach2 =
+        std::max({(a - middle).length2(), (b - middle).length2(), (c - middle).length2()});
+    const float distance =
+        std::max(0.f, (middle - camera_.open().position).length() - std::sqrt(reach2));
+    const float speed2 = std::max(
+        {mesh.velocity[t.x].length2(), mesh.velocity[t.y].length2(), mesh.velocity[t.z].length2()});
+    if (std::sqrt(speed2) > limit * distance) return true;
   }
   return false;
 }

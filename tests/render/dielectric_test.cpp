@@ -1,0 +1,192 @@
+// Water against closed forms: Fresnel slabs, absorption, total reflection, closed meshes.
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "render/scene.h"
+#include "tests/render/support.h"
+
+namespace drench::test {
+namespace {
+
+constexpr double kIndex = 1.333;
+const double kOneFace = std::pow((kIndex - 1) / (kIndex + 1), 2);  // 0.020371
+
+/// A slab of 20 m x d x 20 m whose top lies at y = 0, seen straight from above; the camera hides
+/// nothing. One panel shines from above or from below.
+struct Slab {
+  Shot shot = plain_shot(256);
+  FrameGeometry geometry;
+
+  Slab(double thickness, const Material& material, Facing light) {
+    shot.material = {material};
+    aim_narrow(shot, {0, 5, 0}, {0, 0, 0});
+    shot.light = {panel({0, light == Facing::down ? 10. : -10., 0}, 3, 3, 1, light)};
+    geometry.fluid = box_mesh({-10, float(-thickness), -10}, {10, 0, 10});
+  }
+};
+
+TEST(FresnelSlab, ReflectsWhatBothFacesSumTo) {
+  // R = R1 + (1 - R1)^2 R1 (1 + R1^2 + ...) = 2 R1 / (1 + R1) = 0.03993.
+  for (const auto first : {FirstInterface::one, FirstInterface::both}) {
+    const Slab slab(0.5, dielectric("water", kIndex), Facing::down);
+    RenderOptions options;
+    options.first_interface = first;
+    const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry, options), 0);
+    EXPECT_LT(mean.error, 0.002);
+    EXPECT_NEAR(mean.value, 2 * kOneFace / (1 + kOneFace), bound(mean));
+  }
+}
+
+TEST(FresnelSlab, TransmitsTheRest) {
+  const Slab slab(0.5, dielectric("water", kIndex), Facing::up);
+  const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry), 0);
+  EXPECT_NEAR(mean.value, (1 - kOneFace) / (1 + kOneFace), bound(mean));
+}
+
+TEST(AbsorbingSlab, TransmitsBeerLambertBetweenItsReflections) {
+  // T = (1 - R1)^2 e^-sd / (1 - R1^2 e^-2sd)
+  const V3f absorption(0.5f, 1, 2);
+  const double thickness = 0.7;
+  const Slab slab(thickness, dielectric("water", kIndex, absorption), Facing::up);
+  const Film film = render_frame(slab.shot, 1001, slab.geometry);
+  for (int c = 0; c < 3; ++c) {
+    const double once = std::exp(-absorption[c] * thickness);
+    const Mean mean = channel_mean(film, c);
+    EXPECT_NEAR(mean.value, std::pow(1 - kOneFace, 2) * once / (1 - std::pow(kOneFace * once, 2)),
+                bound(mean));
+  }
+}
+
+TEST(AbsorbingSlab, FollowsBeerLambertAloneWhenTheIndexMatches) {
+  const V3f absorption(0.5f, 1, 2);
+  const Slab slab(1.25, dielectric("water", 1, absorption), Facing::up);
+  const Film film = render_frame(slab.shot, 1001, slab.geometry);
+  for (int c = 0; c < 3; ++c) {
+    const double expected = std::exp(-1.25 * absorption[c]);
+    // No chance is left in this one: only rounding.
+    EXPECT_NEAR(channel_mean(film, c).value, expected, 2e-5 * expected);
+  }
+}
+
+TEST(AbsorbingSlab, TintsTheFloorByTheWayLightTook) {
+  // Index-matched water over a white floor, light straight down: e^-s(d / cos camera + d).
+  Shot shot = plain_shot(64);
+  add_ground(shot, 0.5f);
+  shot.material.push_back(dielectric("water", 1, V3f(0.8f, 0.4f, 0.f)));
+  shot.fluid.spacing = 1e-4;
+  Light sun;
+  sun.type = LightType::sun;
+  sun.radiance = V3f(kPi64);
+  sun.angle_deg = 2;  // wide enough to be met by surface samples: light sampling cannot pass water
+  shot.light = {sun};
+  shot.render.samples = 16384;
+  shot.render.width = shot.render.height = 8;
+  aim_narrow(shot, {0, 5, 5}, {0, 0, 0});
+  const double depth = 0.5;
+  FrameGeometry geometry{box_mesh({-4, -0.1f, -4}, {4, float(depth), 4}), {}};
+  const Film film = render_frame(shot, 1001, geometry);
+  const Mean clear = channel_mean(film, 2);
+  EXPECT_NEAR(clear.value, 0.5, 4 * clear.error);
+  EXPECT_LT(clear.error, 0.02);
+  // The same paths in every channel, so the ratio has almost no noise: 1e-3 for the sun's width.
+  for (int c = 0; c < 2; ++c)
+    EXPECT_NEAR(channel_mean(film, c).value / clear.value,
+                std::exp(-(c == 0 ? 0.8 : 0.4) * depth * (1 + std::sqrt(2.))), 1e-3);
+}
+
+TEST(SnellsWindow, EndsAtTheCriticalAngle) {
+  // Under flat water over a black floor the sky shows inside asin(1/n) = 48.61 degrees of the
+  // vertical and nothing shows outside.
+  Shot shot = plain_shot(4, 64);
+  add_ground(shot, 0, 200);
+  shot.material.push_back(dielectric("water", kIndex));
+  shot.light = {sky(1)};
+  shot.camera.position = V3d(0, 1, 0);
+  shot.camera.target = V3d(0, 2, 0);
+  shot.camera.up = V3d(0, 0, -1);
+  shot.camera.fov_deg = 120.0;
+  const FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
+  const Film film = render_frame(shot, 1001, geometry);
+  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
+  const double edge = pixels_per_tangent * std::tan(std::asin(1 / kIndex));
+  int inside = 0, outside = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double r = std::hypot(x + 0.5 - 32, y + 0.5 - 32);
+      const float value = film.rgba[4 * size_t(y * 64 + x)];
+      // The pixel filter reaches 1.5 pixels along each axis, 2.12 in all.
+      if (r > edge + 2.2) {
+        EXPECT_EQ(value, 0) << x << ' ' << y;
+        ++outside;
+      } else if (r < edge - 6) {
+        EXPECT_GT(value, 0.4f) << x << ' ' << y;  // 1 - F is above 0.75 there; four samples
+        ++inside;
+      }
+    }
+  EXPECT_GT(inside, 400);
+  EXPECT_GT(outside, 400);
+}
+
+TEST(SnellsWindow, ShowsOneMinusFresnelAtTheZenith) {
+  Shot shot = plain_shot(1024, 8);
+  add_ground(shot, 0, 200);
+  shot.material.push_back(dielectric("water", kIndex));
+  shot.light = {sky(1)};
+  aim_narrow(shot, {0, 1, 0}, {0, 2, 0});
+  const FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
+  const Mean mean = channel_mean(render_frame(shot, 1001, geometry), 0);
+  EXPECT_NEAR(mean.value, 1 - kOneFace, bound(mean));
+}
+
+TEST(WaterMesh, LosesNoRayThroughItsEdges) {
+  // From inside a closed convex mesh every ray meets an inner side; from outside, leaving outwards,
+  // none comes back.
+  Shot shot = plain_shot(1);
+  shot.material = {dielectric("water", kIndex)};
+  TriangleMesh mesh = sphere_mesh(5);
+  translate(mesh, {10, 2, -3});  // away from the origin, where rounding is coarser
+  const Scene scene(shot, 1001, {mesh, {}}, {});
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const auto direction = [&] {
+    for (;;) {
+      const V3f d(uniform(random), uniform(random), uniform(random));
+      if (d.length2() < 1 && d.length2() > 0.01f) return d.normalized();
+    }
+  };
+  Ray ray{V3f(10, 2, -3), direction(), 0};
+  int lost = 0, caught = 0, wrong_side = 0;
+  for (int k = 0; k < 400000; ++k) {
+    const Hit hit = scene.intersect(ray, Coherence::incoherent);
+    if (hit.kind != Hit::Kind::object) {
+      ++lost;
+      ray.origin = V3f(10, 2, -3);
+      continue;
+    }
+    const Surface surface = scene.surface<false>(ray, hit);
+    wrong_side += surface.geometric_normal.dot(ray.direction) > 0 ? 0 : 1;
+    V3f d = direction();
+    if (d.dot(surface.geometric_normal) > 0) d = -d;
+    const Ray away{surface.leave(-d), -d, 0};
+    caught += scene.intersect(away, Coherence::incoherent).kind == Hit::Kind::object ? 1 : 0;
+    ray = {surface.leave(d), d, 0};
+  }
+  EXPECT_EQ(lost, 0);
+  EXPECT_EQ(wrong_side, 0);
+  EXPECT_EQ(caught, 0);
+}
+
+TEST(WaterMesh, KnowsWhatLiesInside) {
+  Shot shot = plain_shot(1);
+  shot.material = {dielectric("water", kIndex)};
+  const Scene scene(shot, 1001, {sphere_mesh(4), {}}, {});
+  EXPECT_TRUE(scene.inside_fluid({0.1f, 0.2f, -0.3f}, 0));
+  EXPECT_TRUE(scene.inside_fluid({0, -0.98f, 0}, 0));
+  EXPECT_FALSE(scene.inside_fluid({0, -1.02f, 0}, 0));
+  EXPECT_FALSE(scene.inside_fluid({1.5f, 0, 0}, 0));
+}
+
+}  // namespace
+}  // namespace drench::test
