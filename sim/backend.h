@@ -11,3 +11,4 @@
 #define DRENCH_HD inline __attribute__((always_inline))
 #define DRENCH_LAMBDA [=]
 #endif
+

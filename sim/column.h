@@ -86,6 +86,17 @@ std::vector<T> to_host(const Column<T>& column, size_t size) {
   column.download(host.data(), size);
   return host;
 }
+/// One value, read back.
+template <class T>
+T value_at(const Column<T>& column, size_t place) {
+#if defined(__CUDACC__)
+  T value;
+  check_cuda(cudaMemcpy(&value, column.data() + place, sizeof(T), cudaMemcpyDeviceToHost), "reading back");
+  return value;
+#else
+  return column.data()[place];
+#endif
+}
 template <class T>
 void from_host(Column<T>& column, const std::vector<T>& host) {
   column.resize(host.size());

@@ -18,6 +18,9 @@ DRENCH_HD int select(bool mask, int a, int b) { return mask ? a : b; }
 DRENCH_HD float minimum(float a, float b) { return a < b ? a : b; }
 DRENCH_HD float maximum(float a, float b) { return a > b ? a : b; }
 DRENCH_HD float square_root(float a) { return sqrtf(a); }
+DRENCH_HD float load(const float* p, int i) { return p[i]; }
+DRENCH_HD int load(const int* p, int i) { return p[i]; }
+DRENCH_HD void store(float* p, int i, float a) { p[i] = a; }
 
 #if !defined(__CUDACC__)
 
@@ -59,6 +62,22 @@ DRENCH_HD Pack minimum(Pack a, Pack b) { return Pack(_mm256_min_ps(a.v, b.v)); }
 DRENCH_HD Pack maximum(Pack a, Pack b) { return Pack(_mm256_max_ps(a.v, b.v)); }
 DRENCH_HD Pack square_root(Pack a) { return Pack(_mm256_sqrt_ps(a.v)); }
 DRENCH_HD Pack select(Mask m, Pack a, Pack b) { return Pack(m.v ? a.v : b.v); }
+
+/// Eight consecutive indices starting at base, and eight arbitrary ones: what an index is on a CPU core
+/// in passes that run over packs (for_each_lane). On the GPU both are an int.
+struct Lanes {
+  int base;
+};
+struct LaneIndex {
+  __m256i v;
+};
+DRENCH_HD Pack load(const float* p, Lanes i) { return Pack::load(p + i.base); }
+DRENCH_HD LaneIndex load(const int* p, Lanes i) {
+  return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p + i.base))};
+}
+DRENCH_HD Pack load(const float* p, LaneIndex i) { return Pack(_mm256_i32gather_ps(p, i.v, 4)); }
+DRENCH_HD void store(float* p, Lanes i, Pack a) { a.store(p + i.base); }
+DRENCH_HD Lanes operator+(Lanes i, int offset) { return {i.base + offset}; }
 
 /// Sum of the lanes by a fixed tree.
 DRENCH_HD float sum_of_lanes(Pack a) {

@@ -4,6 +4,7 @@
 // reductions are maxima and minima (order-free) or sums over fixed chunks.
 
 #include "sim/column.h"
+#include "sim/pack.h"
 
 #if defined(__CUDACC__)
 #else
@@ -30,11 +31,18 @@ void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   check_cuda(cudaGetLastError(), name);
 }
 
+/// A launch whose index is eight consecutive ones at once on a CPU core.
+template <class F>
+void for_each_lane(const char* name, int n, const F& f) {
+  parallel_for(name, n, f);
+}
+
 constexpr int reduce_block = 256, reduce_blocks = 128;
 
 template <class T, class F, class Combine>
 __global__ void launch_reduce(int n, T start, F f, Combine combine, T* out) {
-  __shared__ T shared[reduce_block];
+  __shared__ alignas(16) char raw[reduce_block * sizeof(T)];
+  T* shared = reinterpret_cast<T*>(raw);
   T value = start;
   for (int i = blockIdx.x * reduce_block + threadIdx.x; i < n; i += gridDim.x * reduce_block) {
     value = combine(value, f(i));
@@ -67,7 +75,7 @@ T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
 
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
-  constexpr int grain = 2048;
+  constexpr int grain = 256;
   if (n <= grain) {
     for (int i = 0; i < n; ++i) f(i);
     return;
@@ -75,6 +83,12 @@ void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, n, grain), [&](const auto& range) {
     for (int i = range.begin(); i < range.end(); ++i) f(i);
   });
+}
+
+/// A launch whose index is eight consecutive ones at once; columns are padded to a multiple of eight.
+template <class F>
+void for_each_lane(const char* name, int n, const F& f) {
+  parallel_for(name, (n + 7) / 8, [&](int block) { f(Lanes{8 * block}); });
 }
 
 /// combine over f(0..n-1), chunk by chunk of fixed size, chunks in order.

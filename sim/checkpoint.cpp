@@ -1,0 +1,94 @@
+#include "sim/checkpoint.h"
+
+#include <cstring>
+
+#include "pipeline/contract/error.h"
+
+namespace drench::sim {
+
+namespace {
+
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '1'};
+
+/// The same list of members writes and reads: Archive is a Writer or a Reader.
+template <class Archive, class C>
+void transfer(Archive& archive, C& c) {
+  archive(c.frame), archive(c.time), archive(c.steps), archive(c.next_id), archive(c.emitted);
+  auto& s = c.state;
+  for (auto* v : {&s.position, &s.velocity, &s.owed, &s.cloth_position, &s.cloth_velocity}) {
+    archive(v->x), archive(v->y), archive(v->z);
+  }
+  archive(s.id), archive(s.memory_triangle), archive(s.memory_side), archive(s.lambda);
+  archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
+}
+
+struct Writer {
+  std::string bytes;
+  template <class T>
+  void operator()(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  template <class T>
+  void operator()(const std::vector<T>& values) {
+    (*this)(uint64_t(values.size()));
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  }
+};
+
+struct Reader {
+  const std::byte* at;
+  const std::byte* end;
+  const std::filesystem::path& path;
+  void take(void* to, uint64_t size) {
+    if (size > uint64_t(end - at)) throw Error(path.string() + ": the checkpoint is cut short. Delete it; the run starts from an earlier one");
+    if (size) std::memcpy(to, at, size);
+    at += size;
+  }
+  template <class T>
+  void operator()(T& value) { take(&value, sizeof value); }
+  template <class T>
+  void operator()(std::vector<T>& values) {
+    uint64_t count = 0;
+    (*this)(count);
+    if (count > uint64_t(end - at) / sizeof(T)) {
+      throw Error(path.string() + ": the checkpoint is damaged. Delete it; the run starts from an earlier one");
+    }
+    values.resize(count);
+    take(values.data(), count * sizeof(T));
+  }
+};
+
+}  // namespace
+
+WrittenFile write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint) {
+  Writer writer;
+  transfer(writer, checkpoint);
+  const Digest content = hash_bytes(writer.bytes.data(), writer.bytes.size());
+  Writer file;
+  file.bytes.assign(magic, sizeof magic);
+  file(checkpoint.layout), file(content);
+  file.bytes += writer.bytes;
+  return write_file_whole(path, file.bytes);
+}
+
+Checkpoint read_checkpoint(const std::filesystem::path& path, const Digest& layout) {
+  const std::vector<std::byte> bytes = read_file(path);
+  Reader reader{bytes.data(), bytes.data() + bytes.size(), path};
+  char found[sizeof magic];
+  Checkpoint checkpoint;
+  Digest content;
+  reader.take(found, sizeof found);
+  reader(checkpoint.layout), reader(content);
+  if (std::memcmp(found, magic, sizeof magic) != 0 || content != hash_bytes(reader.at, reader.end - reader.at)) {
+    throw Error(path.string() + ": not a whole checkpoint. Delete it; the run starts from an earlier one");
+  }
+  if (checkpoint.layout != layout) {
+    throw Error(path.string() + ": the checkpoint belongs to other settings of the shot. Delete it, or run the "
+                                "shot into another folder");
+  }
+  transfer(reader, checkpoint);
+  return checkpoint;
+}
+
+}  // namespace drench::sim

@@ -1,0 +1,26 @@
+#pragma once
+// Lossless restart files: every state the next step reads.
+
+#include <filesystem>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+#include "sim/solver.h"
+
+namespace drench::sim {
+
+struct Checkpoint {
+  int frame = 0;
+  double time = 0;                   // s since the first frame
+  uint64_t steps = 0;
+  int next_id = 0;
+  std::vector<uint64_t> emitted;     // layers that left each emitter
+  HostState state;
+  Digest layout;                     // of the shot's settings and the file's layout
+};
+
+WrittenFile write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);
+/// @throws Error if damaged (the content's own digest disagrees) or if `layout` differs.
+Checkpoint read_checkpoint(const std::filesystem::path& path, const Digest& layout);
+
+}  // namespace drench::sim

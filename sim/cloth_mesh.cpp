@@ -1,0 +1,165 @@
+// Sheets: grids and meshes with masses and springs (section 4 of the seed), and the checks they must pass.
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/mesh_file.h"
+#include "sim/scene.h"
+
+namespace drench::sim {
+
+namespace {
+
+using Edge = std::pair<uint32_t, uint32_t>;
+Edge ordered(uint32_t a, uint32_t b) { return a < b ? Edge{a, b} : Edge{b, a}; }
+
+/// Springs between the same two vertices add up.
+struct SpringMap {
+  std::map<Edge, double> stiffness;
+  void add(uint32_t a, uint32_t b, double k) { stiffness[ordered(a, b)] += k; }
+};
+
+/// A grid of cells. Every cell gives its four sides half an adjacent spring each, stiffer across and
+/// softer along a stretched cell (k = modulus x width / length), both its diagonals, and a quarter of
+/// its mass to each corner: the lattice's moduli then hold up to the rim (tests/validation/README.md).
+void build_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+  const int nu = cloth.cells.x, nv = cloth.cells.y;
+  const double du = cloth.u.length() / nu, dv = cloth.v.length() / nv;
+  const double mass = cloth.areal_density * cloth.u.cross(cloth.v).length() / (double(nu) * nv);
+  const auto at = [&](int i, int j) { return uint32_t(j * (nu + 1) + i); };
+  for (int j = 0; j <= nv; ++j) {
+    for (int i = 0; i <= nu; ++i) {
+      const double s = double(i) / nu, t = double(j) / nv;
+      sheet.position.push_back(cloth.corner + cloth.u * s + cloth.v * t);
+      sheet.uv.push_back(Imath::V2f(float(s), float(t)));
+    }
+  }
+  sheet.mass.assign(sheet.position.size(), 0.0);
+  for (int j = 0; j < nv; ++j) {
+    for (int i = 0; i < nu; ++i) {
+      const uint32_t a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
+      for (uint32_t v : {a, b, c, d}) sheet.mass[v] += mass / 4;
+      springs.add(a, b, 0.5 * cloth.adjacent_stiffness * dv / du);
+      springs.add(d, c, 0.5 * cloth.adjacent_stiffness * dv / du);
+      springs.add(a, d, 0.5 * cloth.adjacent_stiffness * du / dv);
+      springs.add(b, c, 0.5 * cloth.adjacent_stiffness * du / dv);
+      springs.add(a, c, cloth.diagonal_stiffness);
+      springs.add(b, d, cloth.diagonal_stiffness);
+      // v x u points to the front, so a sheet in x, z faces up.
+      sheet.triangle.push_back({a, d, c});
+      sheet.triangle.push_back({a, c, b});
+    }
+  }
+}
+
+/// A triangle mesh: edges are adjacent springs, the two vertices opposite an edge a diagonal one.
+void build_from_file(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+  const TriangleMesh mesh = read_mesh(cloth.mesh_file);
+  for (const V3f& p : mesh.position) sheet.position.push_back(V3d(p));
+  sheet.uv = mesh.uv;
+  sheet.triangle = mesh.triangle;
+  sheet.mass.assign(sheet.position.size(), 0.0);
+  std::map<Edge, std::vector<uint32_t>> opposite;
+  for (const auto& t : sheet.triangle) {
+    const V3d e = sheet.position[t.y] - sheet.position[t.x], f = sheet.position[t.z] - sheet.position[t.x];
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t a = t[k], b = t[(k + 1) % 3];
+      sheet.mass[a] += cloth.areal_density * e.cross(f).length() / 6;
+      springs.add(a, b, 0.5 * cloth.adjacent_stiffness);
+      opposite[ordered(a, b)].push_back(t[(k + 2) % 3]);
+    }
+  }
+  for (const auto& [edge, tips] : opposite) {
+    if (tips.size() == 2) springs.add(tips[0], tips[1], cloth.diagonal_stiffness);
+  }
+}
+
+std::string corner_text(const Sheet& sheet, const Imath::Vec3<uint32_t>& t) {
+  const V3d p = sheet.position[t.x];
+  return fmt::format("vertices {}, {}, {} near ({:.4g}, {:.4g}, {:.4g}) m", t.x, t.y, t.z, p.x, p.y, p.z);
+}
+
+void check_triangles(const Sheet& sheet) {
+  std::map<std::pair<uint32_t, uint32_t>, size_t> directed;
+  std::vector<char> used(sheet.position.size(), 0);
+  for (size_t k = 0; k < sheet.triangle.size(); ++k) {
+    const auto& t = sheet.triangle[k];
+    const V3d e = sheet.position[t.y] - sheet.position[t.x], f = sheet.position[t.z] - sheet.position[t.x];
+    const double longest = std::max({e.length2(), f.length2(), (f - e).length2()});
+    if (!(e.cross(f).length() > 1e-6 * longest)) {
+      throw Error(fmt::format("cloth \"{}\": triangle {} ({}) is degenerate: it has no area, so contact has no "
+                              "normal there. Remove it or merge its vertices",
+                              sheet.name, k, corner_text(sheet, t)));
+    }
+    for (int c = 0; c < 3; ++c) {
+      used[t[c]] = 1;
+      const auto [place, fresh] = directed.emplace(std::pair(t[c], t[(c + 1) % 3]), k);
+      if (!fresh) {
+        throw Error(fmt::format("cloth \"{}\": triangle {} ({}) shares the edge {}-{} with triangle {} in the same "
+                                "direction: the mesh is not manifold, or is wound both ways. Split the sheet "
+                                "there or reverse the triangle",
+                                sheet.name, k, corner_text(sheet, t), t[c], t[(c + 1) % 3], place->second));
+      }
+    }
+  }
+  for (size_t v = 0; v < used.size(); ++v) {
+    if (!used[v]) {
+      throw Error(fmt::format("cloth \"{}\": vertex {} belongs to no triangle and would have no mass. Remove it",
+                              sheet.name, v));
+    }
+  }
+}
+
+void apply_pins(const Cloth& cloth, Sheet& sheet) {
+  sheet.pinned.assign(sheet.position.size(), false);
+  for (size_t k = 0; k < cloth.pin.size(); ++k) {
+    size_t held = 0;
+    for (uint32_t v : cloth.pin[k].vertices) {
+      if (v >= sheet.position.size()) {
+        throw Error(fmt::format("cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
+                                sheet.name, k + 1, v, sheet.position.size()));
+      }
+      sheet.pinned[v] = true;
+      ++held;
+    }
+    if (cloth.pin[k].box) {
+      const auto& [low, high] = *cloth.pin[k].box;
+      for (size_t v = 0; v < sheet.position.size(); ++v) {
+        const V3d p = sheet.position[v];
+        if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y || p.z > high.z) continue;
+        sheet.pinned[v] = true;
+        ++held;
+      }
+    }
+    if (held == 0) {
+      throw Error(fmt::format("cloth \"{}\": pin {} holds no vertex. Enlarge its box or remove it", sheet.name, k + 1));
+    }
+  }
+}
+
+}  // namespace
+
+Sheet build_sheet(const Cloth& cloth) {
+  Sheet sheet;
+  sheet.name = cloth.name;
+  SpringMap springs;
+  if (cloth.mesh_file.empty()) {
+    build_grid(cloth, sheet, springs);
+  } else {
+    build_from_file(cloth, sheet, springs);
+  }
+  if (sheet.triangle.empty()) throw Error("cloth \"" + sheet.name + "\": the mesh has no triangles");
+  check_triangles(sheet);
+  sheet.rest = sheet.position;
+  for (const auto& [edge, k] : springs.stiffness) {
+    if (k > 0) sheet.spring.push_back({int(edge.first), int(edge.second), k});
+  }
+  apply_pins(cloth, sheet);
+  return sheet;
+}
+
+}  // namespace drench::sim

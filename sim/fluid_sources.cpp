@@ -1,0 +1,171 @@
+// Where particles come from: lattices in boxes and balls, drops, and the layers of emitters.
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "pipeline/contract/error.h"
+#include "sim/scene.h"
+
+namespace drench::sim {
+
+namespace {
+
+struct Source {
+  std::vector<V3d> position;
+  V3d velocity;
+};
+
+Source lattice_box(const FluidBox& box, double a) {
+  Source source{{}, box.velocity};
+  int n[3];
+  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int(std::lround((box.max[k] - box.min[k]) / a)));
+  for (int z = 0; z < n[2]; ++z) {
+    for (int y = 0; y < n[1]; ++y) {
+      for (int x = 0; x < n[0]; ++x) source.position.push_back(box.min + V3d(x + 0.5, y + 0.5, z + 0.5) * a);
+    }
+  }
+  return source;
+}
+
+/// Lattice points around a centre, nearest first (ties by lattice order): the first n make a ball.
+std::vector<V3d> ball_points(double radius, double a) {
+  const int reach = int(std::ceil(radius / a)) + 1;
+  std::vector<V3d> points;
+  for (int z = -reach; z < reach; ++z) {
+    for (int y = -reach; y < reach; ++y) {
+      for (int x = -reach; x < reach; ++x) points.push_back(V3d(x + 0.5, y + 0.5, z + 0.5) * a);
+    }
+  }
+  std::stable_sort(points.begin(), points.end(),
+                   [](const V3d& p, const V3d& q) { return p.length2() < q.length2(); });
+  return points;
+}
+
+size_t points_within(const std::vector<V3d>& points, double radius) {
+  size_t n = 0;
+  while (n < points.size() && points[n].length2() <= radius * radius) ++n;
+  return n;
+}
+
+Source lattice_ball(const FluidSphere& sphere, double a) {
+  Source source{ball_points(sphere.radius, a), sphere.velocity};
+  source.position.resize(std::max<size_t>(1, points_within(source.position, sphere.radius)));
+  for (V3d& p : source.position) p += sphere.center;
+  return source;
+}
+
+/// Centres drawn evenly in the box, each at least a drop's width from the others.
+std::vector<V3d> drop_centres(const FluidDrops& drops, double reach, double a, uint32_t seed) {
+  std::mt19937 random(seed);
+  const auto unit = [&] { return double(random()) / 4294967296.0; };  // std distributions differ by library
+  const V3d low = drops.min + V3d(reach), high = drops.max - V3d(reach);
+  std::vector<V3d> centres;
+  for (int tries = 0; int(centres.size()) < drops.count; ++tries) {
+    if (tries > 2000 * drops.count) {
+      throw Error("fluid.drops: only " + std::to_string(centres.size()) + " of " + std::to_string(drops.count) +
+                  " drops fit into the box without touching. Use fewer or smaller drops, or a larger box");
+    }
+    V3d c;
+    for (int k = 0; k < 3; ++k) c[k] = low[k] + unit() * std::max(0.0, high[k] - low[k]);
+    const auto close = [&](const V3d& o) { return (o - c).length() < 2 * reach + a; };
+    if (std::none_of(centres.begin(), centres.end(), close)) centres.push_back(c);
+  }
+  return centres;
+}
+
+Source lattice_drops(const FluidDrops& drops, double a, uint32_t seed) {
+  Source source{{}, drops.velocity};
+  if (drops.count <= 0) return source;
+  const std::vector<V3d> ball = ball_points(std::max(drops.radius, a), a);
+  size_t each = std::max<size_t>(1, points_within(ball, drops.radius)), larger = 0;
+  if (drops.particles > 0) each = size_t(drops.particles / drops.count), larger = drops.particles % drops.count;
+  if (each + (larger > 0) > ball.size() || each == 0) {
+    throw Error("fluid.drops: " + std::to_string(drops.particles) + " particles in " +
+                std::to_string(drops.count) + " drops do not fit a radius of " + std::to_string(drops.radius) +
+                " m. Use a larger radius or other counts");
+  }
+  const double reach = ball[each + (larger > 0) - 1].length() + 0.5 * a;
+  for (const V3d& c : drop_centres(drops, reach, a, seed)) {
+    const size_t n = each + (larger > 0 ? 1 : 0);
+    if (larger > 0) --larger;
+    for (size_t k = 0; k < n; ++k) source.position.push_back(c + ball[k]);
+  }
+  return source;
+}
+
+/// Cells of one spacing: finds an earlier particle closer than half a spacing.
+class Occupancy {
+ public:
+  explicit Occupancy(double a) : a_(a) {}
+  bool taken(const V3d& p, const std::vector<V3d>& points) const {
+    const auto c = cell(p);
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const auto [begin, end] = cells_.equal_range(key(c[0] + dx, c[1] + dy, c[2] + dz));
+          for (auto it = begin; it != end; ++it) {
+            if ((points[it->second] - p).length2() < 0.25 * a_ * a_) return true;
+          }
+        }
+      }
+    }
+    return false;
+  }
+  void add(const V3d& p, size_t index) {
+    const auto c = cell(p);
+    cells_.emplace(key(c[0], c[1], c[2]), index);
+  }
+
+ private:
+  std::array<int64_t, 3> cell(const V3d& p) const {
+    return {int64_t(std::floor(p.x / a_)), int64_t(std::floor(p.y / a_)), int64_t(std::floor(p.z / a_))};
+  }
+  static uint64_t key(int64_t x, int64_t y, int64_t z) {
+    return (uint64_t(x & 0x1fffff) << 42) | (uint64_t(y & 0x1fffff) << 21) | uint64_t(z & 0x1fffff);
+  }
+  double a_;
+  std::unordered_multimap<uint64_t, size_t> cells_;
+};
+
+}  // namespace
+
+EmitterLayer emitter_layer(const FluidEmitter& emitter, double a) {
+  const V3d d = emitter.direction.normalized();
+  const V3d helper = std::abs(d.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+  const V3d u = d.cross(helper).normalized(), v = d.cross(u);
+  EmitterLayer layer;
+  const int reach = int(std::ceil(emitter.radius / a));
+  for (int j = -reach; j <= reach; ++j) {
+    for (int i = -reach; i <= reach; ++i) {
+      if ((i * i + j * j) * a * a <= emitter.radius * emitter.radius) layer.offset.push_back((u * i + v * j) * a);
+    }
+  }
+  return layer;
+}
+
+InitialFluid initial_fluid(const Shot& shot) {
+  const double a = shot.fluid.spacing;
+  std::vector<Source> sources;
+  for (const FluidBox& box : shot.fluid.box) sources.push_back(lattice_box(box, a));
+  for (const FluidSphere& sphere : shot.fluid.sphere) sources.push_back(lattice_ball(sphere, a));
+  for (size_t k = 0; k < shot.fluid.drops.size(); ++k) {
+    sources.push_back(lattice_drops(shot.fluid.drops[k], a, shot.seed + uint32_t(k)));
+  }
+  InitialFluid fluid;
+  Occupancy occupied(a);
+  for (const Source& source : sources) {
+    const size_t before = fluid.position.size();
+    for (const V3d& p : source.position) {
+      if (before > 0 && occupied.taken(p, fluid.position)) continue;
+      fluid.position.push_back(p);
+      fluid.velocity.push_back(source.velocity);
+    }
+    if (sources.size() > 1) {
+      for (size_t i = before; i < fluid.position.size(); ++i) occupied.add(fluid.position[i], i);
+    }
+  }
+  return fluid;
+}
+
+}  // namespace drench::sim

@@ -1,0 +1,208 @@
+#pragma once
+// for_each_pair: one physics functor over all neighbours of every particle. The functor names columns
+// and says what one pair does; the traversal owns cells, layout and hardware. On a CPU core the
+// neighbours of a cell are copied side by side once and read eight at a time; on the GPU every thread
+// walks the 27 cells of its particle. A particle is its own neighbour too (distance 0).
+//
+// Physics:  static constexpr int columns;             number of float columns read
+//           Inputs<columns> inputs() const;           their pointers, in the order of Particle's members
+//           template <class T> struct Particle;       position first; only members of type T or Vec3<T>
+//           template <class T> struct Sum;            members of type T or Vec3<T>, zero to start with
+//           template <class T> void pair(i, j, sum) const;
+//           void finish(int i, const Sum<float>&) const;
+// Filter:   hides neighbours behind a sheet (passes/sheet_filter.h); NoFilter hides none.
+
+#include <bit>
+
+#include "sim/grid.h"
+#include "sim/parallel.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+template <int N>
+struct Inputs {
+  const float* column[N];
+};
+
+struct NoFilter {
+  static constexpr int columns = 0;
+  DRENCH_HD Inputs<1> inputs() const { return {{nullptr}}; }
+};
+
+template <class P, class T, int N>
+struct Members {
+  T value[N];
+  DRENCH_HD P as() const {
+    static_assert(sizeof(P) == sizeof(T) * N, "columns and Particle disagree");
+#if defined(__CUDACC__)
+    P p;
+    memcpy(&p, value, sizeof p);
+    return p;
+#else
+    return std::bit_cast<P>(*this);
+#endif
+  }
+};
+
+#if defined(__CUDACC__)
+
+template <class Physics, class Filter>
+__global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filter) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= n) return;
+  constexpr int N = Physics::columns;
+  using P = typename Physics::template Particle<float>;
+  const auto in = physics.inputs();
+  const auto load = [&](int k) {
+    Members<P, float, N> m;
+    for (int c = 0; c < N; ++c) m.value[c] = __ldg(in.column[c] + k);
+    return m.as();
+  };
+  const P self = load(i);
+  typename Physics::template Sum<float> sum{};
+  const GridShape& g = grid.shape;
+  const int cx = g.cell_x(self.position.x), cy = g.cell_y(self.position.y), cz = g.cell_z(self.position.z);
+  for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
+    for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
+      const int begin = grid.cell_start[g.index(max(cx - 1, 0), y, z)];
+      const int end = grid.cell_start[g.index(min(cx + 1, g.nx - 1), y, z) + 1];
+      for (int j = begin; j < end; ++j) {
+        const P other = load(j);
+        if constexpr (Filter::columns > 0) {
+          if (filter.near(i) && filter.hides(i, j)) continue;
+        }
+        physics.pair(self, other, sum);
+      }
+    }
+  }
+  physics.finish(i, sum);
+}
+
+template <class Physics, class Filter = NoFilter>
+void for_each_pair(const char* name, const GridView& grid, int n, const Physics& physics,
+                   const Filter& filter = {}) {
+  if (n <= 0) return;
+  launch_pairs<<<(n + 127) / 128, 128>>>(grid, n, physics, filter);
+  check_cuda(cudaGetLastError(), name);
+}
+
+#else
+
+/// The columns of all particles in the 27 cells around one, side by side, padded with particles far
+/// outside any support so that the last pack needs no mask.
+class Tile {
+ public:
+  static constexpr float far_away = 1e15f;
+
+  template <int N>
+  void fill(const GridView& grid, int cx, int cy, int cz, const Inputs<N>& in, int columns) {
+    const GridShape& g = grid.shape;
+    const int x0 = std::max(cx - 1, 0), x1 = std::min(cx + 1, g.nx - 1);
+    int begin[9], count[9], rows = 0;
+    size_ = 0;
+    for (int z = std::max(cz - 1, 0); z <= std::min(cz + 1, g.nz - 1); ++z) {
+      for (int y = std::max(cy - 1, 0); y <= std::min(cy + 1, g.ny - 1); ++y, ++rows) {
+        begin[rows] = grid.cell_start[g.index(x0, y, z)];
+        count[rows] = grid.cell_start[g.index(x1, y, z) + 1] - begin[rows];
+        if (y == cy && z == cz) centre_ = size_ - begin[rows];
+        size_ += count[rows];
+      }
+    }
+    stride_ = (size_ + 15) / 8 * 8;
+    if (data_.size() < size_t(stride_) * columns) data_.resize(size_t(stride_) * columns);
+    for (int c = 0; c < columns; ++c) {
+      float* to = data_.data() + size_t(c) * stride_;
+      for (int r = 0; r < rows; ++r) to = std::copy_n(in.column[c] + begin[r], count[r], to);
+      std::fill_n(to, stride_ - size_, c < 3 ? far_away : 0.f);
+    }
+  }
+  int size() const { return size_; }
+  int place_of(int particle) const { return particle + centre_; }  // of the centre row's particles
+  const float* column(int c) const { return data_.data() + size_t(c) * stride_; }
+
+ private:
+  std::vector<float> data_;
+  int size_ = 0, stride_ = 0, centre_ = 0;
+};
+
+template <int N, int M>
+Inputs<N + M> join(const Inputs<N>& a, const float* const (&b)[M]) {
+  Inputs<N + M> all;
+  std::copy_n(a.column, N, all.column);
+  std::copy_n(b, M, all.column + N);
+  return all;
+}
+
+/// All neighbours of one particle, eight at a time.
+template <class Physics, class Filter>
+DRENCH_HD auto sum_over_tile(const Tile& tile, int place, const Physics& physics, const Filter& filter) {
+  constexpr int N = Physics::columns;
+  using P = typename Physics::template Particle<Pack>;
+  typename Physics::template Sum<Pack> sum{};
+  Members<P, Pack, N> self;
+  const float* column[N + Filter::columns];
+  for (int c = 0; c < N + Filter::columns; ++c) column[c] = tile.column(c);
+  for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][place]);
+  const P i = self.as();
+  for (int k = 0; k < tile.size(); k += Pack::size) {
+    Members<P, Pack, N> m;
+    for (int c = 0; c < N; ++c) m.value[c] = Pack::load(column[c] + k);
+    if constexpr (Filter::columns > 0) filter.move_hidden_away(column, N, place, k, m.value);
+    physics.pair(i, m.as(), sum);
+  }
+  return sum;
+}
+
+/// The lanes of a pack sum, added up.
+template <class Physics>
+typename Physics::template Sum<float> add_lanes(const typename Physics::template Sum<Pack>& sum) {
+  using S = typename Physics::template Sum<float>;
+  constexpr int M = sizeof(S) / sizeof(float);
+  Members<S, float, M> out;
+  const Pack* lane = reinterpret_cast<const Pack*>(&sum);
+  for (int m = 0; m < M; ++m) out.value[m] = sum_of_lanes(lane[m]);
+  return out.as();
+}
+
+template <class Physics, class Filter = NoFilter>
+void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[maybe_unused]] int n,
+                   const Physics& physics, const Filter& filter = {}) {
+  const GridShape& g = grid.shape;
+  ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
+    static thread_local Tile tile;
+    for (int row = range.begin(); row < range.end(); ++row) {
+      const int cy = row % g.ny, cz = row / g.ny;
+      for (int cx = 0; cx < g.nx; ++cx) {
+        const int cell = g.index(cx, cy, cz);
+        const int begin = grid.cell_start[cell], end = grid.cell_start[cell + 1];
+        if (begin == end) continue;
+        bool filtered = false;
+        if constexpr (Filter::columns > 0) {
+          for (int i = begin; i < end; ++i) filtered |= filter.near(i);
+        }
+        if (filtered) {
+          if constexpr (Filter::columns > 0) {
+            tile.fill(grid, cx, cy, cz, join(physics.inputs(), filter.inputs().column),
+                      Physics::columns + Filter::columns);
+          }
+        } else {
+          tile.fill(grid, cx, cy, cz, physics.inputs(), Physics::columns);
+        }
+        for (int i = begin; i < end; ++i) {
+          const int place = tile.place_of(i);
+          if constexpr (Filter::columns > 0) {
+            if (filtered && filter.near(i)) {
+              physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, place, physics, filter)));
+              continue;
+            }
+          }
+          physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, place, physics, NoFilter{})));
+        }
+      }
+    }
+  });
+}
+
+#endif
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,160 @@
+#pragma once
+// The last guard of the exact coupling: the straight path of a particle over a cloth substep against
+// the triangles that move meanwhile. In double on the stored floats, so that whoever counts crossings
+// from the stored states finds none. A particle that would cross is put back on its side, a small
+// clearance off the triangle where it met it; if it finds no free place, it and the vertices there are
+// held for the substep, which is free of crossings because nothing moves.
+
+#include "sim/geometry.h"
+#include "sim/passes/polygon_grid.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// A triangle whose corners move on straight lines from a0.. to a1.. while t goes from 0 to 1.
+struct MovingTriangle {
+  Vec3<double> a0, b0, c0, a1, b1, c1;
+};
+
+DRENCH_HD Vec3<double> lerp(Vec3<double> p, Vec3<double> q, double t) { return p + (q - p) * t; }
+
+/// The side of the plane of the triangle that the moving point is on at time t (six times a volume).
+DRENCH_HD double side_at(const MovingTriangle& m, Vec3<double> p0, Vec3<double> p1, double t) {
+  return signed_volume(lerp(m.a0, m.a1, t), lerp(m.b0, m.b1, t), lerp(m.c0, m.c1, t), lerp(p0, p1, t));
+}
+
+/// Is the point inside the triangle's outline at time t, seen along its normal? Edges belong to it.
+DRENCH_HD bool inside_at(const MovingTriangle& m, Vec3<double> p0, Vec3<double> p1, double t) {
+  const Vec3<double> a = lerp(m.a0, m.a1, t), b = lerp(m.b0, m.b1, t), c = lerp(m.c0, m.c1, t),
+                     p = lerp(p0, p1, t);
+  const Vec3<double> n = cross(b - a, c - a);
+  const double slack = -1e-7 * dot(n, n);
+  return dot(cross(b - a, p - a), n) >= slack && dot(cross(c - b, p - b), n) >= slack &&
+         dot(cross(a - c, p - c), n) >= slack;
+}
+
+/// First time in [0, 1] at which the point passes through the triangle, or -1. The side is a cubic in
+/// t: its turning points split [0, 1] into monotone parts, each with at most one root, found by bisection.
+DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<double> p1) {
+  // Power form from four samples.
+  const double f0 = side_at(m, p0, p1, 0), f1 = side_at(m, p0, p1, 1.0 / 3),
+               f2 = side_at(m, p0, p1, 2.0 / 3), f3 = side_at(m, p0, p1, 1);
+  const double c3 = 4.5 * (f3 - 3 * f2 + 3 * f1 - f0), c2 = 9 * f0 - 22.5 * f1 + 18 * f2 - 4.5 * f3,
+               c1 = -5.5 * f0 + 9 * f1 - 4.5 * f2 + f3;
+  double knots[4] = {0, 1, 1, 1};
+  int count = 1;
+  const double qa = 3 * c3, qb = 2 * c2, disc = qb * qb - 4 * qa * c1;
+  if (disc >= 0) {
+    const double q = -0.5 * (qb + (qb >= 0 ? ::sqrt(disc) : -::sqrt(disc)));
+    const double r0 = qa != 0 ? q / qa : 2, r1 = q != 0 ? c1 / q : 2;
+    const double lo = r0 < r1 ? r0 : r1, hi = r0 < r1 ? r1 : r0;
+    if (lo > 0 && lo < 1) knots[count++] = lo;
+    if (hi > 0 && hi < 1 && hi > lo) knots[count++] = hi;
+  }
+  knots[count] = 1;
+  for (int k = 0; k < count; ++k) {
+    double t0 = knots[k], t1 = knots[k + 1];
+    const bool above = side_at(m, p0, p1, t0) > 0;
+    if (above == (side_at(m, p0, p1, t1) > 0)) continue;
+    for (int step = 0; step < 60 && t1 - t0 > 1e-15; ++step) {
+      const double middle = 0.5 * (t0 + t1);
+      ((side_at(m, p0, p1, middle) > 0) == above ? t0 : t1) = middle;
+    }
+    if (inside_at(m, p0, p1, t1)) return t1;
+  }
+  return -1;
+}
+
+struct PathTest {
+  PolygonView polygons;           // cells from the start of the step
+  VecView cloth, cloth_next;      // this substep
+  VecView cloth_velocity, velocity, normal, start, position, owed;
+  const int *triangle, *held;
+  int* hold;                      // set to 1 for vertices to stop
+  const float *distance, *inverse_mass;
+  float mass, clearance, cloth_moved;  // cloth_moved: m, farthest vertex from its place at the step's start
+  float dt;                       // s, of the substep
+  int attempts;                   // 0: the particle is held at once
+
+  struct Hit {
+    int triangle = -1;
+    double time = 2;
+  };
+
+  DRENCH_HD MovingTriangle moving(int t) const {
+    const int *k = polygons.corner + 3 * t;
+    return {to_double(cloth[k[0]]), to_double(cloth[k[1]]), to_double(cloth[k[2]]),
+            to_double(cloth_next[k[0]]), to_double(cloth_next[k[1]]), to_double(cloth_next[k[2]])};
+  }
+
+  DRENCH_HD Hit first_hit(Vec3<float> from, Vec3<float> to) const {
+    Hit hit;
+    const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
+    const Vec3<float> high{maximum(from.x, to.x), maximum(from.y, to.y), maximum(from.z, to.z)};
+    const Vec3<float> middle = (low + high) * 0.5f;
+    const float half = 0.5f * length(to - from) + cloth_moved + clearance;
+    polygons.for_each_near_box(low, high, cloth_moved + clearance, [&](int t) {
+      const float limit = half + sqrtf(polygons.radius2[t]);
+      if (length2(polygons.centroid[t] - middle) > limit * limit) return;
+      const double time = crossing_time(moving(t), to_double(from), to_double(to));
+      if (time >= 0 && time < hit.time) hit = {t, time};
+    });
+    return hit;
+  }
+
+  /// Where the particle ends this substep; false if it must be held with the vertices around.
+  DRENCH_HD bool resolve(int i, Vec3<float> from, Vec3<float>& to) const {
+    for (int attempt = 0; attempt <= attempts; ++attempt) {
+      const Hit hit = first_hit(from, to);
+      if (hit.triangle < 0) return true;
+      if (attempt == attempts) break;
+      bounce(i, from, to, hit);
+    }
+    const Hit hit = first_hit(from, to);
+    for (int k = 0; k < 3; ++k) hold[polygons.corner[3 * hit.triangle + k]] = 1;
+    return false;
+  }
+
+  /// Puts the end of the path back on the particle's side of the triangle it met and takes the normal
+  /// part of the relative velocity, shared by the reduced mass; the cloth's part is owed to it.
+  DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
+    const MovingTriangle m = moving(hit.triangle);
+    const Vec3<double> p0 = to_double(from), p1 = to_double(to);
+    const double side = side_at(m, p0, p1, 0) > 0 ? 1 : -1;
+    const Vec3<double> p = lerp(p0, p1, hit.time), a = lerp(m.a0, m.a1, hit.time),
+                       e = lerp(m.b0, m.b1, hit.time) - a, f = lerp(m.c0, m.c1, hit.time) - a;
+    const Vec3<double> n = cross(e, f);
+    const double nn = dot(n, n) > 1e-60 ? dot(n, n) : 1e-60;
+    const double wb = dot(cross(p - a, f), n) / nn, wc = dot(cross(e, p - a), n) / nn, wa = 1 - wb - wc;
+    const Vec3<double> n1 = cross(m.b1 - m.a1, m.c1 - m.a1);
+    const Vec3<double> unit = n1 * (side / (length(n1) > 1e-30 ? length(n1) : 1e-30));
+    to = to_float(m.a1 * wa + m.b1 * wb + m.c1 * wc + unit * double(clearance));
+
+    const int* k = polygons.corner + 3 * hit.triangle;
+    const Vec3<float> direction = to_float(unit);
+    const float w[3] = {float(wa), float(wb), float(wc)};
+    Vec3<float> wall{0.f, 0.f, 0.f};
+    float row = 1.f / mass;
+    for (int c = 0; c < 3; ++c) {
+      wall = wall + cloth_velocity[k[c]] * w[c];
+      row += w[c] * w[c] * inverse_mass[k[c]];
+    }
+    const float approach = dot(direction, velocity[i] - wall);
+    if (approach >= 0.f) return;
+    const Vec3<float> impulse = direction * (-approach / row);
+    velocity.set(i, velocity[i] + impulse * (1.f / mass));
+    owed.set(i, owed[i] + impulse);
+  }
+
+  /// Can the particle meet the sheet at all? Its distance at the start of the step against all motion.
+  DRENCH_HD bool in_reach(int i, Vec3<float> to) const {
+    const float d = distance[i] < 0.f ? -distance[i] : distance[i];
+    const float nearest = normal_is_zero(i) ? 0.f : d;
+    return nearest <= length(to - start[i]) + length(to - position[i]) + cloth_moved + 2.f * clearance;
+  }
+  DRENCH_HD bool normal_is_zero(int i) const {  // beyond a free edge: near, but the distance is not kept
+    const Vec3<float> n = normal[i];
+    return n.x == 0.f && n.y == 0.f && n.z == 0.f;
+  }
+};
+
+}  // namespace drench::sim::DRENCH_BACKEND

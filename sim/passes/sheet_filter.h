@@ -1,0 +1,89 @@
+#pragma once
+// Fluid must not feel fluid through a sheet. Each near particle knows the plane of its nearest triangle.
+// A pair whose two planes both put the other in front sees each other; a pair whose planes both put it
+// behind, with opposed normals, does not; the rest (curved sheets, free edges) is decided by testing the
+// segment against the triangles themselves.
+
+#include "sim/geometry.h"
+#include "sim/pairs.h"
+#include "sim/passes/polygon_grid.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct SheetFilter {
+  static constexpr int columns = 4;
+  const int* triangle;  // nearest, -1: not near
+  VecView position, normal;
+  const float* distance;
+  PolygonView polygons;
+  float support_radius;
+
+  DRENCH_HD bool near(int i) const { return triangle[i] >= 0; }
+  DRENCH_HD Inputs<4> inputs() const { return {{normal.x, normal.y, normal.z, distance}}; }
+
+  /// The same answer for (i, j) and (j, i): the segment always starts at the smaller end.
+  DRENCH_HD bool segment_hidden(Vec3<float> p, Vec3<float> q) const {
+    const bool swap = p.x != q.x ? p.x > q.x : p.y != q.y ? p.y > q.y : p.z > q.z;
+    const Vec3<float> from = swap ? q : p, to = swap ? p : q;
+    const Vec3<float> low{minimum(p.x, q.x), minimum(p.y, q.y), minimum(p.z, q.z)};
+    const Vec3<float> high{maximum(p.x, q.x), maximum(p.y, q.y), maximum(p.z, q.z)};
+    const Vec3<float> middle = (low + high) * 0.5f;
+    const float half = 0.5f * length(q - p);
+    bool hidden = false;
+    polygons.for_each_near_box(low, high, 0.f, [&](int t) {
+      if (hidden) return;
+      const float limit = half + sqrtf(polygons.radius2[t]);
+      if (length2(polygons.centroid[t] - middle) > limit * limit) return;
+      Vec3<float> a, b, c;
+      polygons.corners(t, a, b, c);
+      hidden = segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));
+    });
+    return hidden;
+  }
+
+#if defined(__CUDACC__)
+  DRENCH_HD bool hides(int i, int j) const {
+    const Vec3<float> x = position[j] - position[i];
+    if (length2(x) >= support_radius * support_radius || i == j) return false;
+    const Vec3<float> ni = normal[i], nj = normal[j];
+    const bool front_i = distance[i] + dot(ni, x) > 0.f, front_j = distance[j] - dot(nj, x) > 0.f;
+    if (front_i && front_j) return false;
+    if (!front_i && !front_j && dot(ni, nj) < 0.f) return true;
+    return segment_hidden(position[i], position[j]);
+  }
+#else
+  /// Moves the lanes of a pack of neighbours that the sheet hides out of every support.
+  DRENCH_HD void move_hidden_away(const float* const* column, int first, int place, int k,
+                                  Pack* value) const {
+    const Vec3<float> p{column[0][place], column[1][place], column[2][place]};
+    const Vec3<Pack> pi{p.x, p.y, p.z};
+    const Vec3<Pack> ni{column[first][place], column[first + 1][place], column[first + 2][place]};
+    const Pack di(column[first + 3][place]);
+    const Vec3<Pack> nj{Pack::load(column[first] + k), Pack::load(column[first + 1] + k),
+                        Pack::load(column[first + 2] + k)};
+    const Pack dj = Pack::load(column[first + 3] + k);
+    const Vec3<Pack> x = Vec3<Pack>{value[0], value[1], value[2]} - pi;
+    const Mask back_i = di + dot(ni, x) <= Pack(0.f), back_j = dj - dot(nj, x) <= Pack(0.f);
+    const Mask within = length2(x) < Pack(support_radius * support_radius);
+    const Mask surely = back_i & back_j & (dot(ni, nj) < Pack(0.f));
+    const Mask doubtful = (back_i | back_j) & within & !surely;
+    alignas(32) float hidden[8];
+    select(surely, Pack(1.f), Pack(0.f)).store(hidden);
+    for (int bits = doubtful.bits(); bits; bits &= bits - 1) {
+      const int lane = __builtin_ctz(bits), j = k + lane;
+      if (j == place) continue;  // a particle that has been pushed through still sees itself
+      if (segment_hidden(p, {column[0][j], column[1][j], column[2][j]})) hidden[lane] = 1.f;
+    }
+    if (place - k >= 0 && place - k < 8) hidden[place - k] = 0.f;
+    value[0] = select(Pack::load(hidden) > Pack(0.5f), Pack(Tile::far_away), value[0]);
+  }
+#endif
+};
+
+inline SheetFilter sheet_filter(const State& state) {
+  const FluidState& f = state.fluid;
+  return {f.triangle.data(), f.position.view(), f.normal.view(), f.sheet_distance.data(),
+          polygons_of(state.cloth), state.parameters.support_radius};
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

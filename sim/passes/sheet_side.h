@@ -1,0 +1,131 @@
+#pragma once
+// From the foot point to a side, a normal and a signed distance (exact coupling).
+
+#include "sim/geometry.h"
+#include "sim/kernels.h"
+#include "sim/nearest.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct SheetTopology {
+  PolygonView polygons;
+  const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
+  VecView rest_centroid;
+  const float* half_thickness;
+
+  DRENCH_HD Vec3<float> area_normal(int t) const {  // twice the area along the unit normal
+    Vec3<float> a, b, c;
+    polygons.corners(t, a, b, c);
+    return cross(b - a, c - a);
+  }
+  DRENCH_HD Vec3<float> unit_normal(int t) const {
+    const Vec3<float> n = area_normal(t);
+    return n * (1.f / maximum(length(n), 1e-20f));
+  }
+  /// Angle-weighted pseudo-normal of a vertex: its sign is right for any foot point on the vertex
+  /// (Baerentzen and Aanaes 2005).
+  DRENCH_HD Vec3<float> vertex_normal(int vertex) const {
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    for (int k = fan_start[vertex]; k < fan_start[vertex + 1]; ++k) {
+      const int t = fan_entry[k] / 3, corner = fan_entry[k] % 3;
+      Vec3<float> v[3];
+      polygons.corners(t, v[0], v[1], v[2]);
+      const Vec3<float> e = v[(corner + 1) % 3] - v[corner], f = v[(corner + 2) % 3] - v[corner];
+      const float angle = atan2f(length(cross(e, f)), dot(e, f));
+      sum = sum + unit_normal(t) * angle;
+    }
+    return sum;
+  }
+};
+
+inline SheetTopology topology_of(const ClothState& c) {
+  return {polygons_of(c), c.neighbour.data(), c.sheet.data(), c.fan_start.data(), c.fan_entry.data(),
+          c.rim.data(), c.rest_centroid.view(), c.half_thickness.data()};
+}
+
+/// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no sheet.
+struct FootNormal {
+  Vec3<float> normal;
+  bool free_edge;
+};
+
+DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, float wb, float wc) {
+  constexpr float on_edge = 1e-6f;
+  const bool za = wa < on_edge, zb = wb < on_edge, zc = wc < on_edge;
+  const int* corner = sheet.polygons.corner + 3 * t;
+  if (!(za || zb || zc)) return {sheet.unit_normal(t), false};
+  if ((za && zb) || (zb && zc) || (za && zc)) {
+    const int vertex = corner[!za ? 0 : !zb ? 1 : 2];
+    return {sheet.vertex_normal(vertex), sheet.rim[vertex] != 0};
+  }
+  const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
+  const int other = sheet.neighbour[3 * t + edge];
+  if (other < 0) return {sheet.unit_normal(t), true};
+  return {sheet.unit_normal(t) + sheet.unit_normal(other), false};
+}
+
+/// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
+DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc, float spacing) {
+  float inside = 1.f;
+  const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
+  Vec3<float> v[3];
+  sheet.polygons.corners(t, v[0], v[1], v[2]);
+  const float twice_area = length(sheet.area_normal(t));
+  for (int e = 0; e < 3; ++e) {
+    if (sheet.neighbour[3 * t + e] >= 0) continue;
+    const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
+    inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
+  }
+  return max0(inside);
+}
+
+// Side, normal, signed distance and wall density of every particle near a sheet. The side is taken from
+// the geometry when a particle comes within reach and remembered while its nearest triangle stays on
+// the same patch (rest centroids within two supports); memory ends beyond the support and at free edges.
+inline void find_sheet_sides(State& state) {
+  FluidState& f = state.fluid;
+  const SheetTopology sheet = topology_of(state.cloth);
+  const VecView position = f.position.view(), normal = f.normal.view();
+  int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
+      *memory_side = f.memory_side.data();
+  const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
+  float *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data(),
+        *lambda = f.lambda.data();
+  const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
+  const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
+  parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
+    const int t = triangle[i];
+    normal.set(i, {0.f, 0.f, 0.f});
+    distance[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f;
+    if (t < 0) {
+      memory_triangle[i] = -1;
+      lambda[i] = 0.f;
+      return;
+    }
+    const float wb = weight_b[i], wc = weight_c[i], wa = 1.f - wb - wc;
+    const FootNormal foot = foot_normal(sheet, t, wa, wb, wc);
+    if (foot.free_edge) {
+      memory_triangle[i] = -1;
+      return;
+    }
+    Vec3<float> a, b, c;
+    sheet.polygons.corners(t, a, b, c);
+    const Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
+    const float d = length(to_particle);
+    const int seen = dot(to_particle, foot.normal) >= 0.f ? 1 : -1;
+    const int old = memory_triangle[i];
+    const bool remembered = old >= 0 && sheet.sheet[old] == sheet.sheet[t] &&
+                            length(sheet.rest_centroid[old] - sheet.rest_centroid[t]) < patch;
+    const int side = remembered ? memory_side[i] : seen;
+    memory_triangle[i] = t, memory_side[i] = side;
+    const Vec3<float> pseudo = foot.normal * (float(side) / maximum(length(foot.normal), 1e-20f));
+    const bool clear = d > 1e-4f * h;  // closer than that the direction is rounding
+    const float flip = side == seen ? 1.f : -1.f;
+    normal.set(i, clear ? to_particle * (flip / d) : pseudo);
+    distance[i] = flip * d;
+    edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
+    share[i] = edge[i] * poly6_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
+  });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,61 @@
+#pragma once
+// Particles sorted by cell at the start of every step; ties keep their order, which a checkpoint holds.
+
+#include "sim/passes/polygon_grid.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+inline void permute(Column<float>& column, Column<float>& spare, const int* order, int n) {
+  const float* from = column.data();
+  float* to = spare.data();
+  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
+  column.swap(spare);
+}
+inline void permute(Column<int>& column, Column<int>& spare, const int* order, int n) {
+  const int* from = column.data();
+  int* to = spare.data();
+  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
+  column.swap(spare);
+}
+inline void permute(VecColumn& column, VecColumn& spare, const int* order, int n) {
+  const VecView from = column.view(), to = spare.view();
+  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to.set(i, from[order[i]]); });
+  column.swap(spare);
+}
+
+inline void sort_particles(State& state) {
+  FluidState& f = state.fluid;
+  const Parameters& p = state.parameters;
+  const int n = f.count;
+  const VecView x = f.position.view();
+  const Bounds box = bounds_of_points("fluid bounds", x, n);
+  f.grid = make_grid_shape(box.low, box.high, p.support_radius);
+  const GridShape grid = f.grid;
+  // Past an open side of the domain by more than a support a particle is lost: it sorts behind all.
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k) low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
+  const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
+  const int lost = grid.cells();
+  int* cell = f.cell.data();
+  parallel_for("fluid cells", n, DRENCH_LAMBDA(int i) {
+    const Vec3<float> q = x[i];
+    const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
+                        q.z >= lower.z && q.z <= upper.z;
+    cell[i] = inside ? grid.cell(q) : lost;
+  });
+  stable_sort_keys(f.cell, n, lost, f.order, f.cell_start, state.scratch);
+  const int* order = f.order.data();
+  permute(f.position, state.swap_vector, order, n);
+  permute(f.velocity, state.swap_vector, order, n);
+  permute(f.id, state.swap_int, order, n);
+  if (f.memory_triangle.size()) {
+    permute(f.memory_triangle, state.swap_int, order, n);
+    permute(f.memory_side, state.swap_int, order, n);
+    permute(f.owed, state.swap_vector, order, n);
+    permute(f.lambda, state.swap_vector.x, order, n);
+  }
+  const bool open = !(p.wall[0] && p.wall[1] && p.wall[2]);
+  if (open) f.count = value_at(f.cell_start, lost);
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,290 @@
+// The initial state: local frame, parameters, all sheets in one, and the checks across parts.
+
+#include "sim/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include <fmt/format.h>
+
+#include "pipeline/contract/error.h"
+#include "sim/geometry.h"
+
+namespace drench::sim {
+
+float LocalFrame::to_local(int axis, double world) const {
+  const double step = spacing / 65536;
+  return float(std::round((world - origin[axis]) / step) * step);
+}
+
+namespace {
+
+LocalFrame local_frame(const Shot& shot) {
+  LocalFrame frame{{0, 0, 0}, shot.fluid.spacing};
+  for (int k = 0; k < 3; ++k) {
+    frame.origin[k] = std::floor(shot.domain.min[k] / frame.spacing + 1e-9) * frame.spacing;
+  }
+  return frame;
+}
+
+/// Sum of a^3 W_poly6 over a cubic lattice of spacing a.
+double lattice_sum(double a, double h) {
+  const int reach = int(std::ceil(h / a));
+  double sum = 0;
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
+        const double s = h * h - (x * x + y * y + z * z) * a * a;
+        if (s > 0) sum += s * s * s;
+      }
+    }
+  }
+  return sum * a * a * a * 315 / (64 * M_PI * std::pow(h, 9));
+}
+
+/// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at start
+/// count as the height v^2/2g they would have fallen.
+double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
+  const double g = shot.gravity.length();
+  double speed2 = 0, top = -1e300, bottom = 1e300;
+  const V3d down = g > 0 ? shot.gravity / g : V3d(0, -1, 0);
+  const auto see = [&](const V3d& p, double speed) {
+    speed2 = std::max(speed2, speed * speed);
+    top = std::max(top, -p.dot(down)), bottom = std::min(bottom, -p.dot(down));
+  };
+  for (size_t i = 0; i < fluid.position.size(); ++i) see(fluid.position[i], fluid.velocity[i].length());
+  for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
+  for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
+    if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] == Axis::open) continue;
+    bottom = std::min(bottom, down[k] < 0 ? shot.domain.min[k] : -shot.domain.max[k]);
+  }
+  const double height = std::max(top - bottom, shot.fluid.spacing);
+  return std::max(10 * std::sqrt(g * height + 0.5 * speed2), 1.0);
+}
+
+Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
+  Parameters p;
+  const double a = shot.fluid.spacing, h = a * shot.fluid.support_ratio;
+  p.fluid = shot.fluid.present();
+  p.spacing = float(a), p.support_radius = float(h);
+  p.rest_density = float(shot.fluid.rest_density);
+  p.particle_mass = float(shot.fluid.rest_density * a * a * a);
+  p.lattice_sum = float(lattice_sum(a, h));
+  p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
+  // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
+  // smoothing length, half the support radius.
+  const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;
+  p.dynamic_viscosity = float(shot.fluid.rest_density * std::max(shot.fluid.kinematic_viscosity, numerical));
+  p.wall_viscosity = float(shot.fluid.rest_density * shot.fluid.kinematic_viscosity);
+  for (int k = 0; k < 3; ++k) {
+    p.gravity[k] = float(shot.gravity[k]);
+    p.origin[k] = frame.origin[k];
+    p.low[k] = float(shot.domain.min[k] - frame.origin[k]);
+    p.high[k] = float(shot.domain.max[k] - frame.origin[k]);
+    p.wall[k] = shot.domain.axis[k] == Axis::walls;
+  }
+  p.paper = shot.coupling.scheme == CouplingScheme::paper;
+  p.fixed_dt = shot.time_step;
+  return p;
+}
+
+/// Largest eigenvalue of a symmetric positive 3x3 matrix by power iteration, from above by 1 %.
+double largest_eigenvalue(const double (&m)[6]) {
+  V3d v(0.57, 0.61, 0.55);
+  double value = 0;
+  for (int k = 0; k < 50; ++k) {
+    const V3d w(m[0] * v.x + m[1] * v.y + m[2] * v.z, m[1] * v.x + m[3] * v.y + m[4] * v.z,
+                m[2] * v.x + m[4] * v.y + m[5] * v.z);
+    value = w.length();
+    if (value == 0) return 0;
+    v = w / value;
+  }
+  return 1.01 * value;
+}
+
+/// 2 / omega with omega^2 <= max over vertices of the eigenvalue of sum_j 2 k e e^T over m: exact,
+/// 4 (k_adj + k_diag) / m, on a square lattice. 0.7 leaves room for rotated and stretched springs.
+double cloth_dt_limit(const Sheet& sheet) {
+  std::vector<std::array<double, 6>> block(sheet.position.size(), {0, 0, 0, 0, 0, 0});
+  for (const Sheet::Spring& s : sheet.spring) {
+    const V3d e = (sheet.position[s.b] - sheet.position[s.a]).normalized();
+    const double entry[6] = {e.x * e.x, e.x * e.y, e.x * e.z, e.y * e.y, e.y * e.z, e.z * e.z};
+    for (int v : {s.a, s.b}) {
+      for (int k = 0; k < 6; ++k) block[v][k] += 2 * s.stiffness * entry[k];
+    }
+  }
+  double omega2 = 0;
+  for (size_t v = 0; v < block.size(); ++v) {
+    double m[6];
+    std::copy(block[v].begin(), block[v].end(), m);
+    if (!sheet.pinned[v]) omega2 = std::max(omega2, largest_eigenvalue(m) / sheet.mass[v]);
+  }
+  return omega2 > 0 ? 0.7 * 2 / std::sqrt(omega2) : 1e30;
+}
+
+/// Compressed rows: entries of row r stand at [start[r], start[r + 1]).
+template <class T>
+void to_rows(const std::vector<std::vector<T>>& rows, std::vector<int>& start, std::vector<T>& flat) {
+  start.assign(1, 0);
+  for (const std::vector<T>& row : rows) {
+    flat.insert(flat.end(), row.begin(), row.end());
+    start.push_back(int(flat.size()));
+  }
+}
+
+void append_springs(const Sheet& sheet, const Cloth& cloth, ClothTopology& t, int base) {
+  struct End {
+    int vertex;
+    float length, stiffness, damping;
+  };
+  std::vector<std::vector<End>> rows(sheet.position.size());
+  for (const Sheet::Spring& s : sheet.spring) {
+    const double length = (sheet.rest[s.b] - sheet.rest[s.a]).length();
+    const double reduced = sheet.mass[s.a] * sheet.mass[s.b] / (sheet.mass[s.a] + sheet.mass[s.b]);
+    const double damping = cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced);
+    rows[s.a].push_back({s.b + base, float(length), float(s.stiffness), float(damping)});
+    rows[s.b].push_back({s.a + base, float(length), float(s.stiffness), float(damping)});
+  }
+  if (t.spring_start.empty()) t.spring_start.push_back(0);
+  for (const auto& row : rows) {
+    for (const End& e : row) {
+      t.spring_end.push_back(e.vertex), t.rest_length.push_back(e.length);
+      t.stiffness.push_back(e.stiffness), t.spring_damping.push_back(e.damping);
+    }
+    t.spring_start.push_back(int(t.spring_end.size()));
+  }
+}
+
+/// Triangles across the edges ab, bc, ca of each triangle; -1 at free edges, whose vertices are rim.
+void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) {
+  std::unordered_map<uint64_t, int> of_edge;
+  const auto key = [](uint32_t a, uint32_t b) { return uint64_t(a) << 32 | b; };
+  for (size_t k = 0; k < sheet.triangle.size(); ++k) {
+    for (int c = 0; c < 3; ++c) of_edge[key(sheet.triangle[k][c], sheet.triangle[k][(c + 1) % 3])] = int(k);
+  }
+  const size_t first = t.rim.size();
+  t.rim.resize(first + sheet.position.size(), 0);
+  for (const auto& triangle : sheet.triangle) {
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t a = triangle[c], b = triangle[(c + 1) % 3];
+      const auto other = of_edge.find(key(b, a));
+      t.neighbour.push_back(other == of_edge.end() ? -1 : other->second + base_triangle);
+      if (other == of_edge.end()) t.rim[first + a] = t.rim[first + b] = 1;
+    }
+  }
+}
+
+void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame, Scene& scene) {
+  ClothTopology& t = scene.cloth;
+  const int base = t.vertices(), base_triangle = t.triangles();
+  append_springs(sheet, cloth, t, base);
+  append_neighbours(sheet, t, base_triangle);
+  std::vector<std::vector<int>> fan(sheet.position.size());
+  for (size_t k = 0; k < sheet.triangle.size(); ++k) {
+    V3d centre(0);
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t v = sheet.triangle[k][c];
+      t.corner.push_back(int(v) + base);
+      fan[v].push_back(3 * (int(k) + base_triangle) + c);
+      centre += sheet.rest[v] / 3;
+    }
+    t.sheet.push_back(index);
+    t.half_thickness.push_back(float(0.5 * cloth.thickness));
+    t.rest_centroid.push(float(centre.x - frame.origin[0]), float(centre.y - frame.origin[1]),
+                         float(centre.z - frame.origin[2]));
+  }
+  std::vector<int> start, flat;
+  to_rows(fan, start, flat);
+  const int offset = int(t.fan_entry.size());
+  if (t.fan_start.empty()) t.fan_start.push_back(0);
+  for (size_t r = 1; r < start.size(); ++r) t.fan_start.push_back(start[r] + offset);
+  t.fan_entry.insert(t.fan_entry.end(), flat.begin(), flat.end());
+  for (size_t v = 0; v < sheet.position.size(); ++v) {
+    t.mass.push_back(float(sheet.mass[v]));
+    t.inverse_mass.push_back(sheet.pinned[v] ? 0.f : float(1 / sheet.mass[v]));
+    t.damping_rate.push_back(float(cloth.damping));
+    const V3d p = sheet.position[v], u = sheet.pinned[v] ? V3d(0) : cloth.velocity;
+    scene.start.cloth_position.push(frame.to_local(0, p.x), frame.to_local(1, p.y), frame.to_local(2, p.z));
+    scene.start.cloth_velocity.push(float(u.x), float(u.y), float(u.z));
+  }
+}
+
+/// Refuses particles closer to a sheet than a quarter spacing: the side they belong to is a guess.
+void check_overlap(const Shot& shot, const Scene& scene) {
+  using P = cpu::Vec3<float>;
+  const HostVec &x = scene.start.position, &v = scene.start.cloth_position;
+  const float a = scene.parameters.spacing;
+  std::unordered_multimap<uint64_t, int> cells;
+  const auto key = [a](float px, float py, float pz) {
+    const auto c = [a](float s) { return uint64_t(int64_t(std::floor(s / a)) & 0x1fffff); };
+    return c(px) << 42 | c(py) << 21 | c(pz);
+  };
+  for (size_t i = 0; i < x.size(); ++i) cells.emplace(key(x.x[i], x.y[i], x.z[i]), int(i));
+  for (int t = 0; t < scene.cloth.triangles(); ++t) {
+    P corner[3], low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
+    for (int k = 0; k < 3; ++k) {
+      const int c = scene.cloth.corner[3 * t + k];
+      corner[k] = {v.x[c], v.y[c], v.z[c]};
+      low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y), std::min(low.z, corner[k].z)};
+      high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y), std::max(high.z, corner[k].z)};
+    }
+    const float reach = 0.25f * a + scene.cloth.half_thickness[t];
+    for (float z = low.z - reach; z < high.z + reach + a; z += a) {
+      for (float y = low.y - reach; y < high.y + reach + a; y += a) {
+        for (float px = low.x - reach; px < high.x + reach + a; px += a) {
+          const auto [begin, end] = cells.equal_range(key(px, y, z));
+          for (auto it = begin; it != end; ++it) {
+            const P p{x.x[it->second], x.y[it->second], x.z[it->second]};
+            const float d2 = cpu::closest_point(p, corner[0], corner[1], corner[2]).distance2;
+            if (d2 >= reach * reach) continue;
+            throw Error(fmt::format(
+                "{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, {:.4g}, {:.4g}) m is {:.2g} m from it, "
+                "nearer than {:.2g} m (a quarter spacing and half the thickness), so it has no side. Move the fluid "
+                "or the cloth at least half a spacing ({:.3g} m) apart",
+                shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name, scene.frame.to_world(0, p.x),
+                scene.frame.to_world(1, p.y), scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Scene build_scene(const Shot& shot) {
+  if (!shot.fluid.present() && shot.cloth.empty()) {
+    throw Error(shot.file.string() + ": there is nothing to simulate. Add a [[fluid.box]] or a [[cloth]]");
+  }
+  Scene scene;
+  scene.frame = local_frame(shot);
+  const InitialFluid fluid = shot.fluid.present() ? initial_fluid(shot) : InitialFluid{};
+  scene.parameters = build_parameters(shot, scene.frame, fluid);
+  HostState& start = scene.start;
+  for (size_t i = 0; i < fluid.position.size(); ++i) {
+    const V3d p = fluid.position[i], u = fluid.velocity[i];
+    start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y), scene.frame.to_local(2, p.z));
+    start.velocity.push(float(u.x), float(u.y), float(u.z));
+    start.id.push_back(int(i));
+  }
+  start.memory_triangle.assign(start.id.size(), -1);
+  start.memory_side.assign(start.id.size(), 1);
+  start.owed.resize(start.id.size());
+  start.lambda.assign(start.id.size(), 0.f);
+  double dt_limit = 1e30;
+  for (size_t s = 0; s < shot.cloth.size(); ++s) {
+    scene.sheet.push_back(build_sheet(shot.cloth[s]));
+    scene.first_vertex.push_back(scene.cloth.vertices());
+    scene.first_triangle.push_back(scene.cloth.triangles());
+    append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, scene);
+    dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back()));
+  }
+  scene.first_vertex.push_back(scene.cloth.vertices());
+  scene.first_triangle.push_back(scene.cloth.triangles());
+  scene.parameters.cloth_dt_limit = float(std::min(dt_limit, 1e-3));
+  check_overlap(shot, scene);
+  return scene;
+}
+
+}  // namespace drench::sim

@@ -1,0 +1,262 @@
+#include "sim/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/shot_file.h"
+#include "sim/checkpoint.h"
+#include "sim/scene.h"
+
+namespace drench {
+
+namespace {
+
+std::unique_ptr<sim::Solver> make_solver(const sim::Scene& scene, Device device, std::string& name) {
+#if defined(DRENCH_HAS_CUDA)
+  if (device != Device::cpu && sim::cuda::device_available(name)) {
+    return sim::cuda::make_solver(scene.parameters, scene.cloth);
+  }
+  if (device == Device::cuda) {
+    throw Error("--device cuda: no usable GPU (" + name + "). Install a driver or use --device cpu");
+  }
+#else
+  if (device == Device::cuda) {
+    throw Error("--device cuda: this build has no CUDA. Install the CUDA Toolkit and build again, or use "
+                "--device cpu");
+  }
+#endif
+  name = "CPU";
+  return sim::cpu::make_solver(scene.parameters, scene.cloth);
+}
+
+}  // namespace
+
+struct Simulator::Implementation {
+  Shot shot;
+  SimulatorOptions options;
+  sim::Scene scene;
+  std::string device;
+  std::unique_ptr<sim::Solver> solver;
+  std::vector<sim::EmitterLayer> layer;
+  Digest layout;
+
+  int frame = 0;
+  double time = 0;  // s since the first frame; negative in the pre-roll
+  uint64_t steps = 0;
+  int next_id = 0;
+  std::vector<uint64_t> emitted;
+  sim::Limits limits;
+  std::filesystem::path last_checkpoint;
+
+  Implementation(const Shot& shot_, const SimulatorOptions& options_)
+      : shot(shot_), options(options_), scene(sim::build_scene(shot)), solver(make_solver(scene, options.device, device)) {
+    for (const FluidEmitter& e : shot.fluid.emitter) layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
+    emitted.assign(layer.size(), 0);
+    Hasher hasher;
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 1").finish();
+    frame = shot.timeline.first;
+    next_id = int(scene.start.id.size());
+    solver->load(scene.start);
+    limits = solver->measure();
+    time = -shot.preroll;
+    if (shot.preroll > 0) {
+      StepReport report;
+      advance_to(0, report, {});
+    }
+    solver->refresh();
+  }
+
+  double frame_time(int f) const { return (f - shot.timeline.first) / shot.timeline.fps; }
+
+  /// Layers due by `until`, each moved on from the moment it left.
+  void emit(double until) {
+    const double a = shot.fluid.spacing;
+    for (size_t e = 0; e < layer.size(); ++e) {
+      const FluidEmitter& source = shot.fluid.emitter[e];
+      const V3d direction = source.direction.normalized();
+      for (;; ++emitted[e]) {
+        const double leaves = source.start + double(emitted[e]) * a / source.speed;
+        if (leaves > until || leaves > source.stop) break;
+        if (solver->particles() + layer[e].offset.size() > max_particles) {
+          throw Error(fmt::format("{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
+                                  "stop the emitter earlier", shot.file.string(), e + 1, max_particles, until));
+        }
+        add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)), direction * source.speed);
+      }
+    }
+  }
+
+  void add_layer(const sim::EmitterLayer& disc, const V3d& centre, const V3d& u) {
+    sim::HostVec position, velocity;
+    std::vector<int> id;
+    for (const V3d& offset : disc.offset) {
+      const V3d p = centre + offset;
+      position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y), scene.frame.to_local(2, p.z));
+      velocity.push(float(u.x), float(u.y), float(u.z));
+      id.push_back(next_id++);
+    }
+    solver->append(position, velocity, id);
+  }
+
+  /// Steps to time `end` exactly: the rest is cut into equal parts no longer than the stable step.
+  void advance_to(double end, StepReport& report, const std::function<bool()>& keep_going) {
+    std::map<std::string, int> ruled;
+    while (time < end) {
+      if (keep_going && !keep_going()) throw Stopped("stopped on request");
+      sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+      if (shot.time_step > 0) limit = fixed_step(limit);
+      const double rest = end - time;
+      const double parts = std::ceil(rest / limit.dt - 1e-9);
+      const double dt = parts <= 1 ? rest : rest / parts;
+      const int substeps = shot.cloth.empty() ? 1 : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
+      emit(time);
+      limits = solver->step(dt, substeps);
+      time = parts <= 1 ? end : time + dt;
+      ++steps;
+      check_state();
+      report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
+      report.largest_dt = std::max(report.largest_dt, dt);
+      report.max_speed = std::max(report.max_speed, double(limits.max_speed));
+      ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
+      if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
+    }
+  }
+
+  sim::StepLimit fixed_step(const sim::StepLimit& stable) const {
+    if (shot.time_step > stable.dt) {
+      throw Error(fmt::format("{}: shot.time_step is {:.3g} s but steps above {:.3g} s are unstable now (frame {}, "
+                              "limit: {}). Use a smaller step, or 0 for an adaptive one",
+                              shot.file.string(), shot.time_step, stable.dt, frame, stable.name));
+    }
+    return {shot.time_step, "fixed"};
+  }
+
+  /// @throws Error if anything is not finite or absurdly fast: what, where, when, and what is safe.
+  void check_state() const {
+    if (limits.bad_particle < 0 && limits.bad_vertex < 0) return;
+    const sim::HostState state = solver->save();
+    const bool particle = limits.bad_particle >= 0;
+    const int i = particle ? limits.bad_particle : limits.bad_vertex;
+    const sim::HostVec &x = particle ? state.position : state.cloth_position,
+                       &v = particle ? state.velocity : state.cloth_velocity;
+    const double speed = std::sqrt(double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
+    throw Error(fmt::format(
+        "{}: the simulation blew up after frame {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m has speed "
+        "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a smaller shot.time_step, "
+        "a softer cloth or a larger fluid.sound_speed",
+        shot.file.string(), frame, time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
+        scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]), scene.frame.to_world(2, x.z[i]), speed,
+        last_checkpoint.empty() ? "none" : last_checkpoint.string()));
+  }
+
+  void describe(StepReport& report) const {
+    const std::vector<float> density = solver->density();
+    const sim::HostState state = solver->save();
+    report.time = time;
+    report.particles = density.size();
+    for (int t : solver->near_triangles()) report.near += t >= 0;
+    double sum = 0, energy = 0;
+    for (float rho : density) {
+      const double over = std::max(0.0, double(rho) / scene.parameters.rest_density - 1);
+      sum += over;
+      report.max_compression = std::max(report.max_compression, over);
+    }
+    if (!density.empty()) report.mean_compression = sum / double(density.size());
+    const auto kinetic = [](const sim::HostVec& v, size_t i) {
+      return 0.5 * (double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
+    };
+    for (size_t i = 0; i < state.velocity.size(); ++i) energy += scene.parameters.particle_mass * kinetic(state.velocity, i);
+    for (size_t i = 0; i < state.cloth_velocity.size(); ++i) energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
+    report.kinetic_energy = energy;
+    report.guard_hits = state.guard_hits;
+  }
+
+  ParticleFrame particles() const {
+    const sim::HostState state = solver->save();
+    ParticleFrame out;
+    out.spacing = float(shot.fluid.spacing), out.rest_density = float(shot.fluid.rest_density);
+    out.density = solver->density();
+    for (size_t i = 0; i < state.id.size(); ++i) {
+      out.position.push_back(world(state.position, i));
+      out.velocity.emplace_back(state.velocity.x[i], state.velocity.y[i], state.velocity.z[i]);
+      out.id.push_back(uint32_t(state.id[i]));
+    }
+    return out;
+  }
+
+  V3f world(const sim::HostVec& p, size_t i) const {
+    return V3f(float(scene.frame.to_world(0, p.x[i])), float(scene.frame.to_world(1, p.y[i])),
+               float(scene.frame.to_world(2, p.z[i])));
+  }
+
+  std::vector<ClothFrame> cloth() const {
+    const sim::HostState state = solver->save();
+    std::vector<ClothFrame> frames;
+    for (size_t s = 0; s < scene.sheet.size(); ++s) {
+      const sim::Sheet& sheet = scene.sheet[s];
+      ClothFrame out{sheet.name, {}};
+      for (int v = scene.first_vertex[s]; v < scene.first_vertex[s + 1]; ++v) {
+        out.mesh.position.push_back(world(state.cloth_position, v));
+        out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v], state.cloth_velocity.z[v]);
+        out.mesh.rest_position.push_back(V3f(sheet.rest[v - scene.first_vertex[s]]));
+      }
+      out.mesh.uv = sheet.uv;
+      out.mesh.triangle = sheet.triangle;
+      frames.push_back(std::move(out));
+    }
+    return frames;
+  }
+
+  static constexpr size_t max_particles = 200'000'000;
+};
+
+Simulator::Simulator(const Shot& shot, const SimulatorOptions& options)
+    : implementation_(std::make_unique<Implementation>(shot, options)) {}
+Simulator::~Simulator() = default;
+Simulator::Simulator(Simulator&&) noexcept = default;
+
+StepReport Simulator::advance_frame(const std::function<bool()>& keep_going) {
+  Implementation& s = *implementation_;
+  StepReport report;
+  s.advance_to(s.frame_time(s.frame + 1), report, keep_going);
+  ++s.frame;
+  s.solver->refresh();
+  s.describe(report);
+  return report;
+}
+
+int Simulator::frame() const { return implementation_->frame; }
+ParticleFrame Simulator::particles() const { return implementation_->particles(); }
+std::vector<ClothFrame> Simulator::cloth() const { return implementation_->cloth(); }
+std::string Simulator::device_name() const { return implementation_->device; }
+
+WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
+  Implementation& s = *implementation_;
+  sim::Checkpoint checkpoint{s.frame, s.time, s.steps, s.next_id, s.emitted, s.solver->save(), s.layout};
+  checkpoint.state.limits = s.limits;
+  WrittenFile written = sim::write_checkpoint(path, checkpoint);
+  s.last_checkpoint = path;
+  return written;
+}
+
+void Simulator::read_checkpoint(const std::filesystem::path& path) {
+  Implementation& s = *implementation_;
+  sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
+  if (checkpoint.emitted.size() != s.emitted.size() ||
+      checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices())) {
+    throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
+  }
+  s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
+  s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted;
+  s.limits = checkpoint.state.limits;
+  s.solver->load(checkpoint.state);
+  s.solver->refresh();
+  s.last_checkpoint = path;
+}
+
+}  // namespace drench

@@ -1,0 +1,234 @@
+// One backend's Solver. Compiled twice: as it is, and as CUDA.
+
+#include "sim/solver.h"
+
+#include <algorithm>
+#include <map>
+
+#include "sim/step_plan.h"
+
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+void upload(VecColumn& column, const HostVec& host) {
+  from_host(column.x, host.x), from_host(column.y, host.y), from_host(column.z, host.z);
+}
+HostVec download(const VecColumn& column, int n) {
+  return {to_host(column.x, n), to_host(column.y, n), to_host(column.z, n)};
+}
+
+class BackendSolver : public Solver {
+ public:
+  BackendSolver(const Parameters& parameters, const ClothTopology& cloth) {
+    state_.parameters = parameters;
+    if (parameters.paper) {
+      state_.wall_table = build_wall_table(parameters.support_radius / parameters.spacing);
+    }
+    plan_ = step_plan(parameters, cloth.vertices() > 0);
+    for (const Pass& pass : plan_) allocated_ |= pass.reads | pass.writes;
+    if (cloth.vertices() > 0) load_topology(cloth);
+  }
+
+  void load(const HostState& host) override {
+    state_.fluid.count = int(host.id.size());
+    resize_particles(host.id.size());
+    upload(state_.fluid.position, host.position);
+    upload(state_.fluid.velocity, host.velocity);
+    from_host(state_.fluid.id, host.id);
+    if (allocated_ & column_memory) {
+      from_host(state_.fluid.memory_triangle, host.memory_triangle);
+      from_host(state_.fluid.memory_side, host.memory_side);
+      upload(state_.fluid.owed, host.owed);
+      from_host(state_.fluid.lambda, host.lambda);
+    }
+    if (allocated_ & column_cloth) {
+      upload(state_.cloth.position, host.cloth_position);
+      upload(state_.cloth.velocity, host.cloth_velocity);
+      state_.cloth.position.resize(state_.cloth.padded);
+      state_.cloth.velocity.resize(state_.cloth.padded);
+    }
+    state_.guard_hits = host.guard_hits;
+    state_.guard_holds = host.guard_holds;
+  }
+
+  HostState save() const override {
+    HostState host;
+    const FluidState& f = state_.fluid;
+    const int n = f.count;
+    host.position = download(f.position, n);
+    host.velocity = download(f.velocity, n);
+    host.id = to_host(f.id, n);
+    if (allocated_ & column_memory) {
+      host.memory_triangle = to_host(f.memory_triangle, n);
+      host.memory_side = to_host(f.memory_side, n);
+      host.owed = download(f.owed, n);
+      host.lambda = to_host(f.lambda, n);
+    }
+    if (allocated_ & column_cloth) {
+      host.cloth_position = download(state_.cloth.position, state_.cloth.vertices);
+      host.cloth_velocity = download(state_.cloth.velocity, state_.cloth.vertices);
+    }
+    host.guard_hits = state_.guard_hits;
+    host.guard_holds = state_.guard_holds;
+    return host;
+  }
+
+  std::vector<float> density() const override { return to_host(state_.fluid.density, state_.fluid.count); }
+  std::vector<int> near_triangles() const override {
+    if (!(allocated_ & column_sheet)) return std::vector<int>(state_.fluid.count, -1);
+    return to_host(state_.fluid.triangle, state_.fluid.count);
+  }
+
+  void append(const HostVec& position, const HostVec& velocity, const std::vector<int>& id) override {
+    FluidState& f = state_.fluid;
+    const size_t at = f.count, more = id.size();
+    resize_particles(at + more);
+    const auto put = [&](VecColumn& column, const HostVec& host) {
+      column.x.upload(host.x.data(), more, at);
+      column.y.upload(host.y.data(), more, at);
+      column.z.upload(host.z.data(), more, at);
+    };
+    put(f.position, position);
+    put(f.velocity, velocity);
+    f.id.upload(id.data(), more, at);
+    if (allocated_ & column_memory) {
+      f.memory_triangle.upload(std::vector<int>(more, -1).data(), more, at);
+      f.memory_side.upload(std::vector<int>(more, 1).data(), more, at);
+      const std::vector<float> none(more, 0.f);
+      put(f.owed, {none, none, none});
+      f.lambda.upload(none.data(), more, at);
+    }
+    f.count = int(at + more);
+  }
+
+  Limits step(double dt, int substeps) override {
+    state_.dt = dt;
+    state_.substeps = substeps;
+    if (state_.parameters.fluid && state_.fluid.count == 0) {  // an emitter that has not started
+      if (state_.cloth.vertices > 0) step_cloth_alone(state_);
+    } else {
+      for (const Pass& pass : plan_) pass.launch(state_);
+    }
+    return measure_limits(state_);
+  }
+
+  void refresh() override {
+    if (state_.fluid.count == 0) return;
+    for (const Pass& pass : plan_) {
+      pass.launch(state_);
+      if (pass.writes & column_density) break;
+    }
+  }
+
+  Limits measure() override { return measure_limits(state_); }
+
+  std::vector<PassInfo> plan() const override {
+    std::vector<PassInfo> info;
+    for (const Pass& pass : plan_) info.push_back({pass.name, pass.reads, pass.writes});
+    return info;
+  }
+  unsigned allocated() const override { return allocated_; }
+  int particles() const override { return state_.fluid.count; }
+
+ private:
+  void resize_particles(size_t n) {
+    FluidState& f = state_.fluid;
+    for (VecColumn* c : {&f.position, &f.velocity, &state_.swap_vector}) c->resize(n);
+    for (Column<int>* c : {&f.id, &f.cell, &f.order, &state_.swap_int}) c->resize(n);
+    if (allocated_ & column_acceleration) f.acceleration.resize(n);
+    if (allocated_ & column_density) {
+      for (Column<float>* c : {&f.density, &f.pressure, &f.inverse_density}) c->resize(n);
+    }
+    if (allocated_ & column_sheet) {
+      for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.edge, &f.cloth_share}) {
+        c->resize(n);
+      }
+      f.triangle.resize(n);
+      f.normal.resize(n);
+    }
+    if (allocated_ & column_contact) {
+      for (VecColumn* c : {&f.drag, &f.impulse, &f.start}) c->resize(n);
+      f.held.resize(n);
+      state_.contact.key.resize(n);
+    }
+    if (allocated_ & column_memory) {
+      f.memory_triangle.resize(n);
+      f.memory_side.resize(n);
+      f.owed.resize(n);
+      f.lambda.resize(n);
+    }
+  }
+
+  void load_topology(const ClothTopology& t) {
+    ClothState& c = state_.cloth;
+    c.vertices = t.vertices();
+    c.triangles = t.triangles();
+    c.padded = (c.vertices + 7) / 8 * 8;
+    const auto pad = [&](Column<float>& column, std::vector<float> host) {
+      host.resize(c.padded, 0.f);  // a padding vertex is pinned and has no springs
+      from_host(column, host);
+    };
+    pad(c.mass, t.mass), pad(c.inverse_mass, t.inverse_mass), pad(c.damping_rate, t.damping_rate);
+    load_springs(t);
+    from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
+    from_host(c.half_thickness, t.half_thickness);
+    upload(c.rest_centroid, t.rest_centroid);
+    from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry), from_host(c.rim, t.rim);
+    for (VecColumn* v : {&c.position, &c.velocity, &c.next, &c.next_velocity, &c.start, &c.predicted, &c.force}) {
+      v->resize(c.padded);
+    }
+    c.force.clear();
+    c.centroid.resize(c.triangles);
+    c.radius2.resize(c.triangles);
+    c.cell.resize(c.triangles);
+    c.share.resize(c.vertices);
+    c.held.resize(c.vertices);
+  }
+
+  /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices as
+  /// long as there are eight offsets or fewer at most vertices, as on grids; the rest fill up what is free.
+  void load_springs(const ClothTopology& t) {
+    ClothState& c = state_.cloth;
+    int busiest = 0;
+    std::map<int, int> count_of_offset;
+    for (int v = 0; v < c.vertices; ++v) {
+      busiest = std::max(busiest, t.spring_start[v + 1] - t.spring_start[v]);
+      for (int k = t.spring_start[v]; k < t.spring_start[v + 1]; ++k) ++count_of_offset[t.spring_end[k] - v];
+    }
+    std::vector<int> offset;
+    for (const auto& [o, count] : count_of_offset) {
+      if (count > c.vertices / 4) offset.push_back(o);
+    }
+    if (int(count_of_offset.size()) > int(offset.size()) || int(offset.size()) > busiest) offset.clear();
+    c.spring_slots = busiest;
+    offset.resize(busiest, 0);
+    const size_t size = size_t(busiest) * c.padded;
+    std::vector<int> end(size);
+    std::vector<float> length(size, 0.f), stiffness(size, 0.f), damping(size, 0.f);
+    for (size_t k = 0; k < size; ++k) end[k] = int(k % c.padded);
+    for (int v = 0; v < c.vertices; ++v) {
+      for (int k = t.spring_start[v], free = 0; k < t.spring_start[v + 1]; ++k, ++free) {
+        const auto slot = std::find(offset.begin(), offset.end(), t.spring_end[k] - v);
+        const size_t to = size_t(slot == offset.end() ? free : slot - offset.begin()) * c.padded + v;
+        end[to] = t.spring_end[k], length[to] = t.rest_length[k];
+        stiffness[to] = t.stiffness[k], damping[to] = t.spring_damping[k];
+      }
+    }
+    from_host(c.slot_offset, offset), from_host(c.spring_end, end), from_host(c.rest_length, length);
+    from_host(c.stiffness, stiffness), from_host(c.spring_damping, damping);
+  }
+
+  State state_;
+  std::vector<Pass> plan_;
+  unsigned allocated_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Solver> make_solver(const Parameters& parameters, const ClothTopology& cloth) {
+  return std::make_unique<BackendSolver>(parameters, cloth);
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

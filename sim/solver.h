@@ -1,0 +1,90 @@
+#pragma once
+// The boundary between host code, compiled once, and the two backends: plain host arrays in and out.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sim/parameters.h"
+
+namespace drench::sim {
+
+/// Three floats a row; local frame.
+struct HostVec {
+  std::vector<float> x, y, z;
+  size_t size() const { return x.size(); }
+  void push(float a, float b, float c) { x.push_back(a), y.push_back(b), z.push_back(c); }
+  void resize(size_t n) { x.resize(n), y.resize(n), z.resize(n); }
+};
+
+/// Everything the next step reads: what a checkpoint holds.
+struct HostState {
+  HostVec position, velocity;  // m local, m/s
+  std::vector<int> id, memory_triangle, memory_side;
+  HostVec owed;                // kg m/s
+  std::vector<float> lambda;   // N
+  HostVec cloth_position, cloth_velocity;
+  Limits limits;               // of the step before
+  uint64_t guard_hits = 0, guard_holds = 0;
+};
+
+/// What never changes about the sheets, all in one.
+struct ClothTopology {
+  std::vector<float> mass, inverse_mass, damping_rate;  // kg; 0 where pinned; 1/s
+  std::vector<int> spring_start, spring_end;            // rows by vertex
+  std::vector<float> rest_length, stiffness, spring_damping;
+  std::vector<int> corner, neighbour, sheet;            // 3, 3, 1 a triangle
+  std::vector<float> half_thickness;
+  HostVec rest_centroid;
+  std::vector<int> fan_start, fan_entry, rim;
+  int vertices() const { return int(mass.size()); }
+  int triangles() const { return int(sheet.size()); }
+};
+
+/// Columns a pass may name; only those that the plan names are allocated.
+enum ColumnGroup : unsigned {
+  column_position = 1, column_velocity = 2, column_acceleration = 4, column_density = 8,
+  column_sheet = 16,    // nearest triangle, weights, normal, distance, edge, share
+  column_memory = 32,   // remembered side
+  column_contact = 64,  // impulses
+  column_cloth = 128,
+};
+
+struct PassInfo {
+  std::string name;
+  unsigned reads, writes;  // of ColumnGroup
+};
+
+class Solver {
+ public:
+  virtual ~Solver() = default;
+  virtual void load(const HostState& state) = 0;
+  virtual HostState save() const = 0;
+  /// Fluid density of every particle, kg/m^3, and nearest triangles (-1 none), as of refresh() or step().
+  virtual std::vector<float> density() const = 0;
+  virtual std::vector<int> near_triangles() const = 0;
+  /// Adds particles with ids at the end of the columns.
+  virtual void append(const HostVec& position, const HostVec& velocity, const std::vector<int>& id) = 0;
+  /// One fluid step with `substeps` cloth steps in it.
+  virtual Limits step(double dt, int substeps) = 0;
+  /// Density and nearest triangles of the current positions, without a step. Sorts the particles, which
+  /// the next step would do in the same way: its result is the same bits with or without this.
+  virtual void refresh() = 0;
+  /// Limits of a state that no step has made yet.
+  virtual Limits measure() = 0;
+  virtual std::vector<PassInfo> plan() const = 0;
+  virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
+  virtual int particles() const = 0;
+};
+
+namespace cpu {
+std::unique_ptr<Solver> make_solver(const Parameters& parameters, const ClothTopology& cloth);
+}
+namespace cuda {  // defined when built with CUDA
+std::unique_ptr<Solver> make_solver(const Parameters& parameters, const ClothTopology& cloth);
+/// Name of the device, or why there is none.
+bool device_available(std::string& name_or_reason);
+}  // namespace cuda
+
+}  // namespace drench::sim

@@ -1,0 +1,104 @@
+#pragma once
+// The state of a simulation on one backend: columns of particles, vertices, springs and triangles.
+
+#include <vector>
+
+#include "sim/grid.h"
+#include "sim/parameters.h"
+#include "sim/sort.h"
+#include "sim/wall_table.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct VecColumn {
+  Column<float> x, y, z;
+  VecView view() const { return {x.data(), y.data(), z.data()}; }
+  void resize(size_t n) { x.resize(n), y.resize(n), z.resize(n); }
+  void swap(VecColumn& o) noexcept { x.swap(o.x), y.swap(o.y), z.swap(o.z); }
+  void clear() { x.clear_bytes(0), y.clear_bytes(0), z.clear_bytes(0); }
+};
+
+/// Particles, sorted by cell at the start of every step.
+struct FluidState {
+  int count = 0;
+  // kept from step to step
+  VecColumn position, velocity;       // m local, m/s
+  Column<int> id;
+  Column<int> memory_triangle;        // triangle whose side is remembered, -1 none   (exact coupling)
+  Column<int> memory_side;            // +1 or -1
+  Column<float> lambda;               // N, normal contact force of the last step: the next one's first guess
+  VecColumn owed;                     // kg m/s that the path test took and cloth has not received yet
+  // rebuilt every step
+  VecColumn acceleration;             // m/s^2
+  Column<float> density, pressure, inverse_density;
+  Column<int> cell, order;
+  Column<int> cell_start;
+  GridShape grid{};
+  // coupling
+  Column<int> triangle;               // nearest triangle within the support radius, -1 none
+  Column<float> weight_b, weight_c;   // barycentric weights of its foot point
+  VecColumn normal;                   // unit, from the sheet to the particle's side; 0 where none
+  Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
+  Column<float> edge;                 // 0 beyond a free edge .. 1 half a spacing inside it
+  Column<float> cloth_share;          // share of density that the sheet replaces
+  VecColumn drag, impulse;            // kg m/s, tangential part; last change
+  VecColumn start;                    // m, position at the start of the step
+  Column<int> held;                   // 1 where the path test stops a particle for this substep
+};
+
+/// All sheets in one: vertices, springs by vertex, triangles.
+struct ClothState {
+  int vertices = 0, triangles = 0;
+  // kept from step to step
+  VecColumn position, velocity;
+  // fixed
+  Column<float> mass, inverse_mass;     // kg; inverse 0 where pinned
+  Column<float> damping_rate;           // 1/s
+  int padded = 0, spring_slots = 0;     // vertices up to a multiple of 8; springs of the busiest one
+  Column<int> spring_end;               // other vertex, slot s of vertex i at s padded + i
+  Column<int> slot_offset;              // other vertex - vertex, where it is the same all over a slot; else 0
+  Column<float> rest_length, stiffness, spring_damping;  // m, N/m, N s/m
+  Column<int> corner;                   // 3 a triangle
+  Column<int> neighbour;                // 3 a triangle: across edges ab, bc, ca; -1 is a free edge
+  Column<int> sheet;                    // of a triangle
+  Column<float> half_thickness;         // m, of a triangle
+  VecColumn rest_centroid;              // m
+  Column<int> fan_start, fan_entry;     // CSR by vertex: 3 triangle + corner
+  Column<int> rim;                      // 1 where a vertex lies on a free edge
+  // rebuilt
+  VecColumn next, next_velocity;        // the substep being made
+  VecColumn start;                      // at the start of the step
+  VecColumn centroid;
+  Column<float> radius2;                // m^2, centroid to farthest corner
+  Column<int> cell, order, cell_start;  // polygons by centroid
+  GridShape grid{};
+  float largest_radius = 0;             // m
+  Vec3<float> low{}, high{};            // m, bounds of all vertices
+  VecColumn predicted;                  // m/s, mean over the step
+  Column<float> share;                  // sum of contact weights
+  VecColumn force;                      // N from the fluid, constant over the step
+  Column<int> held;                     // 1 where the path test stops a vertex for this substep
+};
+
+/// Contacts sorted by triangle.
+struct ContactState {
+  Column<int> key, order, start;
+  int near = 0;  // particles within the support radius of a sheet: the first of order
+};
+
+struct State {
+  Parameters parameters;
+  WallTableData wall_table{};  // of the paper coupling
+  FluidState fluid;
+  ClothState cloth;
+  ContactState contact;
+  SortScratch scratch;
+  VecColumn swap_vector;
+  Column<int> swap_int;
+  double dt = 0;            // s, of the step being made
+  int substeps = 1;         // cloth steps in it
+  uint64_t guard_hits = 0;  // particles held back by the path test, since the start
+  uint64_t guard_holds = 0; // substeps in which vertices had to be stopped
+};
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,25 @@
+#pragma once
+// The passes of a step in order. A pass that is not in the plan costs no memory and no launch.
+
+#include "sim/solver.h"
+#include "sim/state.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct Pass {
+  const char* name;
+  bool (*when)(const Parameters& p, bool cloth);
+  unsigned reads, writes;  // ColumnGroup
+  void (*launch)(State& state);
+};
+
+/// Every pass there is, in order; the plan of a shot is those whose `when` holds.
+std::vector<Pass> step_plan(const Parameters& parameters, bool cloth);
+
+/// A step of cloth that no fluid touches.
+void step_cloth_alone(State& state);
+
+/// Limits of the current state.
+Limits measure_limits(State& state);
+
+}  // namespace drench::sim::DRENCH_BACKEND
