@@ -59,8 +59,8 @@ uint32_t AliasTable::sample(float& u) const {
 
 Environment::Environment(const Light& light, Sampling sampling)
     : scale_(light.radiance),
-      horizon_(light.radiance),
-      ground_(light.radiance),
+      horizon_(light.radiance * light.horizon),
+      ground_(light.radiance * light.below),
       rotation_(float(light.rotation_deg / 360 - std::floor(light.rotation_deg / 360))) {
   if (!light.map.empty()) read_map(light);
   const int columns = is_map() ? map_.width : kGradientColumns;
@@ -134,7 +134,7 @@ V3f Environment::from_map(const V2f& uv) const {
 V3f Environment::radiance(const V3f& d) const {
   if (!is_map()) {
     if (d.y < 0) return ground_;
-    const float t = 1 - d.y, rise = t * t * t;  // most of the change lies near the horizon
+    const float t = 1 - std::min(d.y, 1.f), rise = t * t * t;  // most change lies near the horizon
     return scale_ * (1 - rise) + horizon_ * rise;
   }
   const V2f uv = to_map(d);

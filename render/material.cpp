@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/shot_table.h"
 
 namespace drench {
 
@@ -15,24 +16,6 @@ const Material* named(const std::vector<Material>& materials, const std::string&
   for (const Material& m : materials)
     if (m.name == name) return &m;
   return nullptr;
-}
-
-std::vector<Material> built_in_materials() {
-  Material water;
-  water.name = "water";
-  water.type = MaterialType::dielectric;
-  water.ior = 1.333;
-  water.absorption = {0.45f, 0.07f, 0.03f};
-  Material cotton;
-  cotton.name = "cotton";
-  cotton.type = MaterialType::cloth;
-  cotton.reflectance = {0.55f, 0.52f, 0.48f};
-  cotton.transmittance = {0.25f, 0.23f, 0.2f};
-  Material ground;
-  ground.name = "ground";
-  ground.type = MaterialType::diffuse;
-  ground.reflectance = {0.4f, 0.4f, 0.4f};
-  return {water, cotton, ground};
 }
 
 void check(const Material& m) {
@@ -68,9 +51,8 @@ V3f ShadingMaterial::reflectance_at(const V2f& uv) const {
 }
 
 ShadingMaterial find_material(const Shot& shot, const std::string& name) {
-  static const std::vector<Material> built_in = built_in_materials();
   const Material* found = named(shot.material, name);
-  if (!found) found = named(built_in, name);
+  if (!found) found = named(shot_table::built_in_materials(), name);
   if (!found)
     throw Error(
         fmt::format("material '{}' is used but the shot has no such material; add a "

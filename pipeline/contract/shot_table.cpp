@@ -161,7 +161,7 @@ std::vector<Parameter> shot_rows() {
 
 std::vector<Parameter> fluid_rows() {
   return {
-      row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh,
+      row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh | render,
                            "distance a of particles at rest; a particle has mass rest_density a^3"),
       row<&Fluid::support_ratio>("fluid", "support_ratio", "", {0, 6}, simulate,
                                  "support radius of the kernels / spacing"),
@@ -317,6 +317,14 @@ std::vector<Parameter> look_rows() {
       row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")
           .only(environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
+          .only(environment),
+      row<&Light::horizon>("light", "horizon", "", {0, 1000}, render,
+                           "sky without a map: radiance at the horizon over that at the zenith")
+          .as(Kind::spectrum)
+          .only(environment),
+      row<&Light::below>("light", "below", "", {0, 1000}, render,
+                         "sky without a map: radiance below the horizon over that at the zenith")
+          .as(Kind::spectrum)
           .only(environment),
 
       row<&Material::name>("material", "name", "", none, render, "built-in ones may be redefined")
