@@ -39,7 +39,8 @@ void CheckpointKeeper::remove_stale() {
 }
 
 void CheckpointKeeper::remove(const std::string& file) {
-  // The record first: a kill in between leaves a file that nothing trusts, removed at the next start.
+  // The record first: a kill in between leaves a file that nothing trusts, removed at the next
+  // start.
   manifest_.drop(file);
   std::error_code code;
   fs::remove(folder_ / file, code);

@@ -1,7 +1,7 @@
 #include "pipeline/driver/command_line.h"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <exception>
@@ -97,9 +97,7 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   init->callback([&arguments] { init_command(arguments.name); });
 }
 
-void say(const char* kind, const char* text) {
-  std::fprintf(stderr, "drench: %s%s\n", kind, text);
-}
+void say(const char* kind, const char* text) { std::fprintf(stderr, "drench: %s%s\n", kind, text); }
 
 int parse_and_run(int argc, char** argv) {
   Arguments arguments;
@@ -133,8 +131,9 @@ int drench_program(int argc, char** argv) {
     say("", error.what());
     return user_error;
   } catch (const std::bad_alloc&) {
-    say("", "not enough memory; close other programs, or make the scene smaller (fluid.spacing, "
-            "surface.voxel, render size)");
+    say("",
+        "not enough memory; close other programs, or make the scene smaller (fluid.spacing, "
+        "surface.voxel, render size)");
     return user_error;
   } catch (const std::exception& bug) {
     say("this is a bug in drench, please report it: ", bug.what());

@@ -33,8 +33,8 @@ struct Job {
 Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
   Job job;
   job.shot = read_shot(arguments.shot, {.quality = arguments.quality, .set = arguments.set});
-  job.folder = arguments.out.empty() ? fs::path("out") / job.shot.name / arguments.quality
-                                     : arguments.out;
+  job.folder =
+      arguments.out.empty() ? fs::path("out") / job.shot.name / arguments.quality : arguments.out;
   std::vector<int> frames = arguments.frames.empty()
                                 ? all_frames(job.shot.timeline)
                                 : parse_frames(arguments.frames, job.shot.timeline);
@@ -101,8 +101,8 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
     log_info("driver", fmt::format("nothing to do: all {} steps of {} are up to date",
                                    counts.skipped, job.folder.string()));
   } else {
-    log_info("driver", fmt::format("done: {} frames in {}", job.wanted.frames.size(),
-                                   job.folder.string()));
+    log_info("driver",
+             fmt::format("done: {} frames in {}", job.wanted.frames.size(), job.folder.string()));
   }
 }
 
@@ -129,8 +129,8 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
   const std::unique_ptr<Stages> stages =
       shot_stages(job.shot, job.folder, {arguments.device, arguments.memory_gib});
   for (int attempt = 1;; ++attempt) {
-    const Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest),
-                                job.shot.timeline.last);
+    const Plan plan =
+        make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
     if (plan.nothing_to_do()) return plan;
@@ -166,10 +166,10 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
   remove_leftovers(job.folder);
   Manifest manifest(job.folder / layout::manifest);
   if (manifest.damaged_lines() > 0) {
-    log_warning("driver", fmt::format("{}: {} damaged records dropped; what they named is checked "
-                                      "or made again",
-                                      (job.folder / layout::manifest).string(),
-                                      manifest.damaged_lines()));
+    log_warning("driver",
+                fmt::format("{}: {} damaged records dropped; what they named is checked "
+                            "or made again",
+                            (job.folder / layout::manifest).string(), manifest.damaged_lines()));
   }
   manifest.open_for_append();
   const Plan plan = make_all(job, arguments, manifest);
@@ -187,9 +187,10 @@ void plan_command(const ShotArguments& arguments) {
 void clean_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   if (!fs::exists(job.folder / layout::manifest)) {
-    throw Error(fmt::format("{}: holds no manifest; nothing was made here. Give the --out or "
-                            "--quality it was made with",
-                            job.folder.string()));
+    throw Error(
+        fmt::format("{}: holds no manifest; nothing was made here. Give the --out or "
+                    "--quality it was made with",
+                    job.folder.string()));
   }
   const FolderLock lock(job.folder);
   remove_leftovers(job.folder);
@@ -248,9 +249,10 @@ void verify_command(const fs::path& folder, bool as_json) {
     print(text);
   }
   if (bad.empty()) return;
-  throw Error(fmt::format("{}: {} of {} files are missing or damaged, the first is {}; `drench run` "
-                          "makes them again",
-                          folder.string(), bad.size(), records.size(), bad.front()));
+  throw Error(
+      fmt::format("{}: {} of {} files are missing or damaged, the first is {}; `drench run` "
+                  "makes them again",
+                  folder.string(), bad.size(), records.size(), bad.front()));
 }
 
 void init_command(const fs::path& name) {
@@ -262,8 +264,8 @@ void init_command(const fs::path& name) {
                             file.string()));
   }
   write_file_whole(file, starting_shot(file.stem().string()));
-  log_info("driver", fmt::format("wrote {}; `drench run {}` makes its frames", file.string(),
-                                 file.string()));
+  log_info("driver",
+           fmt::format("wrote {}; `drench run {}` makes its frames", file.string(), file.string()));
 }
 
 }  // namespace drench

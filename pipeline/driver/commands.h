@@ -14,11 +14,11 @@ namespace drench {
 /// Options of every command that takes a shot.
 struct ShotArguments {
   std::filesystem::path shot;
-  std::filesystem::path out;   // empty: out/<shot>/<quality>
-  std::string frames;          // empty: all of the shot
+  std::filesystem::path out;  // empty: out/<shot>/<quality>
+  std::string frames;         // empty: all of the shot
   Device device = Device::automatic;
-  int threads = 0;             // 0: all cores
-  double memory_gib = 0;       // 0: no limit
+  int threads = 0;        // 0: all cores
+  double memory_gib = 0;  // 0: no limit
   std::vector<std::string> set;
   std::string quality = "final";
   bool json = false;

@@ -21,16 +21,17 @@ struct Picture {
   std::vector<uint8_t> rgb;
 };
 
-/// Thumbnails of up to 64 frames, evenly picked, averaged in linear light and then taken through the
-/// view transform; frame numbers in the corner.
+/// Thumbnails of up to 64 frames, evenly picked, averaged in linear light and then taken through
+/// the view transform; frame numbers in the corner.
 /// @param images  at least one; frames of different sizes are an error.
 /// @throws Error if a frame cannot be read.
 Picture contact_sheet(const std::vector<NumberedImage>& images);
 WrittenFile write_contact_sheet(const std::filesystem::path& path,
                                 const std::vector<NumberedImage>& images);
 
-/// Writes digits and '-' of a built-in 5 x 7 font, white with a dark rim, `scale` pixels a dot, with
-/// the top left corner of the first character at (x, y). What lies outside the picture is cut off.
+/// Writes digits and '-' of a built-in 5 x 7 font, white with a dark rim, `scale` pixels a dot,
+/// with the top left corner of the first character at (x, y). What lies outside the picture is cut
+/// off.
 void draw_number(Picture& picture, int x, int y, int scale, std::string_view text);
 
 }  // namespace drench

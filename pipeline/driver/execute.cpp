@@ -161,8 +161,7 @@ void Executor::compute(tbb::task_arena& arena, const Work& work) {
   slots_.release();
 }
 
-void Executor::commit(const std::vector<WrittenFile>& files, Step step, int frame,
-                      const Key& key) {
+void Executor::commit(const std::vector<WrittenFile>& files, Step step, int frame, const Key& key) {
   for (const WrittenFile& written : files) {
     Record record = record_of_file(folder_, written);
     record.step = step_name(step);
@@ -367,11 +366,10 @@ void Executor::watch() {
       if (options_.abandon) options_.abandon();
     }
     if (limit > 0 && !stopping() && resident_memory() > limit) {
-      fail(std::make_exception_ptr(Error(
-          fmt::format("{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was "
-                      "stopped with a checkpoint. Give more, or a larger spacing",
-                      folder_.string(), double(resident_memory()) / double(1 << 30),
-                      options_.memory_gib))));
+      fail(std::make_exception_ptr(Error(fmt::format(
+          "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was "
+          "stopped with a checkpoint. Give more, or a larger spacing",
+          folder_.string(), double(resident_memory()) / double(1 << 30), options_.memory_gib))));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -22,7 +22,8 @@ struct ExecuteOptions {
   std::function<void()> abandon;  // called when that is over; everything committed is safe
 };
 
-/// A file that should have been there is missing or damaged. Its record is dropped already: plan again.
+/// A file that should have been there is missing or damaged. Its record is dropped already: plan
+/// again.
 class PlanAgain : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,10 +31,10 @@ class PlanAgain : public std::runtime_error {
 
 /// Brings the folder to what is wanted.
 /// @param manifest  open for append, the folder's lock held.
-/// @throws Stopped after a stop request, with a checkpoint written; PlanAgain; Error of a stage, after
+/// @throws Stopped after a stop request, with a checkpoint written; PlanAgain; Error of a stage,
+/// after
 ///         the simulation wrote a checkpoint so that none of its work is lost.
 void execute(const Wanted& wanted, const Plan& plan, const std::filesystem::path& folder,
-             Manifest& manifest, Stages& stages, Progress& progress,
-             const ExecuteOptions& options);
+             Manifest& manifest, Stages& stages, Progress& progress, const ExecuteOptions& options);
 
 }  // namespace drench

@@ -16,9 +16,10 @@ namespace {
 constexpr int64_t max_frames = 1'000'000;
 
 [[noreturn]] void reject(std::string_view item, std::string_view why) {
-  throw Error(fmt::format("--frames: '{}' {}; write for example 1001-1048, 1001-1048x2 or "
-                          "1001,1010-1020",
-                          item, why));
+  throw Error(
+      fmt::format("--frames: '{}' {}; write for example 1001-1048, 1001-1048x2 or "
+                  "1001,1010-1020",
+                  item, why));
 }
 
 /// Takes a signed integer off the front of `rest`.

@@ -9,12 +9,14 @@
 
 namespace drench {
 
-/// Frames of a comma-separated list; each item is `a`, `a-b`, `a-bxstep` (every step-th frame from a)
-/// or `axstep` (from a to the shot's last frame). Signs belong to numbers: `-5--1` is five frames.
+/// Frames of a comma-separated list; each item is `a`, `a-b`, `a-bxstep` (every step-th frame from
+/// a) or `axstep` (from a to the shot's last frame). Signs belong to numbers: `-5--1` is five
+/// frames.
 ///
 /// @param timeline  frames before its first do not exist; frames after its last are allowed.
 /// @return sorted, each frame once, at least one.
-/// @throws Error naming the item: not of these forms, backwards, step < 1, before the first frame, or
+/// @throws Error naming the item: not of these forms, backwards, step < 1, before the first frame,
+/// or
 ///         more than 1,000,000 frames.
 std::vector<int> parse_frames(std::string_view text, const Timeline& timeline);
 

@@ -1,6 +1,7 @@
 #pragma once
-// OUT/manifest.jsonl: what every file of an output folder is and which key made it. Append-only, one
-// JSON object a line, each with a checksum, so that a torn or damaged line is dropped and never used.
+// OUT/manifest.jsonl: what every file of an output folder is and which key made it. Append-only,
+// one JSON object a line, each with a checksum, so that a torn or damaged line is dropped and never
+// used.
 
 #include <cstdint>
 #include <filesystem>

@@ -118,15 +118,45 @@ std::vector<std::string> encode_command(const fs::path& ffmpeg, const fs::path& 
   // bitexact and no metadata: no version strings or times; a fixed thread count: the encoder's
   // decisions depend on it.
   std::vector<std::string> command{
-      ffmpeg.string(), "-nostdin", "-hide_banner", "-loglevel", "error", "-y",
-      "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", fmt::format("{}x{}", width, height),
-      "-r", fmt::format("{}", fps), "-i", "pipe:0",
-      "-vf", "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0,"
-             "scale=out_color_matrix=bt709:out_range=tv:flags=bitexact+accurate_rnd",
-      "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709",
-      "-color_range", "tv", "-pix_fmt", "yuv420p", "-map_metadata", "-1",
-      "-fflags", "+bitexact", "-flags:v", "+bitexact", "-threads", "2",
-      "-c:v", std::string(codec)};
+      ffmpeg.string(),
+      "-nostdin",
+      "-hide_banner",
+      "-loglevel",
+      "error",
+      "-y",
+      "-f",
+      "rawvideo",
+      "-pix_fmt",
+      "rgb24",
+      "-s",
+      fmt::format("{}x{}", width, height),
+      "-r",
+      fmt::format("{}", fps),
+      "-i",
+      "pipe:0",
+      "-vf",
+      "crop=trunc(iw/2)*2:trunc(ih/2)*2:0:0,"
+      "scale=out_color_matrix=bt709:out_range=tv:flags=bitexact+accurate_rnd",
+      "-colorspace",
+      "bt709",
+      "-color_primaries",
+      "bt709",
+      "-color_trc",
+      "bt709",
+      "-color_range",
+      "tv",
+      "-pix_fmt",
+      "yuv420p",
+      "-map_metadata",
+      "-1",
+      "-fflags",
+      "+bitexact",
+      "-flags:v",
+      "+bitexact",
+      "-threads",
+      "2",
+      "-c:v",
+      std::string(codec)};
   if (codec == "libx264") {
     command.insert(command.end(), {"-preset", "medium", "-crf", "18"});
   } else {
@@ -152,9 +182,10 @@ std::string encode(const fs::path& file, const std::vector<NumberedImage>& image
     if (keep_going && !keep_going()) throw Stopped("stopped while making the movie");
     if (k > 0) film = read_exr(images[k].file);
     if (film.width != width || film.height != height) {
-      throw Error(fmt::format("{}: has {} x {} pixels, the frames before have {} x {}; render all "
-                              "frames at one size",
-                              images[k].file.string(), film.width, film.height, width, height));
+      throw Error(
+          fmt::format("{}: has {} x {} pixels, the frames before have {} x {}; render all "
+                      "frames at one size",
+                      images[k].file.string(), film.width, film.height, width, height));
     }
     const std::vector<uint8_t> rgb = view_transform(film);
     if (!child.send(rgb.data(), rgb.size())) break;

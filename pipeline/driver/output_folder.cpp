@@ -63,9 +63,10 @@ FolderLock::FolderLock(const fs::path& folder) {
     if (reason != EWOULDBLOCK) {
       throw Error(fmt::format("{}: cannot be locked: {}", file.string(), system_reason(reason)));
     }
-    throw Error(fmt::format("{}: {} is working in this folder; wait until it has ended, or give "
-                            "another --out",
-                            folder.string(), holder));
+    throw Error(
+        fmt::format("{}: {} is working in this folder; wait until it has ended, or give "
+                    "another --out",
+                    folder.string(), holder));
   }
   const std::string note = fmt::format("process {} on {}\n", ::getpid(), host_name());
   // The note only serves the message above: the lock holds without it.
@@ -110,9 +111,10 @@ bool has_recorded_digest(const fs::path& folder, const Record& record) {
 Record record_of_file(const fs::path& folder, const WrittenFile& written) {
   struct stat status {};
   if (::lstat(written.path.c_str(), &status) != 0) {
-    throw Error(fmt::format("{}: vanished just after it was written; does another program clean "
-                            "this folder?",
-                            written.path.string()));
+    throw Error(
+        fmt::format("{}: vanished just after it was written; does another program clean "
+                    "this folder?",
+                    written.path.string()));
   }
   Record record;
   record.file = written.path.lexically_relative(folder).generic_string();

@@ -2,10 +2,11 @@
 // An output folder: its lock, its manifest, and whether its files still are what the manifest says.
 //
 // A file is trusted when its size and modification time are those recorded: reading hundreds of MB
-// to find out that nothing is to be done would take longer than half a second. The time is a hint in
-// one direction only: where it or the size differs, the file is hashed, and the digest decides. The
-// hint cannot see a disk that flips bits in place. That is found where a stage reads the file (the
-// digest of every input is checked before use) and by `drench verify`, which hashes everything.
+// to find out that nothing is to be done would take longer than half a second. The time is a hint
+// in one direction only: where it or the size differs, the file is hashed, and the digest decides.
+// The hint cannot see a disk that flips bits in place. That is found where a stage reads the file
+// (the digest of every input is checked before use) and by `drench verify`, which hashes
+// everything.
 
 #include <filesystem>
 #include <map>
@@ -16,12 +17,12 @@
 
 namespace drench {
 
-/// Kernel lock on an output folder (flock): released by the kernel when its process ends, however it
-/// ends, so that none is ever stale.
+/// Kernel lock on an output folder (flock): released by the kernel when its process ends, however
+/// it ends, so that none is ever stale.
 class FolderLock {
  public:
-  /// Makes the folder if needed. @throws Error if another driver holds it, saying who, or the folder
-  /// cannot be written.
+  /// Makes the folder if needed. @throws Error if another driver holds it, saying who, or the
+  /// folder cannot be written.
   explicit FolderLock(const std::filesystem::path& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -82,8 +82,8 @@ class Planner {
   void add(Step step, int frame, Action action, std::string reason) {
     plan_.tasks.push_back({step, frame, action, std::move(reason)});
   }
-  void add_made_from(Step step, int frame, const std::optional<Decision>& decision,
-                     Action input, const std::vector<std::string>& files, const StageKey& stage);
+  void add_made_from(Step step, int frame, const std::optional<Decision>& decision, Action input,
+                     const std::vector<std::string>& files, const StageKey& stage);
 
   const Wanted& wanted_;
   const Lookup lookup_;
@@ -99,7 +99,8 @@ bool Planner::usable_checkpoint(const std::string& file, const Key& key) const {
 void Planner::choose_start(const std::vector<Key>& keys, int first_missing) {
   SimulationSpan& span = plan_.simulation;
   span.from = wanted_.first;
-  // A checkpoint on a frame can write that frame again; the one made on stop stands after its frame.
+  // A checkpoint on a frame can write that frame again; the one made on stop stands after its
+  // frame.
   for (int frame = first_missing; frame > wanted_.first; --frame) {
     if (usable_checkpoint(layout::checkpoint(frame), keys[size_t(frame - wanted_.first)])) {
       span.checkpoint = layout::checkpoint(frame);
@@ -158,9 +159,10 @@ void Planner::add_made_from(Step step, int frame, const std::optional<Decision>&
 
 void Planner::check_inputs(const std::vector<std::string>& missing, const char* command) {
   if (missing.empty()) return;
-  plan_.problems.push_back(fmt::format("{} of the files to read are missing or damaged, the first "
-                                       "is {}; run `drench {}` for these frames, or `drench run`",
-                                       missing.size(), missing.front(), command));
+  plan_.problems.push_back(
+      fmt::format("{} of the files to read are missing or damaged, the first "
+                  "is {}; run `drench {}` for these frames, or `drench run`",
+                  missing.size(), missing.front(), command));
 }
 
 void Planner::plan_mesh() {
@@ -171,8 +173,7 @@ void Planner::plan_mesh() {
       add(Step::mesh, frame, Action::skip, "no fluid");
       continue;
     }
-    const Action input =
-        wanted_.may(Step::simulate) ? simulated_[frame] : Action::skip;
+    const Action input = wanted_.may(Step::simulate) ? simulated_[frame] : Action::skip;
     const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
     if (!decision && input == Action::skip) missing.push_back(layout::particles(frame));
     add_made_from(Step::mesh, frame, decision, input, mesh_files(wanted_, frame), wanted_.mesh);
@@ -230,7 +231,8 @@ Plan Planner::finish(const Snapshot& snapshot, int timeline_last) {
     const std::string image = layout::image(wanted_.shot, frame);
     std::vector<std::string> wanted = simulated_files(wanted_, frame);
     for (std::string& mesh : mesh_files(wanted_, frame)) wanted.push_back(std::move(mesh));
-    const bool named = file == image || std::find(wanted.begin(), wanted.end(), file) != wanted.end();
+    const bool named =
+        file == image || std::find(wanted.begin(), wanted.end(), file) != wanted.end();
     if (frame > last || frame < wanted_.first || !named) plan_.beyond.push_back(file);
   }
   return std::move(plan_);
@@ -240,9 +242,12 @@ Plan Planner::finish(const Snapshot& snapshot, int timeline_last) {
 
 std::string_view action_name(Action action) {
   switch (action) {
-    case Action::run: return "run";
-    case Action::skip: return "skip";
-    case Action::depends: return "depends";
+    case Action::run:
+      return "run";
+    case Action::skip:
+      return "skip";
+    case Action::depends:
+      return "depends";
   }
   return "";
 }
@@ -289,8 +294,8 @@ std::optional<Decision> decide_dailies(const Wanted& wanted, Step step, const Lo
   Hasher all;
   for (const auto& [file, digest] : *inputs) all.text(file).digest(digest);
   key.parts["frames"] = all.finish().hex().substr(0, 8);
-  const std::string file = step == Step::movie ? layout::movie(wanted.shot)
-                                               : std::string(layout::contact_sheet);
+  const std::string file =
+      step == Step::movie ? layout::movie(wanted.shot) : std::string(layout::contact_sheet);
   return decide({file}, key, lookup);
 }
 
@@ -320,15 +325,15 @@ std::string plan_text(const Plan& plan) {
   }
   const SimulationSpan& span = plan.simulation;
   if (span.needed) {
-    text += span.checkpoint.empty()
-                ? fmt::format("simulation starts at frame {}\n", span.from)
-                : fmt::format("simulation continues from frame {} ({})\n", span.from,
-                              span.checkpoint);
+    text += span.checkpoint.empty() ? fmt::format("simulation starts at frame {}\n", span.from)
+                                    : fmt::format("simulation continues from frame {} ({})\n",
+                                                  span.from, span.checkpoint);
   }
   if (!plan.beyond.empty()) {
-    text += fmt::format("{} files belong to frames or sheets the shot no longer has; `drench clean` "
-                        "removes them\n",
-                        plan.beyond.size());
+    text += fmt::format(
+        "{} files belong to frames or sheets the shot no longer has; `drench clean` "
+        "removes them\n",
+        plan.beyond.size());
   }
   return text;
 }

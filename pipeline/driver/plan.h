@@ -36,7 +36,7 @@ struct SimulationSpan {
 
 struct Plan {
   SimulationSpan simulation;
-  std::vector<Task> tasks;  // in order of step, then frame
+  std::vector<Task> tasks;            // in order of step, then frame
   std::vector<std::string> problems;  // inputs that no allowed step makes: nothing can run
   std::vector<std::string> warnings;
   std::vector<std::string> beyond;  // listed files of frames outside the timeline or not wanted

@@ -8,9 +8,9 @@
 
 namespace drench {
 
-/// Sets flush-to-zero and denormals-are-zero for this thread and, while it lives, every thread of TBB
-/// that works for it (in its implicit arena) or in the arena given: a result must not depend on which
-/// thread computed it. Threads started by this one inherit the mode.
+/// Sets flush-to-zero and denormals-are-zero for this thread and, while it lives, every thread of
+/// TBB that works for it (in its implicit arena) or in the arena given: a result must not depend on
+/// which thread computed it. Threads started by this one inherit the mode.
 class ArithmeticMode {
  public:
   ArithmeticMode();

@@ -21,9 +21,7 @@ std::string clock_text(double seconds) {
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
-std::string_view log_part(Step step) {
-  return step == Step::simulate ? "sim" : step_name(step);
-}
+std::string_view log_part(Step step) { return step == Step::simulate ? "sim" : step_name(step); }
 
 }  // namespace
 
@@ -57,8 +55,9 @@ void Progress::done(Step step, int frame, double seconds, std::string_view line)
   }
   if (style_ != ProgressStyle::lines) return;
   const bool framed = step != Step::contact_sheet && step != Step::movie;
-  log_info(log_part(step), fmt::format("{}{}{}ms={:.0f}", framed ? fmt::format("frame={} ", frame) : "",
-                                       line, line.empty() ? "" : " ", seconds * 1000));
+  log_info(log_part(step),
+           fmt::format("{}{}{}ms={:.0f}", framed ? fmt::format("frame={} ", frame) : "", line,
+                       line.empty() ? "" : " ", seconds * 1000));
 }
 
 void Progress::not_needed(Step step, int frame) {
@@ -101,8 +100,8 @@ std::string Progress::text() const {
                       std::string(size_t(width - filled), '-'));
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
   if (frames > 0 && since.count() > 0) {
-    text += fmt::format("  {:.1f} frames/min  {} left", 60 * frames / since.count(),
-                        clock_text(left));
+    text +=
+        fmt::format("  {:.1f} frames/min  {} left", 60 * frames / since.count(), clock_text(left));
   }
   return text;
 }

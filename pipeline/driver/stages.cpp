@@ -38,9 +38,9 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"kinetic_energy", step.kinetic_energy},
                      {"guard_hits", step.guard_hits}}
                     .dump();
-  report.line = fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
-                            step.steps, step.cloth_substeps, step.limit, step.particles,
-                            step.max_speed);
+  report.line =
+      fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
+                  step.steps, step.cloth_substeps, step.limit, step.particles, step.max_speed);
   return report;
 }
 
@@ -131,8 +131,8 @@ class ShotStages final : public Stages {
 
   StageReport contact_sheet(const fs::path& folder, const std::vector<int>& frames) override {
     StageReport report;
-    report.files.push_back(write_contact_sheet(folder / layout::contact_sheet,
-                                               images(folder, frames)));
+    report.files.push_back(
+        write_contact_sheet(folder / layout::contact_sheet, images(folder, frames)));
     return report;
   }
 

@@ -78,9 +78,8 @@ StageKey simulate_key(const Shot& shot, const std::string& device_class) {
 }
 
 StageKey render_key(const Shot& shot) {
-  StageKeyBuilder builder(
-      "render", build_id::render,
-      sections_of(shot, {"camera", "light", "material", "ground", "render"}));
+  StageKeyBuilder builder("render", build_id::render,
+                          sections_of(shot, {"camera", "light", "material", "ground", "render"}));
   builder.settings(stage_settings_digest(shot, Stage::render))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first);
@@ -93,11 +92,16 @@ StageKey render_key(const Shot& shot) {
 
 std::string_view step_name(Step step) {
   switch (step) {
-    case Step::simulate: return "simulate";
-    case Step::mesh: return "mesh";
-    case Step::render: return "render";
-    case Step::contact_sheet: return "contact sheet";
-    case Step::movie: return "movie";
+    case Step::simulate:
+      return "simulate";
+    case Step::mesh:
+      return "mesh";
+    case Step::render:
+      return "render";
+    case Step::contact_sheet:
+      return "contact sheet";
+    case Step::movie:
+      return "movie";
   }
   return "";
 }
@@ -121,9 +125,8 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
                     .settings(stage_settings_digest(shot, Stage::mesh))
                     .finish();
   wanted.render = render_key(shot);
-  wanted.dailies = StageKeyBuilder("dailies", build_id::dailies, {})
-                       .number("fps", shot.timeline.fps)
-                       .finish();
+  wanted.dailies =
+      StageKeyBuilder("dailies", build_id::dailies, {}).number("fps", shot.timeline.fps).finish();
   wanted.has_ffmpeg = find_ffmpeg().has_value();
   return wanted;
 }

@@ -1,5 +1,6 @@
 #pragma once
-// What a shot wants made, and the keys that say whether it is: everything a step depends on, hashed.
+// What a shot wants made, and the keys that say whether it is: everything a step depends on,
+// hashed.
 //
 //   simulate(f) = H(stage, f, simulate(f - 1))        stage = settings, input files, build, device
 //   mesh(f)     = H(stage, f, digest of particles)    digests, not keys: inputs that come out the
@@ -25,12 +26,12 @@ struct StageKey {
 
 /// The state an output folder should be brought to. Plain data: planning does no input or output.
 struct Wanted {
-  std::string shot;           // file stem
-  int first = 1001;           // of the shot's timeline: where simulation starts
-  std::vector<int> frames;    // to deliver, sorted, at least one
-  std::vector<Step> steps;    // steps that may run; a later one alone takes what lies there
-  bool fluid = false;         // false: nothing to mesh
-  bool level_set = false;     // mesh also writes a VDB
+  std::string shot;                // file stem
+  int first = 1001;                // of the shot's timeline: where simulation starts
+  std::vector<int> frames;         // to deliver, sorted, at least one
+  std::vector<Step> steps;         // steps that may run; a later one alone takes what lies there
+  bool fluid = false;              // false: nothing to mesh
+  bool level_set = false;          // mesh also writes a VDB
   std::vector<std::string> cloth;  // names of the sheets
   StageKey simulate, mesh, render, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;

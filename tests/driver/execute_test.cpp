@@ -1,0 +1,369 @@
+#include "pipeline/driver/execute.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <thread>
+
+#include "pipeline/contract/error.h"
+#include "tests/driver/folder.h"
+#include "tests/driver/toy_shot.h"
+
+namespace drench {
+namespace {
+
+using namespace std::chrono_literals;
+using test::digests_in;
+using test::Event;
+using test::flip_bit_quietly;
+using test::make_toy;
+using test::TemporaryFolder;
+using test::ToySettings;
+using test::ToyStages;
+
+std::map<std::string, std::string> undisturbed(const ToySettings& settings) {
+  const TemporaryFolder folder;
+  ToyStages stages(settings);
+  make_toy(settings, stages, folder.path());
+  return digests_in(folder.path());
+}
+
+size_t position(const std::vector<Event>& events, Step step, int frame, bool begin) {
+  const auto found = std::find_if(events.begin(), events.end(), [&](const Event& event) {
+    return event.step == step && event.frame == frame && event.begin == begin;
+  });
+  return size_t(found - events.begin());
+}
+
+TEST(Execute, MakesEveryFileOnceInTheOrderOfItsInputs) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  make_toy(settings, stages, folder.path());
+  EXPECT_EQ(stages.count(Step::simulate), 24);  // the first frame is the initial state
+  EXPECT_EQ(stages.count(Step::mesh), 25);
+  EXPECT_EQ(stages.count(Step::render), 25);
+  EXPECT_EQ(stages.count(Step::contact_sheet), 1);
+  const std::vector<Event> events = stages.events();
+  for (int frame = 2; frame <= 25; ++frame) {
+    EXPECT_LT(position(events, Step::simulate, frame, false),
+              position(events, Step::mesh, frame, true));
+    EXPECT_LT(position(events, Step::mesh, frame, false),
+              position(events, Step::render, frame, true));
+  }
+  EXPECT_EQ(events.back().step, Step::contact_sheet);
+}
+
+// Simulation of frame 5 waits for the image of frame 1: without overlap this would wait for ever
+// (and fail after 20 s).
+TEST(Execute, MeshesAndRendersWhileItSimulates) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  std::atomic<bool> overlapped{false};
+  stages.hook = [&](Step step, int frame) {
+    if (step != Step::simulate || frame != 5) return;
+    for (int k = 0; k < 2000 && !overlapped; ++k) {
+      const std::vector<Event> events = stages.events();
+      overlapped = position(events, Step::render, 1, false) < events.size();
+      std::this_thread::sleep_for(10ms);
+    }
+  };
+  make_toy(settings, stages, folder.path());
+  EXPECT_TRUE(overlapped);
+}
+
+// Two frames in the queue, one in work, one waiting to be queued, one being simulated; the log of a
+// begin may lag behind the queue by one.
+TEST(Execute, NeverRunsMoreThanTwoQueuedFramesAhead) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  stages.hook = [](Step step, int) {
+    if (step == Step::mesh) std::this_thread::sleep_for(5ms);
+  };
+  make_toy(settings, stages, folder.path());
+  int simulated = 1, meshed = 0, most = 0;
+  for (const Event& event : stages.events()) {
+    if (event.step == Step::simulate && event.begin) simulated = event.frame;
+    if (event.step == Step::mesh && event.begin) meshed = event.frame;
+    most = std::max(most, simulated - meshed);
+  }
+  EXPECT_LE(most, 5);
+}
+
+TEST(Execute, DoesNothingTheSecondTime) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  make_toy(settings, first, folder.path());
+  const std::string manifest = test::text_of(folder.path() / layout::manifest);
+  make_toy(settings, second, folder.path());
+  EXPECT_TRUE(second.events().empty());
+  EXPECT_EQ(test::text_of(folder.path() / layout::manifest), manifest);
+}
+
+TEST(Execute, RendersOnlyAfterACameraEdit) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  settings.camera = "right";
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.count(Step::simulate), 0);
+  EXPECT_EQ(second.count(Step::mesh), 0);
+  EXPECT_EQ(second.count(Step::render), 25);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+// A new program simulates again, but the files come out the same: meshing and rendering do not run.
+TEST(Execute, StopsAChangeAtTheFirstFileThatComesOutTheSame) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  settings.program = "2";
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.count(Step::simulate), 24);
+  EXPECT_EQ(second.count(Step::mesh), 0);
+  EXPECT_EQ(second.count(Step::render), 0);
+}
+
+// With growth 2 the state is 0.34 at first and 0.5 from the second frame on: one digit more of the
+// mesh changes the first frame's only.
+TEST(Execute, RendersOnlyFramesWhoseMeshChanged) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  settings.mesh_digits = 1;
+  settings.growth = 2;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  settings.mesh_digits = 2;
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.count(Step::mesh), 25);
+  EXPECT_EQ(second.frames(Step::render), (std::vector<int>{1}));
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+TEST(Execute, MakesAMissingImageAlone) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  make_toy(settings, first, folder.path());
+  std::filesystem::remove(folder.path() / layout::image("toy", 7));
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::render), (std::vector<int>{7}));
+  EXPECT_EQ(second.count(Step::mesh) + second.count(Step::simulate), 0);
+  EXPECT_EQ(second.count(Step::contact_sheet), 0);  // the image came out the same
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+// Frame 17 is lost: simulated again from the checkpoint of frame 11, no further than 17.
+TEST(Execute, MakesALostCacheAgainFromTheCheckpointBefore) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  make_toy(settings, first, folder.path());
+  std::filesystem::remove(folder.path() / layout::particles(17));
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::simulate), (std::vector<int>{12, 13, 14, 15, 16, 17}));
+  EXPECT_EQ(second.count(Step::mesh), 0);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+// Damage that neither size nor time shows is found by the stage that reads the file.
+TEST(Execute, NeverReadsADamagedInputAndMakesItAgain) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  flip_bit_quietly(folder.path() / layout::fluid_mesh(9));
+  settings.camera = "right";
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::mesh), (std::vector<int>{9}));
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+TEST(Execute, GoesOnWithoutADamagedCheckpoint) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  for (const int frame : {11, 21, 25}) flip_bit_quietly(folder.path() / layout::checkpoint(frame));
+  settings.last = 30;
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::simulate).front(), 2);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+TEST(Execute, KeepsTheLastThreeCheckpoints) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  settings.last = 55;
+  ToyStages stages(settings);
+  make_toy(settings, stages, folder.path());
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "sim/checkpoint")) {
+    files.push_back(entry.path().filename().string());
+  }
+  std::sort(files.begin(), files.end());
+  EXPECT_EQ(files,
+            (std::vector<std::string>{"frame.0041.ckpt", "frame.0051.ckpt", "frame.0055.ckpt"}));
+}
+
+TEST(Execute, ContinuesALongerRangeWithoutSimulatingAgain) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  ToyStages first(settings);
+  make_toy(settings, first, folder.path());
+  settings.last = 33;
+  ToyStages second(settings);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::simulate).front(), 26);
+  EXPECT_EQ(digests_in(folder.path()).at(layout::image("toy", 33)),
+            undisturbed(settings).at(layout::image("toy", 33)));
+}
+
+// Stops are asked for at every possible question of one frame's steps in turn: the end result has
+// the same bits as an undisturbed run.
+TEST(Execute, EndsWithTheSameBitsAfterStopsAnywhere) {
+  ToySettings settings;
+  settings.last = 13;
+  const std::map<std::string, std::string> expected = undisturbed(settings);
+  for (int questions = 1; questions < 400; questions += 23) {
+    const TemporaryFolder folder;
+    int runs = 0;
+    for (bool done = false; !done; ++runs) {
+      ASSERT_LT(runs, 1500) << "no progress";
+      ToyStages stages(settings);
+      std::atomic<int> asked{0};
+      ExecuteOptions options;
+      const int allowed = questions + 200;  // the watcher's and other stages' questions count too
+      options.stop_requested = [&] { return ++asked > allowed; };
+      try {
+        make_toy(settings, stages, folder.path(), options);
+        done = true;
+      } catch (const Stopped&) {
+      }
+    }
+    EXPECT_GT(runs, 1) << "never stopped";
+    EXPECT_EQ(digests_in(folder.path()), expected) << questions;
+  }
+}
+
+TEST(Execute, WritesACheckpointOnStopAndContinuesFromIt) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  std::atomic<bool> stop{false};
+  ExecuteOptions options;
+  options.stop_requested = [&] { return stop.load(); };
+  first.hook = [&](Step step, int frame) {
+    if (step == Step::simulate && frame == 8) stop = true;
+  };
+  EXPECT_THROW(make_toy(settings, first, folder.path(), options), Stopped);
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / layout::stop_checkpoint));
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::simulate).front(), 8);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / layout::stop_checkpoint));
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+// A blow-up leaves no file of its frame and says where to continue.
+TEST(Execute, NamesTheLastGoodCheckpointWhenTheSimulationFails) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  stages.hook = [](Step step, int frame) {
+    if (step == Step::simulate && frame == 15) throw Error("particle 7 has no finite position");
+  };
+  try {
+    make_toy(settings, stages, folder.path());
+    FAIL() << "the failure was swallowed";
+  } catch (const Error& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("particle 7"), std::string::npos) << text;
+    EXPECT_NE(text.find("frame.0011.ckpt"), std::string::npos) << text;
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / layout::particles(14)));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / layout::particles(15)));
+}
+
+// When rendering fails, the simulation's work is kept in a checkpoint.
+TEST(Execute, KeepsTheSimulationWhenALaterStageFails) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  first.hook = [](Step step, int frame) {
+    if (step == Step::render && frame == 3) throw Error("no such texture");
+  };
+  EXPECT_THROW(make_toy(settings, first, folder.path()), Error);
+  const int reached = first.frames(Step::simulate).back();
+  make_toy(settings, second, folder.path());
+  EXPECT_GE(second.frames(Step::simulate).front(), reached);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+TEST(Execute, MakesPartOfTheFramesButSimulatesAllBeforeThem) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  settings.frames = {4, 8};
+  ToyStages stages(settings);
+  make_toy(settings, stages, folder.path());
+  EXPECT_EQ(stages.frames(Step::simulate), (std::vector<int>{2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(stages.frames(Step::mesh), settings.frames);
+  EXPECT_EQ(stages.frames(Step::render), settings.frames);
+}
+
+TEST(Execute, RunsAStageAloneOnWhatLiesThere) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  settings.steps = {Step::simulate};
+  ToyStages simulating(settings);
+  make_toy(settings, simulating, folder.path());
+  EXPECT_EQ(simulating.count(Step::mesh) + simulating.count(Step::render), 0);
+  settings.steps = {Step::mesh};
+  ToyStages meshing(settings);
+  make_toy(settings, meshing, folder.path());
+  EXPECT_EQ(meshing.count(Step::simulate), 0);
+  EXPECT_EQ(meshing.count(Step::mesh), 25);
+}
+
+TEST(Execute, GivesTheSameFilesForAnyNumberOfThreads) {
+  const ToySettings settings;
+  const std::map<std::string, std::string> expected = undisturbed(settings);
+  for (const int threads : {1, 2, 5}) {
+    const TemporaryFolder folder;
+    ToyStages stages(settings);
+    ExecuteOptions options;
+    options.threads = threads;
+    make_toy(settings, stages, folder.path(), options);
+    EXPECT_EQ(digests_in(folder.path()), expected) << threads;
+  }
+}
+
+TEST(Execute, StopsWithACheckpointAboveItsMemoryLimit) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  stages.hook = [](Step, int) { std::this_thread::sleep_for(10ms); };
+  ExecuteOptions options;
+  options.memory_gib = 1e-3;  // less than this program's own code
+  try {
+    make_toy(settings, stages, folder.path(), options);
+    FAIL() << "the limit was not seen";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("--memory"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace drench
