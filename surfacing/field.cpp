@@ -27,15 +27,13 @@ void for_each_neighbour(F f) {
 }
 
 /// 2 (1-q)^3 - 8 (1/2-q)^3, each term where its base is positive: the cubic spline in one line.
-struct SplineSum {
-  Pack sum{};
-  void add(Pack distance_squared, Pack weight2, Pack weight8) {  // distance in supports
-    const Pack a = larger(1.f - square_root(distance_squared), Pack{});
-    const Pack b = larger(a - 0.5f, Pack{});
-    sum = multiply_add(a * a, a * weight2, sum);
-    sum = subtract_product(sum, b * b, b * weight8);
-  }
-};
+/// Distance in supports; adds weight W to `sum`, given twice and eight times the weight.
+Pack add_spline(Pack sum, Pack distance_squared, Pack weight2, Pack weight8) {
+  const Pack a = larger(1.f - square_root(distance_squared), Pack{});
+  const Pack b = larger(a - 0.5f, Pack{});
+  sum = multiply_add(a * a, a * weight2, sum);
+  return subtract_product(sum, b * b, b * weight8);
+}
 
 /// Adds one particle to every row of the block that it reaches. p in supports from lattice point 0.
 void splat(const V3f p, float weight, float step, FieldBlock& field) {
@@ -52,9 +50,7 @@ void splat(const V3f p, float weight, float step, FieldBlock& field) {
     for (int y = 0; y < block_edge; ++y, row += block_edge) {
       const float dy = y * step - p.y;
       if (dy * dy >= free_z) continue;
-      SplineSum sum{load(row)};
-      sum.add(dx2 + (dy * dy + dz * dz), weight2, weight8);
-      store(row, sum.sum);
+      store(row, add_spline(load(row), dx2 + (dy * dy + dz * dz), weight2, weight8));
     }
   }
 }
@@ -188,12 +184,16 @@ float ColourKernel::shape(float q) {
   return 2 * a * a * a - 8 * b * b * b;
 }
 
-float ColourKernel::full_colour() const {
+float ColourKernel::weight(float c, float offset) const {
+  constexpr float bulk = 0.95f, surface_colour = 0.85f, surface_offset = 0.2f;
   constexpr float ball_radius = 0.62035f;  // (3 / (4 pi))^(1/3): a ball of one spacing^3
-  return iso_value / shape(ball_radius / support);
+  const float lone_colour = iso_value / (bulk * shape(ball_radius / support));
+  const float one_sided = std::min(offset / surface_offset, 1.f);
+  const float wanted = lone_colour + (surface_colour - lone_colour) * one_sided;
+  return bulk * std::max(1.f, wanted / c);
 }
 
-float ColourKernel::weight(float c) const { return std::max(1.f, full_colour() / c); }
+float ColourKernel::bulk_weight() const { return weight(1, 0); }
 
 std::vector<uint8_t> count_interior(const BinnedParticles& particles) {
   const int bins = particles.lattice.bins, padded = bins + 2;
@@ -236,7 +236,7 @@ std::vector<uint8_t> count_interior(const BinnedParticles& particles) {
 std::vector<float> weigh_particles(const BinnedParticles& particles, const ColourKernel& kernel,
                                    const std::vector<uint8_t>& interior) {
   const float reach = particles.lattice.reach, step = 1 / reach;
-  std::vector<float> weight(particles.x.size(), 1.f);
+  std::vector<float> weight(particles.x.size(), kernel.bulk_weight());
   tbb::enumerable_thread_specific<NearParticles> nears;
   tbb::parallel_for(size_t{0}, particles.block.size(), [&](size_t b) {
     if (interior[b]) return;
@@ -251,15 +251,21 @@ std::vector<float> weigh_particles(const BinnedParticles& particles, const Colou
         points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
       }
       const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
-      SplineSum sum;
+      Pack sum{}, sum_x{}, sum_y{}, sum_z{};
       for_each_close(near, points, reach, [&](size_t j) {
         const Pack dx = (x - near.x[j]) * step, dy = (y - near.y[j]) * step,
                    dz = (z - near.z[j]) * step;
-        sum.add(multiply_add(dx, dx, multiply_add(dy, dy, dz * dz)), two, eight);
+        const Pack w =
+            add_spline(Pack{}, multiply_add(dx, dx, multiply_add(dy, dy, dz * dz)), two, eight);
+        sum += w;
+        sum_x = multiply_add(w, dx, sum_x);
+        sum_y = multiply_add(w, dy, sum_y);
+        sum_z = multiply_add(w, dz, sum_z);
       });
-      std::array<float, pack_width> colour;
-      store(colour.data(), sum.sum * kernel.scale());
-      for (uint32_t k = 0; k < count; ++k) weight[begin + k] = kernel.weight(colour[k]);
+      std::array<float, pack_width> colour, offset;
+      store(colour.data(), sum * kernel.scale());
+      store(offset.data(), square_root(sum_x * sum_x + sum_y * sum_y + sum_z * sum_z) / sum);
+      for (uint32_t k = 0; k < count; ++k) weight[begin + k] = kernel.weight(colour[k], offset[k]);
     }
   });
   return weight;

@@ -22,7 +22,7 @@ struct BinnedParticles {
   std::vector<uint32_t> bin_first;  // (bins^3 + 1) a block, counted from the block's first particle
   std::vector<float> x, y, z;       // voxels from the corner of the particle's block, [0, 8]
   std::vector<uint32_t> source;     // index in the frame
-  std::vector<float> weight;        // volume of the particle / spacing^3; 1 in the bulk
+  std::vector<float> weight;        // volume of the particle / spacing^3 as the field counts it
 
   const uint32_t* bins_of(uint32_t block_index) const {
     return bin_first.data() + size_t(block_index) * bin_stride();
