@@ -30,7 +30,7 @@ class ObjReader {
     for (const auto& t : mesh_.triangle) {
       if (std::max({t.x, t.y, t.z}) >= mesh_.position.size()) fail("has a face without its vertex");
     }
-    mesh_.velocity.resize(mesh_.position.size());
+    mesh_.velocity.resize(mesh_.position.size(), Imath::V3f(0));
     take_uv();
     return std::move(mesh_);
   }
@@ -143,7 +143,7 @@ class ObjReader {
       if (mine != none && uv_[mine] != uv_[*corner.texture]) return;
       mine = *corner.texture;
     }
-    mesh_.uv.resize(mesh_.position.size());
+    mesh_.uv.resize(mesh_.position.size(), Imath::V2f(0));
     for (size_t i = 0; i < chosen.size(); ++i) {
       if (chosen[i] != none) mesh_.uv[i] = uv_[chosen[i]];
     }

@@ -50,7 +50,7 @@ class Reader {
   }
 
   [[noreturn]] void fail(const std::string& where, const std::string& text) const {
-    throw Error(fmt::format("{}: {}", where, text));
+    throw Error(shot_table::printable(fmt::format("{}: {}", where, text)));
   }
 
   /// "shots/dam.toml:14"; an override is one line and named whole.
@@ -286,8 +286,9 @@ toml::table parse_toml(std::string_view text, const std::string& label) {
   try {
     return toml::parse(text, label);
   } catch (const toml::parse_error& problem) {
-    throw Error(fmt::format("{}:{}: is not valid TOML: {}", label, problem.source().begin.line,
-                            problem.description()));
+    throw Error(
+        shot_table::printable(fmt::format("{}:{}: is not valid TOML: {}", label,
+                                          problem.source().begin.line, problem.description())));
   }
 }
 
@@ -303,7 +304,8 @@ void apply_quality(Draft& draft, const toml::table& top, const std::string& labe
                     label, top.get("quality")->source().begin.line));
   }
   std::optional<Draft> chosen;
-  for (auto&& [key, node] : qualities ? *qualities : toml::table{}) {
+  static const toml::table none;
+  for (auto&& [key, node] : qualities ? *qualities : none) {  // a copy would forget its lines
     const std::string name(key.str());
     const std::string where = fmt::format("{}:{}", label, key.source().begin.line);
     if (name == "final") {
@@ -334,7 +336,7 @@ void apply_quality(Draft& draft, const toml::table& top, const std::string& labe
 
 /// "section.key=value", the value in TOML; a bare word stands for a string.
 void apply_override(Draft& draft, const std::string& text, const fs::path& folder) {
-  const std::string label = "--set " + text.substr(0, 200);
+  const std::string label = shot_table::printable("--set " + text.substr(0, 200));
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || text.find('.') > equals) {
     throw Error(

@@ -81,7 +81,8 @@ class ValueReader {
       : parameter_(parameter), value_(value), site_(site) {}
 
   [[noreturn]] void fail(const std::string& why) const {
-    throw Error(fmt::format("{}: {} is {}; {}", site_.where, site_.key, shown(value_), why));
+    throw Error(
+        printable(fmt::format("{}: {} is {}; {}", site_.where, site_.key, shown(value_), why)));
   }
 
   [[noreturn]] void wrong_type() const {
@@ -418,6 +419,13 @@ std::vector<std::string> read_grid_pins(const Parameter& parameter, const toml::
     names.emplace_back(parameter.choices[size_t(reader.choice(value))]);
   }
   return names;
+}
+
+std::string printable(std::string text) {
+  for (char& c : text) {
+    if ((c >= 0 && c < 0x20) || c == 0x7f) c = '?';
+  }
+  return text;
 }
 
 const char* file_name_problem(std::string_view name) {

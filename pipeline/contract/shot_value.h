@@ -26,6 +26,9 @@ std::vector<std::string> read_grid_pins(const Parameter& parameter, const toml::
 /// empty list, which are left out.
 std::string value_text(const Parameter& parameter, const void* field);
 
+/// The text with '?' for control characters: it may go to a terminal, and a NUL would end it.
+std::string printable(std::string text);
+
 /// Why a shot cannot have this name, or null when it can.
 const char* file_name_problem(std::string_view name);
 

@@ -1,0 +1,82 @@
+#include "pipeline/contract/vdb_archive.h"
+
+#include <fmt/format.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+
+#include <sstream>
+#include <stdexcept>
+
+#include "pipeline/contract/hash.h"
+
+namespace drench {
+
+namespace {
+
+// Magic number, file version, library version, a flag; then the UUID as text.
+constexpr size_t uuid_offset = 21;
+constexpr size_t uuid_size = 36;
+
+/// Digest of all bytes but the UUID, written as one: 8-4-4-4-12 hex digits.
+std::string content_uuid(std::string_view bytes) {
+  Hasher hasher;
+  hasher.bytes(bytes.data(), uuid_offset);
+  const std::string_view rest = bytes.substr(uuid_offset + uuid_size);
+  hasher.bytes(rest.data(), rest.size());
+  const std::string hex = hasher.finish().hex();
+  return fmt::format("{}-{}-{}-{}-{}", hex.substr(0, 8), hex.substr(8, 4), hex.substr(12, 4),
+                     hex.substr(16, 4), hex.substr(20));
+}
+
+/// With grid offsets, as a file has them: readers can then load one grid without the others.
+class SeekableArchive : public openvdb::io::Archive {
+ public:
+  void write_to(std::ostream& stream, const openvdb::GridBase::Ptr& grid) const {
+    write(stream, openvdb::GridCPtrVec{grid}, /*seekable=*/true, openvdb::MetaMap());
+  }
+};
+
+}  // namespace
+
+void initialize_vdb() {
+  static const bool done = [] {
+    openvdb::initialize();
+    return true;
+  }();
+  (void)done;
+}
+
+std::string vdb_bytes(const openvdb::GridBase::Ptr& grid) {
+  initialize_vdb();
+  SeekableArchive archive;
+  archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+  std::ostringstream stream(std::ios::binary);
+  archive.write_to(stream, grid);
+  if (!stream) throw std::bad_alloc();  // memory is all that an in-memory stream can lack
+  std::string bytes = std::move(stream).str();
+  if (bytes.size() < uuid_offset + uuid_size) throw std::logic_error("vdb_bytes: no header");
+  bytes.replace(uuid_offset, uuid_size, content_uuid(bytes));
+  return bytes;
+}
+
+openvdb::GridBase::Ptr vdb_grid(std::string_view bytes) {
+  initialize_vdb();
+  if (bytes.size() < uuid_offset + uuid_size || !bytes.starts_with(" BDV")) {
+    throw std::runtime_error("it is not an OpenVDB file or was cut off");
+  }
+  // OpenVDB itself accepts flipped bits and many truncations without a word.
+  if (bytes.substr(uuid_offset, uuid_size) != content_uuid(bytes)) {
+    throw std::runtime_error(
+        "its content does not match its own digest: damaged, or not written by "
+        "Drench");
+  }
+  std::istringstream stream{std::string(bytes), std::ios::binary};
+  openvdb::io::Stream archive(stream, /*delayLoad=*/false);
+  const openvdb::GridPtrVecPtr grids = archive.getGrids();
+  if (!stream || !grids || grids->size() != 1)
+    throw std::runtime_error("it does not hold one grid");
+  return grids->front();
+}
+
+}  // namespace drench

@@ -1,0 +1,182 @@
+#include "pipeline/contract/mesh_file.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/contract/ply_file.h"
+#include "tests/contract/temporary_folder.h"
+
+namespace drench {
+namespace {
+
+namespace fs = std::filesystem;
+using test::error_of;
+using test::TemporaryFolder;
+
+/// A grid of 4 x 3 vertices with every column filled with values that no other place has.
+TriangleMesh full_sheet() {
+  TriangleMesh mesh;
+  for (uint32_t j = 0; j < 3; ++j) {
+    for (uint32_t i = 0; i < 4; ++i) {
+      const float a = float(i) + 0.1f, b = float(j) + 0.01f;
+      mesh.position.emplace_back(a, b, 1e-20f);
+      mesh.velocity.emplace_back(-a, 3e7f * b, a * b);
+      mesh.normal.emplace_back(0.f, 0.6f, 0.8f);
+      mesh.uv.emplace_back(a / 4, b / 3);
+      mesh.rest_position.emplace_back(b, a, -0.f);
+      if (i == 3 || j == 2) continue;
+      const uint32_t k = j * 4 + i;
+      mesh.triangle.emplace_back(k, k + 1, k + 5);
+      mesh.triangle.emplace_back(k, k + 5, k + 4);
+    }
+  }
+  return mesh;
+}
+
+void expect_same(const TriangleMesh& a, const TriangleMesh& b) {
+  EXPECT_EQ(a.position, b.position);
+  EXPECT_EQ(a.velocity, b.velocity);
+  EXPECT_EQ(a.normal, b.normal);
+  EXPECT_EQ(a.uv, b.uv);
+  EXPECT_EQ(a.rest_position, b.rest_position);
+  EXPECT_EQ(a.triangle, b.triangle);
+}
+
+TEST(MeshFile, ReturnsEveryColumnBitForBit) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = full_sheet();
+  write_mesh(folder / "sheet.ply", mesh);
+  expect_same(read_mesh(folder / "sheet.ply"), mesh);
+}
+
+TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh = full_sheet();
+  mesh.normal.clear();
+  mesh.uv.clear();
+  mesh.rest_position.clear();
+  write_mesh(folder / "sheet.ply", mesh);
+  expect_same(read_mesh(folder / "sheet.ply"), mesh);
+}
+
+TEST(MeshFile, HoldsAnEmptyMesh) {
+  const TemporaryFolder folder;
+  write_mesh(folder / "empty.ply", {});
+  expect_same(read_mesh(folder / "empty.ply"), {});
+}
+
+TEST(MeshFile, GivesEqualBytesForEqualMeshes) {
+  const TemporaryFolder folder;
+  const WrittenFile one = write_mesh(folder / "one.ply", full_sheet());
+  const WrittenFile two = write_mesh(folder / "two.ply", full_sheet());
+  EXPECT_EQ(one.digest, two.digest);
+}
+
+TEST(MeshFile, IsNotWrittenWithAValueThatIsNotFinite) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh = full_sheet();
+  mesh.velocity[7].y = std::numeric_limits<float>::quiet_NaN();
+  const std::string text = error_of([&] { write_mesh(folder / "sheet.ply", mesh); });
+  EXPECT_NE(text.find("vertex 7"), std::string::npos) << text;
+  EXPECT_TRUE(folder.names().empty());
+}
+
+constexpr const char* ascii_quad =
+    "ply\nformat ascii 1.0\ncomment made by hand\nelement vertex 4\nproperty double x\n"
+    "property float y\nproperty float z\nproperty uchar red\nelement face 1\n"
+    "property list uchar int vertex_index\nend_header\n"
+    "0 0 0 255\n1 0 0 255\n+1 1e0 0 255\n0 1 0 255\n4 0 1 2 3\n";
+
+// A square cut into two triangles keeps its area of 1 and its orientation along +z.
+TEST(MeshFile, CutsPolygonsOfAsciiPlyIntoTriangles) {
+  const TemporaryFolder folder;
+  write_file_whole(folder / "quad.ply", ascii_quad);
+  const TriangleMesh mesh = read_mesh(folder / "quad.ply");
+  ASSERT_EQ(mesh.triangle.size(), 2u);
+  Imath::V3f area(0);
+  for (const auto& t : mesh.triangle) {
+    const auto& x = mesh.position;
+    area += 0.5f * (x[t.y] - x[t.x]).cross(x[t.z] - x[t.x]);
+  }
+  EXPECT_EQ(area, Imath::V3f(0, 0, 1));
+  EXPECT_EQ(mesh.velocity, std::vector<Imath::V3f>(4, Imath::V3f(0)));
+}
+
+TEST(MeshFile, ReadsObjWithNegativeIndicesJoinedLinesAndTexture) {
+  const TemporaryFolder folder;
+  write_file_whole(folder / "quad.obj",
+                   "# a square\no thing\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\r\n"
+                   "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 \\\n 3/3/1\n"
+                   "f -4/1 -2/3 -1/4\n");
+  const TriangleMesh mesh = read_mesh(folder / "quad.obj");
+  ASSERT_EQ(mesh.triangle.size(), 2u);
+  EXPECT_EQ(mesh.triangle[0], Imath::Vec3<uint32_t>(0, 1, 2));
+  EXPECT_EQ(mesh.triangle[1], Imath::Vec3<uint32_t>(0, 2, 3));
+  ASSERT_EQ(mesh.uv.size(), 4u);
+  EXPECT_EQ(mesh.uv[3], Imath::V2f(0, 1));
+}
+
+// Splitting vertices at a texture seam would tear a sheet of cloth.
+TEST(MeshFile, KeepsObjVerticesWholeAtATextureSeam) {
+  const TemporaryFolder folder;
+  write_file_whole(folder / "seam.obj",
+                   "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\n"
+                   "f 1/1 2/2 3/3\nf 1/4 3/3 4/2\n");
+  const TriangleMesh mesh = read_mesh(folder / "seam.obj");
+  EXPECT_EQ(mesh.position.size(), 4u);
+  EXPECT_TRUE(mesh.uv.empty());
+}
+
+TEST(MeshFile, SaysWhatIsWrongWithABadFile) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+      "property float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  const std::string corners = "0 0 0\n1 0 0\n0 1 0\n";
+  const std::vector<std::array<std::string, 3>> cases{
+      {"a.ply", "solid thing", "header"},
+      {"b.ply", "plx\nend_header\n", "not a PLY"},
+      {"c.ply", head + corners + "3 0 1 3\n", "index 3"},
+      {"d.ply", head + corners + "3 0 1 -1\n", "index"},
+      {"e.ply", head + "0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n", "not finite"},
+      {"f.ply", head + "0 0 1e39\n1 0 0\n0 1 0\n3 0 1 2\n", "not finite"},
+      {"g.ply", head + corners, "cut off"},
+      {"h.ply", head + corners + "2 0 1\n", "2 vertices"},
+      {"i.ply", head + corners + "3 0 1 2\n7\n", "more data"},
+      {"j.ply", "ply\nformat binary_big_endian 1.0\nend_header\n", "binary_big_endian"},
+      {"k.ply",
+       "ply\nformat ascii 1.0\nelement vertex 4000000000000\nproperty float x\nend_header\n0\n",
+       "too short"},
+      {"l.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n", "without its vertex"},
+      {"m.obj", "v 0 0 inf\n", "m.obj:1"},
+      {"n.obj", "v 0 0 0\nf 0 1 2\n", "n.obj:2"},
+      {"o.obj", "v 0 0\n", "finite number"},
+      {"p.obj", "", "no faces"},
+      {"q.obj", "v 0 0 0\nf 1 1\n", "2 vertices"},
+      {"r.stl", "solid", ".stl"},
+  };
+  const TemporaryFolder folder;
+  for (const auto& [name, content, reason] : cases) {
+    test::write_quickly(folder / name, content);
+    const std::string text = error_of([&, &name = name] { read_mesh(folder / name); });
+    EXPECT_NE(text.find(reason), std::string::npos) << name << ": " << text;
+    EXPECT_NE(text.find(name), std::string::npos) << text;
+  }
+  EXPECT_NE(error_of([&] { read_mesh(folder / "none.ply"); }).find("does not exist"),
+            std::string::npos);
+}
+
+TEST(MeshFile, NoticesEveryTruncation) {
+  const TemporaryFolder folder;
+  write_mesh(folder / "sheet.ply", full_sheet());
+  const std::string whole = read_text(folder / "sheet.ply");
+  for (size_t size = 0; size < whole.size(); ++size) {
+    error_of([&] { read_ply("cut.ply", std::string_view(whole).substr(0, size)); });
+  }
+}
+
+}  // namespace
+}  // namespace drench

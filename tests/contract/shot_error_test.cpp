@@ -1,0 +1,250 @@
+// Every mistake in a shot gives one message: place, key, value, limit or reason, remedy.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot_table.h"
+#include "tests/contract/shot_samples.h"
+
+namespace drench {
+namespace {
+
+using shot_table::Kind;
+using shot_table::Parameter;
+using shot_table::Section;
+using test::error_of;
+using test::TemporaryFolder;
+
+/// Text of a mistake and the words that its message must hold.
+struct Mistake {
+  std::string text;
+  std::vector<std::string> words;
+};
+
+constexpr const char* box = "[[fluid.box]]\nmin = [0, 0, 0]\nmax = [0.5, 0.5, 0.5]\n";  // 3 lines
+
+class ShotError : public testing::Test {
+ protected:
+  void SetUp() override { test::write_shot_files(folder_); }
+
+  /// Each text follows the three lines of a box of fluid, so that it starts on line 4.
+  void expect_messages(const std::vector<Mistake>& mistakes) const {
+    for (const Mistake& mistake : mistakes) {
+      const std::string text =
+          error_of([&] { parse_shot(box + mistake.text, folder_ / "scene.toml"); });
+      for (const std::string& word : mistake.words) {
+        EXPECT_NE(text.find(word), std::string::npos) << mistake.text << "\n-> " << text;
+      }
+    }
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ShotError, NamesTheNearestKey) {
+  expect_messages({
+      {"[fluid]\nspaceing = 0.01\n",
+       {"scene.toml:5", "fluid.spaceing", "did you mean fluid.spacing"}},
+      {"[camra]\nfov_deg = 40\n", {"scene.toml:4", "camra", "did you mean camera"}},
+      {"[[clot]]\n", {"scene.toml:4", "did you mean cloth"}},
+      {"[fluid.boxx]\n", {"scene.toml:4", "fluid.boxx", "fluid.box"}},
+      {"[camera]\nspacing = 1\n", {"scene.toml:5", "camera.spacing", "[fluid]"}},
+      {"[coupling]\nscheme = \"exat\"\n", {"scene.toml:5", "\"exat\"", "did you mean \"exact\""}},
+      {"[domain]\nx = \"periodic\"\n", {"scene.toml:5", "domain.x", "\"open\", \"walls\""}},
+  });
+}
+
+TEST_F(ShotError, NamesWrongTypes) {
+  expect_messages({
+      {"[fluid]\nspacing = \"small\"\n",
+       {"scene.toml:5", "fluid.spacing", "\"small\"", "a number in m"}},
+      {"[render]\nsamples = 3.5\n", {"scene.toml:5", "render.samples", "whole number"}},
+      {"[shot]\nframes = 24\n", {"scene.toml:5", "shot.frames", "[1001, 1048]"}},
+      {"[shot]\ngravity = [0, -9.81]\n", {"scene.toml:5", "shot.gravity", "array of 3"}},
+      {"[render]\nmotion_blur = 1\n", {"scene.toml:5", "true or false"}},
+      {"[shot]\nseed = 1979-05-27\n", {"scene.toml:5", "a date"}},
+      {"[[camera]]\n", {"scene.toml:4", "[camera]"}},
+      {"[light]\ntype = \"sun\"\n", {"scene.toml:4", "[[light]]"}},
+      {"[camera]\nfov_deg = [[1, 40], [1, 50]]\n", {"scene.toml:5", "must rise"}},
+      {"[camera]\nposition = [[1, [0, 1]]]\n", {"scene.toml:5", "camera.position"}},
+      {"[camera]\nfov_deg = []\n", {"scene.toml:5", "camera.fov_deg"}},
+      {"[[light]]\ntype = \"sun\"\nradiance = \"srgb(1, 2)\"\n", {"scene.toml:6", "srgb(r, g, b)"}},
+      {"[[light]]\ntype = \"sun\"\nradiance = \"#12345g\"\n", {"scene.toml:6", "#rrggbb"}},
+      {"[shot]\nname = \"../x\"\n", {"scene.toml:5", "'/'"}},
+      {"[[cloth]]\nname = \"a/b\"\n", {"scene.toml:5", "letters, digits"}},
+      {"spacing 3\n", {"scene.toml:4", "not valid TOML"}},
+      {"[fluid]\nspacing = 0.01\nspacing = 0.02\n", {"scene.toml:6", "not valid TOML"}},
+  });
+}
+
+TEST_F(ShotError, NamesImpossibleValues) {
+  expect_messages({
+      {"[fluid]\nspacing = -0.01\n",
+       {"scene.toml:5", "fluid.spacing is -0.01", "between 1e-05 and 10 m"}},
+      {"[fluid]\nspacing = 0.005\nsupport_ratio = 0.8\n",
+       {"scene.toml:6", "0.004 m", "0.005 m", "no neighbours", "support_ratio = 2"}},
+      {"[shot]\nframes = [1048, 1001]\n", {"scene.toml:5", "[1048, 1001]", "Write [1001, 1048]"}},
+      {"[shot]\nframes = [0, 2147483647]\n", {"scene.toml:5", "9999999"}},
+      {"[shot]\nframes = [0, 5000000]\n", {"scene.toml:5", "at most 1000000"}},
+      {"[camera]\nshutter_open = 0.5\nshutter_close = 0.1\n",
+       {"scene.toml:5", "0.5", "0.1", "close before"}},
+      {"[domain]\nmin = [0, 3, 0]\n", {"scene.toml:5", "domain.min", "in y"}},
+      {"[fluid]\nspacing = 1e-5\n", {"scene.toml:5", "particles", "at most 2e+08"}},
+      {"[fluid]\nspacing = 1e-5\n[domain]\nmax = [1000, 2, 1]\n", {"scene.toml:5", "spacings"}},
+      {"[[fluid.box]]\nmin = [0, 0, 0]\nmax = [0.5, 9, 0.5]\n",
+       {"fluid.box[1]", "scene.toml:4", "walls at 0 and 2"}},
+      {"[[fluid.box]]\nmin = [0, 0, 0]\nmax = [0.5, 0.001, 0.5]\n",
+       {"scene.toml:4", "no particle"}},
+      {"[[fluid.box]]\nmin = [0, 0, 0]\n", {"scene.toml:4", "fluid.box[1] has no max"}},
+      {"[[fluid.sphere]]\ncenter = [0, 1, 0]\nradius = 0\n", {"scene.toml:6", "radius", "above 0"}},
+      {"[[fluid.emitter]]\ncenter = [0, 1, 0]\nradius = 0\nspeed = 1\n",
+       {"scene.toml:6", "no area"}},
+      {"[[fluid.emitter]]\ncenter = [0, 1, 0]\nradius = 0.1\nspeed = 1\nstart = 2\nstop = 1\n",
+       {"scene.toml:8", "before it starts"}},
+      {"[[fluid.emitter]]\ncenter = [0, 1, 0]\nradius = 0.1\nspeed = 1\ndirection = [0, 0, 0]\n",
+       {"scene.toml:8", "no direction"}},
+      {"[[fluid.drops]]\nmin = [0, 1, 0]\nmax = [0.1, 0.5, 0.1]\nradius = 0.1\ncount = 3\n",
+       {"scene.toml:5", "in y"}},
+  });
+}
+
+TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
+  expect_messages({
+      {"[[cloth]]\nmesh = \"none.ply\"\n",
+       {"scene.toml:5", "cloth[0].mesh", "none.ply does not exist"}},
+      {"[[cloth]]\nmesh = \".\"\n", {"scene.toml:5", "not a regular file"}},
+      {"[[cloth]]\nu = [1, 0, 0]\nv = [2, 0, 0]\n", {"scene.toml:5", "no area"}},
+      {"[[cloth]]\ncells = [4096, 4096]\n", {"scene.toml:5", "vertices"}},
+      {"[[cloth]]\nmesh = \"flag.obj\"\npins = \"corners\"\n", {"scene.toml:6", "is a mesh"}},
+      {"[[cloth]]\n[[cloth.pin]]\n", {"scene.toml:5", "cloth[0].pin[0]", "either vertices"}},
+      {"[[cloth]]\ncells = [2, 2]\n[[cloth.pin]]\nvertices = [9]\n",
+       {"scene.toml:6", "9", "0 to 8"}},
+      {"[[cloth]]\nname = \"a\"\n[[cloth]]\nname = \"a\"\n",
+       {"scene.toml:7", "\"a\"", "scene.toml:5"}},
+      {"[[light]]\ntype = \"sun\"\nname = \"k\"\n[[light]]\ntype = \"sun\"\nname = \"k\"\n",
+       {"scene.toml:9", "scene.toml:6"}},
+      {"[[light]]\nname = \"k\"\n", {"scene.toml:4", "has no type"}},
+      {"[[light]]\ntype = \"rectangle\"\nu = [0, 0, 1]\n", {"scene.toml:4", "no area"}},
+      {"[[light]]\ntype = \"sun\"\nradius = 2\n", {"scene.toml:6", "type sphere", "is a sun"}},
+      {"[[light]]\ntype = \"environment\"\nmap = \"none.exr\"\n",
+       {"scene.toml:6", "does not exist"}},
+      {"[[cloth]]\nmaterial = \"silk\"\n", {"scene.toml:5", "\"silk\"", "water, cotton, ground"}},
+      {"[[cloth]]\nmaterial = \"water\"\n", {"scene.toml:5", "open sheet"}},
+      {"[[material]]\nname = \"cotton\"\nreflectance = [0.9, 0.5, 0.5]\n",
+       {"scene.toml:6", "0.9", "0.2", "at most 1", "red"}},
+      {"[[material]]\nname = \"silk\"\n[[material]]\nname = \"silk\"\n",
+       {"scene.toml:6", "scene.toml:4"}},
+      {"[camera]\nposition = [0, 0.5, 0]\ntarget = [0, 0.5, 0]\n",
+       {"scene.toml:6", "looks nowhere"}},
+      {"[camera]\nup = [0, 0, 0]\n", {"scene.toml:5", "no direction"}},
+      {"[camera]\nposition = [0, 3, 0]\ntarget = [0, 0, 0]\n", {"along the view"}},
+  });
+}
+
+TEST_F(ShotError, NamesAShotWithoutAnythingToSimulate) {
+  const std::string text =
+      error_of([&] { parse_shot("[render]\nwidth = 64\n", folder_ / "scene.toml"); });
+  EXPECT_NE(text.find("neither fluid nor cloth"), std::string::npos) << text;
+}
+
+TEST_F(ShotError, NamesMistakesInQualities) {
+  expect_messages({
+      {"[quality.fast.render]\nwidht = 3\n", {"scene.toml:5", "did you mean render.width"}},
+      {"[quality.fast.render]\nwidth = 0\n",
+       {"scene.toml:5", "render.width is 0", "between 1 and 16384"}},
+      {"[quality.final.render]\nwidth = 3\n", {"scene.toml:4", "final is the shot as written"}},
+      {"[quality]\nfast = 3\n", {"scene.toml:5", "quality.fast"}},
+      {"[[quality]]\n", {"scene.toml:4", "quality must be a table"}},
+      {"[quality.fast.cloth.none]\ncells = [3, 3]\n", {"scene.toml:4", "no cloth.none"}},
+  });
+  const ShotOptions unknown{.quality = "fast", .set = {}};
+  const std::string text = error_of([&] { parse_shot(box, folder_ / "scene.toml", unknown); });
+  EXPECT_NE(text.find("no quality \"fast\""), std::string::npos) << text;
+}
+
+TEST_F(ShotError, NamesTheOverride) {
+  const auto message = [&](const std::string& set) {
+    return error_of([&] {
+      parse_shot(test::full_shot(), folder_ / "scene.toml", {.quality = "final", .set = {set}});
+    });
+  };
+  for (const auto& [set, word] : std::vector<std::pair<std::string, std::string>>{
+           {"fluid.spacing=-1", "between 1e-05 and 10 m"},
+           {"fluid.spacng=1", "did you mean fluid.spacing"},
+           {"fluid.support_ratio=0.5", "no neighbours"},
+           {"shot.frames=[5, 1]", "Write [1, 5]"},
+           {"fluid", "section.key=value"},
+           {"fluid.spacing", "section.key=value"},
+           {"=1", "section.key=value"},
+           {"fluid.spacing=", "TOML"},
+           {"fluid.spacing=1\nfluid.material=\"x\"", "line break"},
+           {"cloth.cells=[1, 2]", "no cloth.cells"},
+           {"cloth.7.cells=[1, 2]", "there is no cloth.7"},
+           {"cloth.sheet.name=\"other\"", "cannot be overridden"},
+           {"cloth.flag.cells=[9, 9]", "another grid"},
+           {"quality.fast.render.width=3", "quality"}}) {
+    const std::string text = message(set);
+    EXPECT_TRUE(text.starts_with("--set " + set.substr(0, set.find('\n')))) << text;
+    EXPECT_NE(text.find(word), std::string::npos) << set << "\n-> " << text;
+  }
+}
+
+/// Whether the row holds numbers that its limits bind.
+bool is_numeric(const Parameter& p) {
+  switch (p.kind) {
+    case Kind::integer:
+    case Kind::natural:
+    case Kind::number:
+    case Kind::vector:
+    case Kind::colour:
+    case Kind::spectrum:
+    case Kind::cells:
+    case Kind::frames:
+    case Kind::number_track:
+    case Kind::vector_track:
+      return true;
+    default:
+      return false;
+  }
+}
+
+std::string array_for(Kind kind, const std::string& x) {
+  if (kind == Kind::cells || kind == Kind::frames) return fmt::format("[{0}, {0}]", x);
+  if (kind == Kind::vector || kind == Kind::colour || kind == Kind::spectrum ||
+      kind == Kind::vector_track) {
+    return fmt::format("[{0}, {0}, {0}]", x);
+  }
+  return x;
+}
+
+// 10 extremes on every numeric key: each must be refused with key and limit, never taken.
+TEST_F(ShotError, RefusesExtremesOfEveryNumericKey) {
+  Shot shot = parse_shot(test::full_shot(), folder_ / "scene.toml");
+  size_t keys = 0;
+  shot_table::for_each_object(shot, [&](const Section& section, void* object,
+                                        const std::string& path) {
+    if (section.name == "cloth.pin") return;  // lists and boxes
+    for (const Parameter* p : shot_table::parameters_of(section.name)) {
+      if (!is_numeric(*p) || !shot_table::applies(*p, section, object)) continue;
+      ++keys;
+      std::string place = path;
+      std::replace(place.begin(), place.end(), '[', '.');
+      place.erase(std::remove(place.begin(), place.end(), ']'), place.end());
+      for (const char* extreme :
+           {"nan", "-nan", "inf", "-inf", "1e30", "-1e30", "9223372036854775807",
+            "-9223372036854775808", "1e308", "-1e12"}) {
+        const std::string set = fmt::format("{}.{}={}", place, p->key, array_for(p->kind, extreme));
+        const std::string text = error_of([&] {
+          parse_shot(test::full_shot(), folder_ / "scene.toml", {.quality = "final", .set = {set}});
+        });
+        EXPECT_NE(text.find(fmt::format("{}.{} is", path, p->key)), std::string::npos) << text;
+      }
+    }
+  });
+  EXPECT_GT(keys, 60u);
+}
+
+}  // namespace
+}  // namespace drench

@@ -1,0 +1,114 @@
+#pragma once
+// A shot that has one of everything, for tests that walk the whole table.
+
+#include <string>
+
+#include "pipeline/contract/files.h"
+#include "tests/contract/temporary_folder.h"
+
+namespace drench::test {
+
+/// Files that full_shot names, in `folder`.
+inline void write_shot_files(const TemporaryFolder& folder) {
+  write_file_whole(folder / "flag.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
+  write_file_whole(folder / "sky.exr", "a map");
+  write_file_whole(folder / "weave.png", "a texture");
+}
+
+inline const char* full_shot() {
+  return R"toml(# one of everything
+[shot]
+frames = [1001, 1024]
+fps = 24
+preroll = 0.5
+seed = 7
+
+[domain]
+min = [-1, 0, -1]
+max = [1, 2, 1]
+z = "open"
+
+[fluid]
+spacing = 0.02
+
+[[fluid.box]]
+min = [-0.5, 0.1, -0.5]
+max = [0.5, 0.3, 0.5]
+
+[[fluid.sphere]]
+center = [0, 1, 0]
+radius = 0.2
+
+[[fluid.emitter]]
+center = [0, 1.8, 0]
+direction = [0, -1, 0.1]
+radius = 0.1
+speed = 2
+stop = 1
+
+[[fluid.drops]]
+min = [-0.5, 1.2, -0.5]
+max = [0.5, 1.5, 0.5]
+radius = 0.05
+count = 4
+
+[[cloth]]
+name = "sheet"
+cells = [8, 6]
+pins = ["corners", "edge_v0"]
+
+[[cloth.pin]]
+box = {min = [-1, 0, -1], max = [0, 2, 0]}
+
+[[cloth]]
+name = "flag"
+mesh = "flag.obj"
+
+[[cloth.pin]]
+vertices = [0]
+
+[camera]
+position = [[1001, [0, 1, 3]], [1024, [1, 1, 3]]]
+fov_deg = [[1001, 40], [1024, 35.5]]
+interp = "smooth"
+
+[[light]]
+type = "rectangle"
+
+[[light]]
+type = "sphere"
+
+[[light]]
+type = "sun"
+name = "sun"
+
+[[light]]
+type = "environment"
+name = "sky"
+map = "sky.exr"
+
+[[material]]
+name = "water"
+absorption = [0.5, 0.1, 0.05]
+
+[[material]]
+name = "canvas"
+type = "cloth"
+reflectance = "srgb(200, 180, 40)"
+texture = "weave.png"
+
+[ground]
+height = -0.01
+
+[quality.preview.fluid]
+spacing = 0.04
+
+[quality.preview.cloth.sheet]
+cells = [4, 2]
+
+[quality.preview.render]
+width = 96
+)toml";
+}
+
+}  // namespace drench::test
