@@ -432,11 +432,11 @@ const char* file_name_problem(std::string_view name) {
   const auto control = [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; };
   if (name.empty()) return "it names output files, so it must not be empty";
   if (name.size() > 200) return "it names output files; use at most 200 characters";
-  if (name[0] == '.' || name[0] == '-')
-    return "it names output files; start with a letter or digit";
   if (name.find('/') != name.npos || std::any_of(name.begin(), name.end(), control)) {
     return "it names output files; use neither '/' nor control characters";
   }
+  if (name[0] == '.' || name[0] == '-')
+    return "it names output files; start with a letter or digit";
   return nullptr;
 }
 
