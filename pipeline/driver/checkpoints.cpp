@@ -102,8 +102,7 @@ void CheckpointKeeper::on_stop(const Simulation& simulation, int frame) {
 
 std::string CheckpointKeeper::last_good() const {
   const std::vector<Record> found = on_frames();
-  if (found.empty()) return "none";
-  return fmt::format("frame {} ({})", found.back().frame, (folder_ / found.back().file).string());
+  return found.empty() ? "none" : (folder_ / found.back().file).string();
 }
 
 }  // namespace drench

@@ -24,7 +24,7 @@ class CheckpointKeeper {
   void after_frame(const Simulation& simulation, int frame);
   /// On stop: the state may stand between `frame`, which is committed, and the next.
   void on_stop(const Simulation& simulation, int frame);
-  /// "frame 1031 (out/.../frame.1031.ckpt)", or "none".
+  /// The file of the last one, or "none".
   std::string last_good() const;
 
  private:

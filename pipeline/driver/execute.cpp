@@ -225,8 +225,12 @@ void Executor::advance_to(int frame) {
       compute(simulate_arena_,
               [&] { report = simulation_->advance([this] { return !stopping(); }); });
     } catch (const Error& error) {
-      throw Error(fmt::format("{}\nLast good checkpoint: {}. No file of frame {} was written.",
-                              error.what(), checkpoints_.last_good(), simulation_->frame() + 1));
+      // The simulator names a checkpoint it wrote or read itself; one of an earlier run it cannot
+      // know.
+      const std::string good = checkpoints_.last_good();
+      if (std::string_view(error.what()).find(good) != std::string_view::npos) throw;
+      throw Error(
+          fmt::format("{}\nLast good checkpoint in the output folder: {}", error.what(), good));
     }
     finished(Step::simulate, simulation_->frame(), start, report);
   }

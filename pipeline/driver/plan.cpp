@@ -73,6 +73,8 @@ class Planner {
 
  private:
   void choose_start(const std::vector<Key>& keys, int first_missing);
+  void warn_of_stale_caches();
+  void warn_of_stale_meshes();
   void check_inputs(const std::vector<std::string>& missing, const char* command);
   bool usable_checkpoint(const std::string& file, const Key& key) const;
   bool simulates(int frame) const {
@@ -165,7 +167,40 @@ void Planner::check_inputs(const std::vector<std::string>& missing, const char* 
                   missing.size(), missing.front(), command));
 }
 
+/// A later stage alone works on what lies there, but says when that is not what the shot says now.
+void Planner::warn_of_stale_caches() {
+  const std::vector<Key> keys = simulation_keys(wanted_, wanted_.frames.back());
+  std::vector<int> stale;
+  for (const int frame : wanted_.frames) {
+    for (const std::string& file : simulated_files(wanted_, frame)) {
+      const std::optional<KnownFile> known = lookup_(file);
+      if (!known || known->record.key == keys[size_t(frame - wanted_.first)].digest) continue;
+      stale.push_back(frame);
+      break;
+    }
+  }
+  if (stale.empty()) return;
+  plan_.warnings.push_back(
+      fmt::format("frames {} were simulated with other settings; they are used "
+                  "as they are. `drench simulate` brings them up to date",
+                  format_frames(stale)));
+}
+
+void Planner::warn_of_stale_meshes() {
+  std::vector<int> stale;
+  for (const int frame : wanted_.frames) {
+    const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
+    if (decision && decision->make && lookup_(layout::fluid_mesh(frame))) stale.push_back(frame);
+  }
+  if (stale.empty()) return;
+  plan_.warnings.push_back(
+      fmt::format("the meshes of frames {} were made with other settings; they "
+                  "are used as they are. `drench mesh` brings them up to date",
+                  format_frames(stale)));
+}
+
 void Planner::plan_mesh() {
+  if (!wanted_.may(Step::simulate)) warn_of_stale_caches();
   std::vector<std::string> missing;
   for (const int frame : wanted_.frames) {
     if (!wanted_.fluid) {
@@ -183,6 +218,10 @@ void Planner::plan_mesh() {
 }
 
 void Planner::plan_render() {
+  if (!wanted_.may(Step::mesh)) {
+    warn_of_stale_caches();
+    if (wanted_.fluid) warn_of_stale_meshes();
+  }
   std::vector<std::string> missing;
   for (const int frame : wanted_.frames) {
     Action input = Action::skip;

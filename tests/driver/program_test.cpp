@@ -1,0 +1,322 @@
+// The real program as a child process: what a user sees.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pipeline/driver/layout.h"
+#include "pipeline/driver/output_folder.h"
+#include "tests/driver/child.h"
+#include "tests/driver/tiny_shot.h"
+
+namespace drench {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace test;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr int done = 0, user_error = 1, stopped = 75;
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+Ended drench(const std::vector<std::string>& words) {
+  const TemporaryFolder folder;
+  return run_program(DRENCH_PROGRAM, words, folder.path());
+}
+
+/// Steps in stats.jsonl: those that really ran.
+std::map<std::string, int> steps_run(const fs::path& out) {
+  std::map<std::string, int> steps;
+  std::istringstream lines(text_of(out / layout::stats));
+  for (std::string line; std::getline(lines, line);) {
+    ++steps[json::parse(line).at("step").get<std::string>()];
+  }
+  return steps;
+}
+
+std::map<std::string, int> steps_run_by(const TinyShot& shot,
+                                        const std::vector<std::string>& more = {}) {
+  fs::remove(shot.out() / layout::stats);
+  const Ended ended = shot.run("run", more);
+  EXPECT_EQ(ended.code, done) << ended.err;
+  return fs::exists(shot.out() / layout::stats) ? steps_run(shot.out())
+                                                : std::map<std::string, int>{};
+}
+
+TEST(Program, ShowsOneExampleInTheHelpOfEachCommand) {
+  for (const char* command :
+       {"run", "simulate", "mesh", "render", "plan", "verify", "init", "clean"}) {
+    const Ended ended = drench({command, "--help"});
+    EXPECT_EQ(ended.code, done) << command;
+    const std::string example = "Example: drench " + std::string(command);
+    EXPECT_TRUE(has(ended.out, example)) << ended.out;
+  }
+}
+
+TEST(Program, RefusesBadCommandLinesWithExitCode1) {
+  const TinyShot shot;
+  const std::string file = shot.file().string();
+  const std::vector<std::vector<std::string>> bad{{},
+                                                  {"fly"},
+                                                  {"run"},
+                                                  {"run", file, "extra"},
+                                                  {"run", file, "--device", "tpu"},
+                                                  {"run", file, "--threads", "0"},
+                                                  {"run", file, "--threads", "many"},
+                                                  {"run", file, "--memory", "-1"},
+                                                  {"run", file, "--frames", "1009-1001"},
+                                                  {"run", file, "--frames", "soon"},
+                                                  {"run", file, "--frames", "1000"},
+                                                  {"run", file, "--quality", "unheard"},
+                                                  {"run", file, "--set", "fluid.spacin=0.02"},
+                                                  {"run", file, "--set", "fluid.spacing=-1"},
+                                                  {"run", file, "--set", "nothing"},
+                                                  {"run", "no-such-shot.toml"},
+                                                  {"verify", "/nowhere"},
+                                                  {"clean", file, "--out", "/nowhere"}};
+  for (const std::vector<std::string>& words : bad) {
+    const Ended ended = drench(words);
+    std::string line;
+    for (const std::string& word : words) line += word + " ";
+    EXPECT_EQ(ended.code, user_error) << line << ended.err;
+    EXPECT_FALSE(ended.err.empty()) << line;
+    EXPECT_FALSE(has(ended.err, "bug")) << line << ended.err;
+  }
+  EXPECT_FALSE(fs::exists(shot.out()));
+}
+
+TEST(Program, MakesEveryFileTheDesignNames) {
+  const TinyShot shot;
+  const Ended ended = shot.run("run");
+  ASSERT_EQ(ended.code, done) << ended.err;
+  std::vector<std::string> files{"manifest.jsonl", "stats.jsonl", "shot.lock.toml",
+                                 "contact_sheet.png"};
+  for (int frame = 1001; frame <= 1012; ++frame) {
+    const std::string number = std::to_string(frame);
+    for (const std::string& file :
+         {"sim/particles." + number + ".vdb", "sim/cloth.flag." + number + ".ply",
+          "mesh/fluid." + number + ".ply", "render/tiny." + number + ".exr"}) {
+      files.push_back(file);
+    }
+  }
+  for (const std::string& file : files) EXPECT_TRUE(fs::exists(shot.out() / file)) << file;
+  const Ended verified =
+      run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder());
+  EXPECT_EQ(verified.code, done) << verified.out;
+}
+
+TEST(Program, SaysThatASecondRunHasNothingToDo) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  const std::string manifest = text_of(shot.out() / layout::manifest);
+  const Ended ended = shot.run("run");
+  EXPECT_EQ(ended.code, done);
+  EXPECT_TRUE(has(ended.err, "nothing to do")) << ended.err;
+  EXPECT_EQ(text_of(shot.out() / layout::manifest), manifest);
+}
+
+TEST(Program, PlansWithoutWriting) {
+  const TinyShot shot;
+  const Ended ended = shot.run("plan", {"--json"});
+  EXPECT_EQ(ended.code, done) << ended.err;
+  EXPECT_EQ(json::parse(ended.out)["tasks"].size(), 3 * 12u + 2);
+  EXPECT_FALSE(fs::exists(shot.out()));
+}
+
+TEST(Program, RendersOnlyAfterACameraEdit) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  const Ended plan = shot.run("plan", {"--set", "camera.fov_deg=30"});
+  EXPECT_TRUE(has(plan.out, "camera changed")) << plan.out;
+  const auto steps = steps_run_by(shot, {"--set", "camera.fov_deg=30"});
+  EXPECT_EQ(steps.count("simulate"), 0u);
+  EXPECT_EQ(steps.count("mesh"), 0u);
+  EXPECT_EQ(steps.at("render"), 12);
+}
+
+TEST(Program, NamesWhatAPlanSkipsAndWhy) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  EXPECT_TRUE(has(shot.run("plan").out, "key unchanged"));
+  EXPECT_TRUE(has(shot.run("plan", {"--set", "fluid.spacing=0.04"}).out, "fluid changed"));
+  EXPECT_TRUE(has(shot.run("plan", {"--set", "surface.smoothing=3"}).out, "surface changed"));
+  std::string text = text_of(shot.file());
+  const size_t from = text.find("[fluid]"), to = text.find("[[cloth]]");
+  put_text(shot.file(), text.erase(from, to - from));
+  EXPECT_TRUE(has(shot.run("plan").out, "no fluid"));
+}
+
+// Stage by stage or all at once, for one core or two: the same files.
+TEST(Program, GivesTheSameFilesStageByStageAndForAnyThreads) {
+  const auto& expected = undisturbed_digests();
+  const TinyShot staged;
+  EXPECT_EQ(staged.run("mesh").code, user_error) << "meshed without caches";
+  for (const char* command : {"simulate", "mesh", "render"}) {
+    const Ended ended = staged.run(command, {"--threads", "1"});
+    EXPECT_EQ(ended.code, done) << ended.err;
+  }
+  EXPECT_EQ(staged.digests(), expected);
+  const TinyShot together;
+  EXPECT_EQ(together.run("run", {"--threads", "3"}).code, done);
+  EXPECT_EQ(together.digests(), expected);
+}
+
+TEST(Program, ContinuesALongerRangeFromTheLastCheckpoint) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  put_text(shot.file(),
+           std::string(text_of(shot.file())).replace(text_of(shot.file()).find("1012"), 4, "1015"));
+  EXPECT_EQ(steps_run_by(shot).at("simulate"), 3);
+  auto digests = shot.digests(), expected = undisturbed_digests(15);
+  // The shorter run kept a checkpoint at its own last frame.
+  digests.erase(layout::checkpoint(1012));
+  EXPECT_EQ(digests, expected);
+}
+
+TEST(Program, MakesOneMissingFileAlone) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  fs::remove(shot.out() / layout::image("tiny", 1005));
+  EXPECT_EQ(steps_run_by(shot), (std::map<std::string, int>{{"render", 1}}));
+  fs::remove(shot.out() / layout::fluid_mesh(1006));
+  EXPECT_EQ(steps_run_by(shot), (std::map<std::string, int>{{"mesh", 1}}));
+  EXPECT_EQ(shot.digests(), undisturbed_digests());
+}
+
+// A quietly flipped bit: verify finds it by digest and the next run makes the file again.
+TEST(Program, DetectsAndRebuildsADamagedCache) {
+  for (const std::string& file : {layout::particles(1007), layout::cloth("flag", 1003),
+                                  layout::fluid_mesh(1004), layout::image("tiny", 1009)}) {
+    const TinyShot shot;
+    ASSERT_EQ(shot.run("run").code, done);
+    flip_bit_quietly(shot.out() / file);
+    const Ended verified =
+        run_program(DRENCH_PROGRAM, {"verify", shot.out().string(), "--json"}, shot.folder());
+    EXPECT_EQ(verified.code, user_error);
+    EXPECT_EQ(json::parse(verified.out)["bad"], json::array({file}));
+    EXPECT_EQ(shot.run("run").code, done);
+    EXPECT_EQ(shot.digests(), undisturbed_digests()) << file;
+  }
+}
+
+// Without verify: the stage that reads the damaged file finds it.
+TEST(Program, NeverRendersADamagedMesh) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  flip_bit_quietly(shot.out() / layout::fluid_mesh(1004));
+  const auto steps = steps_run_by(shot, {"--set", "render.seed=2"});
+  EXPECT_EQ(steps.at("mesh"), 1);
+  EXPECT_EQ(steps.at("render"), 12);
+  const Ended ended = shot.run("run");  // back to the first seed
+  EXPECT_EQ(ended.code, done);
+  EXPECT_EQ(shot.digests(), undisturbed_digests());
+}
+
+TEST(Program, RefusesASecondDriverAndSaysWho) {
+  const TinyShot shot;
+  const FolderLock lock(shot.out());
+  const Ended ended = shot.run("run");
+  EXPECT_EQ(ended.code, user_error);
+  EXPECT_TRUE(has(ended.err, std::to_string(::getpid()))) << ended.err;
+}
+
+// Twelve drivers start at once: one works, the others say so or find everything done.
+TEST(Program, SurvivesManyDriversAtOnce) {
+  const TinyShot shot;
+  std::vector<std::unique_ptr<Child>> drivers;
+  for (int k = 0; k < 12; ++k) {
+    drivers.push_back(std::make_unique<Child>(DRENCH_PROGRAM, shot.words("run"), shot.folder()));
+  }
+  int finished = 0;
+  for (const auto& driver : drivers) {
+    const Ended ended = driver->wait();
+    EXPECT_TRUE(ended.code == done || ended.code == user_error) << ended.err;
+    finished += ended.code == done;
+  }
+  EXPECT_GE(finished, 1);
+  EXPECT_EQ(shot.digests(), undisturbed_digests());
+}
+
+TEST(Program, NamesAnOutputFolderItCannotWrite) {
+  const TinyShot shot;
+  put_text(shot.folder() / "file", "x");
+  std::vector<fs::path> folders{shot.folder() / "file" / "out", "/proc/drench"};
+  if (::geteuid() != 0) {  // permissions do not bind root
+    fs::create_directory(shot.folder() / "closed");
+    ::chmod((shot.folder() / "closed").c_str(), 0500);
+    folders.push_back(shot.folder() / "closed");
+  }
+  for (const fs::path& folder : folders) {
+    const Ended ended = run_program(
+        DRENCH_PROGRAM, {"run", shot.file().string(), "--out", folder.string()}, shot.folder());
+    EXPECT_EQ(ended.code, user_error);
+    EXPECT_TRUE(has(ended.err, folder.string())) << ended.err;
+  }
+}
+
+TEST(Program, ReportsFramesBeyondAShortenedRangeAndCleansThem) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  put_text(shot.file(),
+           std::string(text_of(shot.file())).replace(text_of(shot.file()).find("1012"), 4, "1008"));
+  const Ended ended = shot.run("run");
+  EXPECT_TRUE(has(ended.err, "drench clean")) << ended.err;
+  EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1010)));
+  EXPECT_EQ(shot.run("clean").code, done);
+  EXPECT_FALSE(fs::exists(shot.out() / layout::image("tiny", 1009)));
+  EXPECT_FALSE(fs::exists(shot.out() / layout::particles(1012)));
+  EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1008)));
+  EXPECT_EQ(run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder()).code, done);
+}
+
+TEST(Program, WritesAStartingShotAndNeverOverOne) {
+  const TemporaryFolder folder;
+  const std::string name = (folder.path() / "rain").string();
+  EXPECT_EQ(run_program(DRENCH_PROGRAM, {"init", name}, folder.path()).code, done);
+  const Ended plan = run_program(DRENCH_PROGRAM, {"plan", name + ".toml"}, folder.path());
+  EXPECT_EQ(plan.code, done) << plan.err;
+  put_text(name + ".toml", "mine");
+  EXPECT_EQ(run_program(DRENCH_PROGRAM, {"init", name}, folder.path()).code, user_error);
+  EXPECT_EQ(text_of(name + ".toml"), "mine");
+}
+
+// The header's attributes are plain text in the file; nothing in it depends on the time.
+TEST(Program, WritesItsProvenanceIntoEveryImage) {
+  const TinyShot shot;
+  ASSERT_EQ(shot.run("run").code, done);
+  const std::string header = text_of(shot.out() / layout::image("tiny", 1003)).substr(0, 4096);
+  for (const char* name : {"shot", "frame", "seed", "samples", "version", "key.render",
+                           "key.mesh/fluid.1003.ply", "key.sim/cloth.flag.1003.ply"}) {
+    EXPECT_TRUE(has(header, std::string(name) + '\0' + "string")) << name;
+  }
+}
+
+// Asked to stop, it ends within ten seconds with a checkpoint; continuing gives the same bits.
+TEST(Program, StopsOnRequestWithinTenSecondsAndContinues) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const TinyShot shot(30);
+    Child child(DRENCH_PROGRAM, shot.words("run"), shot.folder());
+    while (child.running() && !fs::exists(shot.out() / layout::particles(1004))) {
+      std::this_thread::sleep_for(1ms);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    child.send(signal);
+    const Ended ended = child.wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - start, 10s);
+    EXPECT_EQ(ended.code, stopped) << ended.err;
+    EXPECT_TRUE(fs::exists(shot.out() / layout::stop_checkpoint));
+    EXPECT_EQ(shot.run("run").code, done);
+    EXPECT_EQ(shot.digests(), undisturbed_digests(30));
+  }
+}
+
+}  // namespace
+}  // namespace drench
