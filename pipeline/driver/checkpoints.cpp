@@ -78,7 +78,7 @@ void CheckpointKeeper::write(const Simulation& simulation, int frame, const std:
   manifest_.add(record);
 }
 
-void CheckpointKeeper::after_frame(const Simulation& simulation, int frame) {
+void CheckpointKeeper::before_frame(const Simulation& simulation, int frame) {
   const bool last = frame == first_ + int(keys_.size()) - 1;  // a longer range continues here
   const bool due = frame > first_ && ((frame - first_) % every_ == 0 || last);
   if (!due) return;

@@ -20,8 +20,9 @@ class CheckpointKeeper {
 
   /// Removes checkpoints of other keys and files that no record names.
   void remove_stale();
-  /// After `frame` was committed: writes a checkpoint if one is due, then removes old ones.
-  void after_frame(const Simulation& simulation, int frame);
+  /// Before the files of `frame` are written: writes a checkpoint if one is due, then removes old
+  /// ones.
+  void before_frame(const Simulation& simulation, int frame);
   /// On stop: the state may stand between `frame`, which is committed, and the next.
   void on_stop(const Simulation& simulation, int frame);
   /// The file of the last one, or "none".

@@ -239,12 +239,13 @@ void Executor::advance_to(int frame) {
 void Executor::produce(int frame) {
   if (!simulation_) start_simulation();
   advance_to(frame);
+  // Before the frame: once a frame is there, so is its checkpoint, wherever a kill falls.
+  checkpoints_.before_frame(*simulation_, frame);
   std::vector<WrittenFile> files;
   compute(simulate_arena_, [&] { files = simulation_->write_frame(folder_); });
   commit(files, Step::simulate, frame, keys_.at(size_t(frame - wanted_.first)));
   committed_ = frame;
   has_committed_ = true;
-  checkpoints_.after_frame(*simulation_, frame);
   if (frame == wanted_.first || frame == plan_.simulation.from) {
     progress_.not_needed(Step::simulate, frame);  // a state that was there costs no time
   }

@@ -1,6 +1,6 @@
 // kill -9 and a full disk at any moment: the run continues and ends with the same bits.
 //
-// DRENCH_KILLS=N (default 12) sets how many points of each kind are tried.
+// DRENCH_KILLS=N (default 8) sets how many points of each kind are tried.
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 int wanted_points() {
   const char* text = std::getenv("DRENCH_KILLS");
-  return text ? std::atoi(text) : 12;
+  return text ? std::atoi(text) : 8;
 }
 
 /// Calls of each kind in an undisturbed run.
