@@ -12,6 +12,7 @@
 #include "pipeline/contract/shot_table.h"
 #include "pipeline/contract/shot_value.h"
 #include "pipeline/contract/toml.h"
+#include "pipeline/contract/toml_text.h"
 
 namespace drench {
 
@@ -283,6 +284,13 @@ class Reader {
 };
 
 toml::table parse_toml(std::string_view text, const std::string& label) {
+  const size_t stray = find_stray_character(text);
+  if (stray != no_stray_character) {
+    throw Error(
+        fmt::format("{}:{}: holds a character beyond ASCII outside quotes; put text into "
+                    "quotes (docs/shots.md lists the keys)",
+                    label, 1 + std::count(text.begin(), text.begin() + ptrdiff_t(stray), '\n')));
+  }
   try {
     return toml::parse(text, label);
   } catch (const toml::parse_error& problem) {
@@ -357,6 +365,12 @@ void apply_override(Draft& draft, const std::string& text, const fs::path& folde
                     std::all_of(value.begin(), value.end(), word);
   if (bare && value != "true" && value != "false" && value != "inf" && value != "nan") {
     value = "\"" + value + "\"";
+  }
+  if (find_stray_character(text) != no_stray_character) {
+    throw Error(
+        fmt::format("{}: holds a character beyond ASCII outside quotes; text needs quotes: "
+                    "--set 'section.key=\"text\"'",
+                    label));
   }
   toml::table table;
   try {

@@ -79,6 +79,22 @@ TEST_F(ShotError, NamesWrongTypes) {
   });
 }
 
+// Letters beyond ASCII belong into strings and comments; toml++ must not see them anywhere else.
+TEST_F(ShotError, NamesCharactersBeyondAsciiOutsideQuotes) {
+  expect_messages({
+      {"# caf\u00e9\n\u00e9 = 1\n", {"scene.toml:5", "beyond ASCII"}},
+      {"[shot]\nname = \u00e9\n", {"scene.toml:5", "beyond ASCII"}},
+      {"[shot]\nname = \"a\" \u00e9\n", {"scene.toml:5", "beyond ASCII"}},
+      {"[shot]\nname = \"\"\"\na\\\n \u00e9\"\"\"\n", {"scene.toml:7", "beyond ASCII"}},
+      {"[shot]\nname = \"\\\u00e9\"\n", {"scene.toml:5", "beyond ASCII"}},
+      {"[shot]\nname = \"caf\u00e9\n\u00e9 = 1\n", {"scene.toml:5", "not valid TOML"}},
+  });
+  const std::string fine = "# caf\u00e9 \"\n[shot]\nname = \"caf\u00e9 \\\" #\" # \u00e9\n";
+  EXPECT_EQ(parse_shot(box + fine, folder_ / "scene.toml").name, "caf\u00e9 \" #");
+  const std::string literal = "[shot]\nname = 'caf\u00e9 \\'\n[camera] # '\n";
+  EXPECT_EQ(parse_shot(box + literal, folder_ / "scene.toml").name, "caf\u00e9 \\");
+}
+
 TEST_F(ShotError, NamesImpossibleValues) {
   expect_messages({
       {"[fluid]\nspacing = -0.01\n",
