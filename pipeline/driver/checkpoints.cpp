@@ -16,12 +16,13 @@ namespace {
 constexpr const char* step = "checkpoint";
 }
 
-CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, int first,
-                                   std::vector<Key> keys, int every, int kept)
+CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, const Wanted& wanted,
+                                   std::vector<Digest> keys, int every, int kept)
     : folder_(std::move(folder)),
       manifest_(manifest),
-      first_(first),
+      first_(wanted.first),
       keys_(std::move(keys)),
+      parts_(wanted.simulate.parts),
       every_(every),
       kept_(kept) {}
 
@@ -30,9 +31,9 @@ void CheckpointKeeper::remove_stale() {
     if (record.step != step) continue;
     // Those beyond the frames asked for now may belong to the same, longer simulation.
     const bool beyond = record.frame >= first_ + int(keys_.size());
-    const bool same_stage = !keys_.empty() && record.parts == keys_.front().parts;
-    const bool known = record.frame >= first_ && !beyond &&
-                       record.key == keys_[size_t(record.frame - first_)].digest;
+    const bool same_stage = record.parts == parts_;
+    const bool known =
+        record.frame >= first_ && !beyond && record.key == keys_[size_t(record.frame - first_)];
     if (!(known || (beyond && same_stage))) remove(file);
   }
   remove_unlisted();
@@ -70,11 +71,10 @@ std::vector<Record> CheckpointKeeper::on_frames() const {
 
 void CheckpointKeeper::write(const Simulation& simulation, int frame, const std::string& file) {
   Record record = record_of_file(folder_, simulation.write_checkpoint(folder_ / file));
-  const Key& key = keys_.at(size_t(frame - first_));
   record.step = step;
   record.frame = frame;
-  record.key = key.digest;
-  record.parts = key.parts;
+  record.key = keys_.at(size_t(frame - first_));
+  record.parts = parts_;
   manifest_.add(record);
 }
 

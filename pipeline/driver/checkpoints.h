@@ -15,8 +15,8 @@ namespace drench {
 class CheckpointKeeper {
  public:
   /// @param keys  of frames first ... last, simulation_keys().
-  CheckpointKeeper(std::filesystem::path folder, Manifest& manifest, int first,
-                   std::vector<Key> keys, int every, int kept);
+  CheckpointKeeper(std::filesystem::path folder, Manifest& manifest, const Wanted& wanted,
+                   std::vector<Digest> keys, int every, int kept);
 
   /// Removes checkpoints of other keys and files that no record names.
   void remove_stale();
@@ -37,7 +37,8 @@ class CheckpointKeeper {
   const std::filesystem::path folder_;
   Manifest& manifest_;
   const int first_;
-  const std::vector<Key> keys_;
+  const std::vector<Digest> keys_;
+  const KeyParts parts_;
   const int every_, kept_;
 };
 

@@ -24,11 +24,11 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   std::filesystem::path folder, name;
-  bool verbose = false;
+  bool verbose = false, json = false;
 };
 
 void add_common(CLI::App& command, Arguments& arguments) {
-  command.add_flag("--json", arguments.shot.json, "machine-readable to stdout");
+  command.add_flag("--json", arguments.json, "machine-readable to stdout");
   command.add_flag("-v,--verbose", arguments.verbose, "also say what is skipped");
   command.add_flag("-q,--quiet", arguments.shot.quiet, "warnings and errors only");
 }
@@ -88,7 +88,7 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   verify->add_option("DIR", arguments.folder, "output folder")->required();
   add_common(*verify, arguments);
   verify->footer("Example: drench verify out/pour/preview");
-  verify->callback([&arguments] { verify_command(arguments.folder, arguments.shot.json); });
+  verify->callback([&arguments] { verify_command(arguments.folder, arguments.shot.format); });
 
   CLI::App* init = app.add_subcommand("init", "write a commented starting shot");
   init->add_option("NAME", arguments.name, "shot to write, with or without .toml")->required();
@@ -107,6 +107,7 @@ int parse_and_run(int argc, char** argv) {
   app.footer("Example: drench run shots/pour.toml --quality preview");
   app.parse_complete_callback([&arguments] {
     if (arguments.verbose) set_log_level(LogLevel::verbose);
+    if (arguments.json) arguments.shot.format = OutputFormat::json;
     if (arguments.shot.quiet) set_log_level(LogLevel::quiet);
   });
   add_commands(app, arguments);

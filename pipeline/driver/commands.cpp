@@ -85,9 +85,10 @@ Counts count_of(const Plan& plan) {
   return counts;
 }
 
-void report_done(const Job& job, const ShotArguments& arguments, const Plan& first, bool nothing) {
+void report_done(const Job& job, const ShotArguments& arguments, const Plan& first) {
+  const bool nothing = first.nothing_to_do();
   const Counts counts = count_of(first);
-  if (arguments.json) {
+  if (arguments.format == OutputFormat::json) {
     print(json{{"shot", job.shot.name},
                {"folder", job.folder.string()},
                {"frames", job.wanted.frames},
@@ -173,7 +174,7 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
   }
   manifest.open_for_append();
   const Plan plan = make_all(job, arguments, manifest);
-  report_done(job, arguments, plan, plan.nothing_to_do());
+  report_done(job, arguments, plan);
 }
 
 void plan_command(const ShotArguments& arguments) {
@@ -181,7 +182,7 @@ void plan_command(const ShotArguments& arguments) {
   const Manifest manifest(job.folder / layout::manifest);
   const Plan plan =
       make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-  print(arguments.json ? plan_json(plan) + "\n" : plan_text(plan));
+  print(arguments.format == OutputFormat::json ? plan_json(plan) + "\n" : plan_text(plan));
 }
 
 void clean_command(const ShotArguments& arguments) {
@@ -207,11 +208,11 @@ void clean_command(const ShotArguments& arguments) {
                               system_reason(code.value())));
     }
   }
-  if (arguments.json) print(json{{"removed", plan.beyond}}.dump() + "\n");
+  if (arguments.format == OutputFormat::json) print(json{{"removed", plan.beyond}}.dump() + "\n");
   log_info("driver", fmt::format("removed {} files", plan.beyond.size()));
 }
 
-void verify_command(const fs::path& folder, bool as_json) {
+void verify_command(const fs::path& folder, OutputFormat format) {
   if (!fs::exists(folder / layout::manifest)) {
     throw Error(fmt::format("{}: holds no manifest.jsonl; give the output folder of a run",
                             folder.string()));
@@ -234,7 +235,7 @@ void verify_command(const fs::path& folder, bool as_json) {
     manifest.open_for_append();
     for (const std::string& file : bad) manifest.drop(file);
   }
-  if (as_json) {
+  if (format == OutputFormat::json) {
     print(json{{"files", records.size()},
                {"bad", bad},
                {"unlisted", unlisted},

@@ -11,6 +11,8 @@
 
 namespace drench {
 
+enum class OutputFormat { text, json };
+
 /// Options of every command that takes a shot.
 struct ShotArguments {
   std::filesystem::path shot;
@@ -21,7 +23,7 @@ struct ShotArguments {
   double memory_gib = 0;  // 0: no limit
   std::vector<std::string> set;
   std::string quality = "final";
-  bool json = false;
+  OutputFormat format = OutputFormat::text;
   bool quiet = false;
 };
 
@@ -33,7 +35,7 @@ void plan_command(const ShotArguments& arguments);
 /// Removes frames outside the shot's range and files of sheets it no longer has.
 void clean_command(const ShotArguments& arguments);
 /// Hashes every file. @throws Error if one is missing or damaged; the next run makes those again.
-void verify_command(const std::filesystem::path& folder, bool json);
+void verify_command(const std::filesystem::path& folder, OutputFormat format);
 /// Writes NAME.toml, a commented starting shot. @throws Error if it exists.
 void init_command(const std::filesystem::path& name);
 

@@ -77,7 +77,7 @@ class Executor {
   StatsFile stats_;
 
   std::set<int> to_simulate_;
-  std::vector<Key> keys_;
+  std::vector<Digest> keys_;
   CheckpointKeeper checkpoints_;
   std::unique_ptr<Simulation> simulation_;
   int committed_ = 0;  // frame of the last commit of simulation_, or of the state it started with
@@ -109,7 +109,7 @@ Executor::Executor(const Wanted& wanted, const Plan& plan, const fs::path& folde
       lookup_([this](const std::string& file) { return look_up(file); }),
       stats_(folder / layout::stats),
       keys_(simulation_keys(wanted, wanted.frames.back())),
-      checkpoints_(folder, manifest, wanted.first, keys_, options.checkpoint_every,
+      checkpoints_(folder, manifest, wanted, keys_, options.checkpoint_every,
                    options.checkpoints_kept),
       simulate_arena_(arena_size(options.threads)),
       mesh_arena_(arena_size(options.threads)),
@@ -243,7 +243,8 @@ void Executor::produce(int frame) {
   checkpoints_.before_frame(*simulation_, frame);
   std::vector<WrittenFile> files;
   compute(simulate_arena_, [&] { files = simulation_->write_frame(folder_); });
-  commit(files, Step::simulate, frame, keys_.at(size_t(frame - wanted_.first)));
+  commit(files, Step::simulate, frame,
+         {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});
   committed_ = frame;
   has_committed_ = true;
   if (frame == wanted_.first || frame == plan_.simulation.from) {

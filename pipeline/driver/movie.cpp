@@ -3,21 +3,21 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "pipeline/contract/error.h"
 #include "render/renderer.h"
-
-extern char** environ;
 
 namespace drench {
 
@@ -53,32 +53,36 @@ class Child {
 
   pid_t pid_ = -1;
   int input_ = -1;
-  std::FILE* output_ = nullptr;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> output_;
 };
 
-Child::Child(const std::vector<std::string>& command) {
-  std::array<int, 2> pipe{};
-  output_ = std::tmpfile();
-  if (!output_ || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
-    throw Error(fmt::format("{}: cannot be started: {}", command.front(), system_reason(errno)));
-  }
-  input_ = pipe[1];
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, pipe[0], STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, ::fileno(output_), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, ::fileno(output_), STDERR_FILENO);
+/// In the new process: only calls that are safe between fork and exec of a threaded program.
+[[noreturn]] void become(char* const* arguments, int input, int output, pid_t parent) {
+  // It must not outlive us: after a kill it would go on writing where the next run works.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(127);
+  ::setpgid(0, 0);  // Ctrl-C is for us; we end it when we stop
+  ::dup2(input, STDIN_FILENO);
+  ::dup2(output, STDOUT_FILENO);
+  ::dup2(output, STDERR_FILENO);
+  ::execv(arguments[0], arguments);
+  ::_exit(127);
+}
+
+Child::Child(const std::vector<std::string>& command) : output_(std::tmpfile(), std::fclose) {
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  const int reason =
-      ::posix_spawn(&pid_, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  ::close(pipe[0]);
-  if (reason != 0) {
-    pid_ = -1;
-    throw Error(fmt::format("{}: cannot be started: {}", command.front(), system_reason(reason)));
-  }
+  const pid_t parent = ::getpid();
+  std::array<int, 2> pipe{-1, -1};
+  if (output_ && ::pipe2(pipe.data(), O_CLOEXEC) == 0) pid_ = ::fork();
+  if (pid_ == 0) become(arguments.data(), pipe[0], ::fileno(output_.get()), parent);
+  const int reason = errno;
+  if (pipe[0] >= 0) ::close(pipe[0]);
+  input_ = pipe[1];
+  if (pid_ > 0) return;
+  close_input();
+  throw Error(fmt::format("{}: cannot be started: {}", command.front(), system_reason(reason)));
 }
 
 bool Child::send(const uint8_t* data, size_t size) {
@@ -103,11 +107,11 @@ int Child::finish() {
 }
 
 std::string Child::last_words() {
-  std::fseek(output_, 0, SEEK_END);
-  const long size = std::ftell(output_);
-  std::fseek(output_, std::max(0L, size - 400), SEEK_SET);
+  std::fseek(output_.get(), 0, SEEK_END);
+  const long size = std::ftell(output_.get());
+  std::fseek(output_.get(), std::max(0L, size - 400), SEEK_SET);
   std::string text(400, '\0');
-  text.resize(std::fread(text.data(), 1, text.size(), output_));
+  text.resize(std::fread(text.data(), 1, text.size(), output_.get()));
   while (!text.empty() && text.back() == '\n') text.pop_back();
   const size_t line = text.rfind('\n');
   return line == std::string::npos ? text : text.substr(line + 1);

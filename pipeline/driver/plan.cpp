@@ -72,11 +72,11 @@ class Planner {
   Plan finish(const Snapshot& snapshot, int timeline_last);
 
  private:
-  void choose_start(const std::vector<Key>& keys, int first_missing);
+  void choose_start(const std::vector<Digest>& keys, int first_missing);
   void warn_of_stale_caches();
   void warn_of_stale_meshes();
   void check_inputs(const std::vector<std::string>& missing, const char* command);
-  bool usable_checkpoint(const std::string& file, const Key& key) const;
+  bool usable_checkpoint(const std::string& file, const Digest& key) const;
   bool simulates(int frame) const {
     return plan_.simulation.needed && frame <= plan_.simulation.last &&
            (plan_.simulation.checkpoint.empty() || frame > plan_.simulation.from);
@@ -93,12 +93,12 @@ class Planner {
   std::map<int, Action> simulated_, meshed_, rendered_;
 };
 
-bool Planner::usable_checkpoint(const std::string& file, const Key& key) const {
+bool Planner::usable_checkpoint(const std::string& file, const Digest& key) const {
   const std::optional<KnownFile> known = lookup_(file);
-  return known && known->state == FileState::intact && known->record.key == key.digest;
+  return known && known->state == FileState::intact && known->record.key == key;
 }
 
-void Planner::choose_start(const std::vector<Key>& keys, int first_missing) {
+void Planner::choose_start(const std::vector<Digest>& keys, int first_missing) {
   SimulationSpan& span = plan_.simulation;
   span.from = wanted_.first;
   // A checkpoint on a frame can write that frame again; the one made on stop stands after its
@@ -122,25 +122,29 @@ void Planner::choose_start(const std::vector<Key>& keys, int first_missing) {
 
 void Planner::plan_simulation() {
   const int last = wanted_.frames.back();
-  const std::vector<Key> keys = simulation_keys(wanted_, last);
-  std::vector<Decision> decisions;
+  const std::vector<Digest> keys = simulation_keys(wanted_, last);
+  Key key{{}, wanted_.simulate.parts};
+  std::vector<std::string> reasons;  // empty: the frame is there
   int first_missing = last + 1;
   for (int frame = wanted_.first; frame <= last; ++frame) {
-    const Key& key = keys[size_t(frame - wanted_.first)];
-    decisions.push_back(decide(simulated_files(wanted_, frame), key, lookup_));
-    if (!decisions.back().make) continue;
+    key.digest = keys[size_t(frame - wanted_.first)];
+    Decision decision = decide(simulated_files(wanted_, frame), key, lookup_);
+    reasons.push_back(decision.make ? std::move(decision.reason) : "");
+    if (!decision.make) continue;
     first_missing = std::min(first_missing, frame);
     plan_.simulation.last = frame;
   }
   plan_.simulation.needed = first_missing <= last;
   if (plan_.simulation.needed) choose_start(keys, first_missing);
   for (int frame = wanted_.first; frame <= last; ++frame) {
-    const Decision& decision = decisions[size_t(frame - wanted_.first)];
+    std::string& reason = reasons[size_t(frame - wanted_.first)];
+    const bool make = !reason.empty();
     // A frame whose file is there and right is simulated again only on the way to a later one.
-    const bool again = !decision.make && simulates(frame);
-    simulated_[frame] = decision.make ? Action::run : again ? Action::depends : Action::skip;
-    add(Step::simulate, frame, decision.make || again ? Action::run : Action::skip,
-        again ? fmt::format("on the way to frame {}", plan_.simulation.last) : decision.reason);
+    const bool again = !make && simulates(frame);
+    simulated_[frame] = make ? Action::run : again ? Action::depends : Action::skip;
+    if (again) reason = fmt::format("on the way to frame {}", plan_.simulation.last);
+    if (reason.empty()) reason = unchanged;
+    add(Step::simulate, frame, make || again ? Action::run : Action::skip, std::move(reason));
   }
 }
 
@@ -169,12 +173,12 @@ void Planner::check_inputs(const std::vector<std::string>& missing, const char* 
 
 /// A later stage alone works on what lies there, but says when that is not what the shot says now.
 void Planner::warn_of_stale_caches() {
-  const std::vector<Key> keys = simulation_keys(wanted_, wanted_.frames.back());
+  const std::vector<Digest> keys = simulation_keys(wanted_, wanted_.frames.back());
   std::vector<int> stale;
   for (const int frame : wanted_.frames) {
     for (const std::string& file : simulated_files(wanted_, frame)) {
       const std::optional<KnownFile> known = lookup_(file);
-      if (!known || known->record.key == keys[size_t(frame - wanted_.first)].digest) continue;
+      if (!known || known->record.key == keys[size_t(frame - wanted_.first)]) continue;
       stale.push_back(frame);
       break;
     }

@@ -152,14 +152,14 @@ std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
   return files;
 }
 
-std::vector<Key> simulation_keys(const Wanted& wanted, int last) {
-  std::vector<Key> keys;
+std::vector<Digest> simulation_keys(const Wanted& wanted, int last) {
+  std::vector<Digest> keys;
   Digest before;
   for (int frame = wanted.first; frame <= last; ++frame) {
     Hasher hasher;
     hasher.text("simulate").digest(wanted.simulate.digest).value(frame).digest(before);
     before = hasher.finish();
-    keys.push_back({before, wanted.simulate.parts});
+    keys.push_back(before);
   }
   return keys;
 }

@@ -57,8 +57,9 @@ struct Key {
   KeyParts parts;
 };
 
-/// Keys of frames first ... last of the simulation, in order.
-std::vector<Key> simulation_keys(const Wanted& wanted, int last);
+/// Keys of frames first ... last of the simulation, in order; their parts are
+/// wanted.simulate.parts.
+std::vector<Digest> simulation_keys(const Wanted& wanted, int last);
 /// Key of a step made from files: their names and digests in order.
 using InputDigests = std::vector<std::pair<std::string, Digest>>;
 Key step_key(const StageKey& stage, Step step, int frame, const InputDigests& inputs);

@@ -36,10 +36,10 @@ Lookup in(const Snapshot& snapshot) {
 /// Everything made and intact.
 Snapshot complete(const ToySettings& settings) {
   const Wanted wanted = toy_wanted(settings);
-  const std::vector<Key> keys = simulation_keys(wanted, wanted.frames.back());
+  const std::vector<Digest> keys = simulation_keys(wanted, wanted.frames.back());
   Snapshot snapshot;
   for (const int frame : wanted.frames) {
-    const Key& key = keys[size_t(frame - wanted.first)];
+    const Key key{keys[size_t(frame - wanted.first)], wanted.simulate.parts};
     for (const std::string& file : simulated_files(wanted, frame)) {
       put(snapshot, file, Step::simulate, frame, key, file);
     }
@@ -58,7 +58,7 @@ Snapshot complete(const ToySettings& settings) {
 void put_checkpoint(Snapshot& snapshot, const ToySettings& settings, int frame,
                     const std::string& file) {
   const Wanted wanted = toy_wanted(settings);
-  const Key key = simulation_keys(wanted, frame).back();
+  const Key key{simulation_keys(wanted, frame).back(), wanted.simulate.parts};
   put(snapshot, file, Step::simulate, frame, key, file);
   snapshot[file].record.step = "checkpoint";
 }
