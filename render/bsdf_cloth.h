@@ -26,6 +26,7 @@ class ClothBsdf {
     reflect_probability_ = r + t > 0 ? r / (r + t) : 1;
   }
 
+  V3f albedo() const { return reflectance_ + transmittance_; }
   bool black() const { return is_black(reflectance_) && is_black(transmittance_); }
 
   /// Value x |cos| for an incoming direction, and the density of `sample` for it.

@@ -93,6 +93,9 @@ class Lights {
   bool samples_map() const { return environment_ && environment_->is_map(); }
   bool can_sample() const { return !shapes_.empty() || !suns_.empty() || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
+  const std::vector<SunLight>& suns() const { return suns_; }
+  /// Mean irradiance of the environment, as luminance.
+  float environment_importance() const { return environment_importance_; }
 
  private:
   size_t environment_index() const { return shapes_.size() + suns_.size(); }

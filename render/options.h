@@ -21,10 +21,16 @@ enum class FirstInterface {
   one,   // one of them, chosen by Fresnel's weight
 };
 
+enum class WaterGuide {
+  on,  // part of the rays under water is aimed at lamps above it
+  off,
+};
+
 struct RenderOptions {
   Estimator estimator = Estimator::mis;
   EnvironmentSampling environment = EnvironmentSampling::automatic;
   FirstInterface first_interface = FirstInterface::one;
+  WaterGuide water_guide = WaterGuide::on;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
 };

@@ -12,6 +12,7 @@
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_dielectric.h"
+#include "render/guide.h"
 
 namespace drench {
 
@@ -38,6 +39,9 @@ constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
 struct PathState {
   Ray ray;
   V3f throughput{1, 1, 1};
+  // What surfaces and water left of the light, whatever the densities of the directions: roulette
+  // plays for it. A ray aimed at a lamp has a small throughput because it will find much light.
+  V3f survival{1, 1, 1};
   V3f vertex;           // where the ray comes from, before its offset
   float bsdf_pdf = 0;   // density of its direction; 0: lights ahead have not been sampled from here
   bool inside = false;  // in the fluid
@@ -106,7 +110,9 @@ class PathTracer {
   void absorb(PathState& state, float distance) {
     const V3f a = scene_.fluid_absorption();
     if (is_black(a)) return;
-    for (int c = 0; c < 3; ++c) state.throughput[c] *= std::exp(-a[c] * distance);
+    const V3f kept(std::exp(-a.x * distance), std::exp(-a.y * distance), std::exp(-a.z * distance));
+    state.throughput *= kept;
+    state.survival *= kept;
   }
 
   /// Weight of light found by a surface sample that light sampling finds with `light_pdf`.
@@ -161,11 +167,13 @@ class PathTracer {
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
       pending_ = state;
       pending_.throughput *= split.reflectance;
+      pending_.survival *= split.reflectance;
       pending_.branch = 1;
       ++pending_.vertices;
       depart(pending_, surface, split.reflected);
       has_pending_ = true;
       state.throughput *= 1 - split.reflectance;
+      state.survival *= 1 - split.reflectance;
     } else if (!reflect) {
       reflect = number(state, kScatterSide) < split.reflectance;
     }
@@ -184,13 +192,42 @@ class PathTracer {
     const bool sample_lights = kLights && !(kWater && state.inside && !scene_.lights_in_fluid());
     if (sample_lights && settings_.estimator != Estimator::bsdf_only)
       add_direct(state, surface, bsdf);
-    const ClothScatter next =
-        bsdf.sample(number(state, kScatterSide), point(state, kScatterDirection));
+    const ClothScatter next = sample_scatter(state, surface, bsdf);
     if (!(next.pdf > 0)) return false;
     depart(state, surface, next.direction);
     state.throughput *= next.weight;
+    state.survival *= bsdf.albedo();
     state.bsdf_pdf = sample_lights ? next.pdf : 0;
     return true;
+  }
+
+  /// The next direction: drawn from the surface, or in water from a mixture with the guide.
+  ClothScatter sample_scatter(const PathState& state, const Surface& surface,
+                              const ClothBsdf& bsdf) const {
+    float u = number(state, kScatterSide);
+    const V2f uv = point(state, kScatterDirection);
+    if constexpr (!kWater) return bsdf.sample(u, uv);
+    if (!state.inside || settings_.water_guide == WaterGuide::off) return bsdf.sample(u, uv);
+    const RefractedLightGuide guide(scene_.lights(), scene_.fluid_ior());
+    const float share = guide.share(surface.position);
+    if (share == 0) return bsdf.sample(u, uv);
+    ClothScatter out;
+    float guide_pdf = 0;
+    if (u < share) {
+      const DirectionSample aimed = guide.sample(surface.position, u / share, uv);
+      if (!(aimed.pdf > 0)) return {};
+      out.direction = aimed.direction;
+      guide_pdf = aimed.pdf;
+    } else {
+      out = bsdf.sample(std::min((u - share) / (1 - share), kOneMinusEpsilon), uv);
+      if (!(out.pdf > 0)) return {};
+      guide_pdf = guide.pdf(surface.position, out.direction);
+    }
+    const V3f value = bsdf.value(out.direction, out.pdf);
+    if (!(out.pdf > 0)) return {};
+    out.pdf = share * guide_pdf + (1 - share) * out.pdf;
+    out.weight = value * (1 / out.pdf);
+    return out;
   }
 
   void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
@@ -216,11 +253,12 @@ class PathTracer {
 
   bool survives(PathState& state) {
     if (state.vertices < kRouletteStart) return true;
-    float keep = std::min(largest(state.throughput), 1.f);
+    float keep = std::min(largest(state.survival), 1.f);
     if (state.vertices >= kLongPath) keep = std::min(keep, kLongSurvival);
     if (keep >= 1) return true;
     if (!(number(state, kRoulette) < keep)) return false;
     state.throughput *= 1 / keep;
+    state.survival *= 1 / keep;
     return true;
   }
 

@@ -28,6 +28,7 @@ struct PathSettings {
   int depth = 8;
   Estimator estimator = Estimator::mis;
   FirstInterface first_interface = FirstInterface::one;
+  WaterGuide water_guide = WaterGuide::on;
   bool camera_in_fluid = false;
 };
 

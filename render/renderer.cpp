@@ -141,6 +141,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.depth = shot.render.depth;
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
+  path.water_guide = options.water_guide;
   path.camera_in_fluid = scene.inside_fluid(scene.camera().open().position, 0);
   const uint32_t samples = uint32_t(shot.render.samples);
   const Job job{scene,

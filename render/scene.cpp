@@ -136,6 +136,7 @@ void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
   if (materials_[material].type != MaterialType::dielectric) return;
   fluid_ = int(objects_.size()) - 1;
   fluid_absorption_ = materials_[material].absorption;
+  fluid_ior_ = materials_[material].ior;
   SceneObject& fluid = objects_.back();
   if (has_ground_)
     for (std::vector<V3f>* p : {&fluid.position, &fluid.position_close})

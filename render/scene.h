@@ -61,6 +61,7 @@ class Scene {
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
   V3f fluid_absorption() const { return fluid_absorption_; }  // 1/m
+  float fluid_ior() const { return fluid_ior_; }
   bool lights_in_fluid() const { return lights_in_fluid_; }
   unsigned features() const { return features_; }
 
@@ -88,6 +89,7 @@ class Scene {
   uint32_t ground_material_ = 0;
   int fluid_ = -1;  // index of the dielectric object
   V3f fluid_absorption_{0, 0, 0};
+  float fluid_ior_ = 1;
   bool lights_in_fluid_ = false;
   unsigned features_ = 0;
 };

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "render/guide.h"
 #include "render/scene.h"
 #include "tests/render/support.h"
 
@@ -138,6 +139,68 @@ TEST(SnellsWindow, ShowsOneMinusFresnelAtTheZenith) {
   const FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
   const Mean mean = channel_mean(render_frame(shot, 1001, geometry), 0);
   EXPECT_NEAR(mean.value, 1 - kOneFace, bound(mean));
+}
+
+TEST(WaterGuide, LeavesTheMeanAsItIs) {
+  // A wavy surface over a floor, a lamp and a sun aslant: aimed and unaimed rays see one picture.
+  Shot shot = plain_shot(512, 8);
+  add_ground(shot, 0.5f, 6);
+  shot.material.push_back(dielectric("water", kIndex, V3f(0.5f, 0.2f, 0.1f)));
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  Light sun;
+  sun.type = LightType::sun;
+  sun.direction = {1, -2, 0};
+  sun.angle_deg = 5;
+  sun.radiance = V3f(2);
+  shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun, sky(0.2f)};
+  TriangleMesh wavy = sphere_mesh(5);
+  for (V3f& p : wavy.position)
+    p = {6 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 6 * p.z};
+  wavy.normal.clear();
+  RenderOptions aimed, unaimed;
+  unaimed.water_guide = WaterGuide::off;
+  for (const TriangleMesh& water : {box_mesh({-5, -0.1f, -5}, {5, 0.4f, 5}), wavy}) {
+    const Mean with = mean_over_seeds(shot, {water, {}}, aimed, 24);
+    const Mean without = mean_over_seeds(shot, {water, {}}, unaimed, 24);
+    EXPECT_LT(without.error, 0.02 * without.value);
+    EXPECT_NEAR(with.value, without.value, 4 * std::hypot(with.error, without.error));
+    // On a level surface most of the noise goes; the two errors are known to 15 % each.
+    if (water.position.size() == 24) {
+      EXPECT_LT(with.error, 0.6 * without.error);
+    }
+  }
+}
+
+TEST(WaterGuide, HasTheDensityItClaims) {
+  // The density integrates to 1 over the directions that reach the surface below the critical
+  // angle, less what the cones hold beyond the horizon: none here.
+  const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6)}, Lights::SampleEnvironment::automatic);
+  const RefractedLightGuide guide(lights, float(kIndex));
+  const V3f point(0.1f, 0, 0);
+  double integral = 0, drawn = 0;
+  constexpr int kSteps = 2000;
+  V3d mean(0), mean_drawn(0);
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      const double y = (i + 0.5) / kSteps, phi = 2 * kPi64 * (j + 0.5) / kSteps;
+      const V3f d(float(std::sqrt(1 - y * y) * std::cos(phi)), float(y),
+                  float(std::sqrt(1 - y * y) * std::sin(phi)));
+      const double share = guide.pdf(point, d) * 2 * kPi64 / kSteps / kSteps;
+      integral += share;
+      mean += V3d(d) * share;
+    }
+  for (uint32_t k = 0; k < 1u << 16; ++k) {
+    const Sampler sampler(PixelOrder::separate, 1, 0, 0, 16, k);
+    const DirectionSample s = guide.sample(point, sampler.one(0), sampler.two(1));
+    drawn += s.pdf > 0 ? 1. / (1 << 16) : 0;
+    if (s.pdf > 0) mean_drawn += V3d(s.direction) / (1 << 16);
+  }
+  // 2000 x 2000 points, coarse where the density grows without bound at the critical angle.
+  EXPECT_NEAR(drawn, integral, 3e-3);
+  EXPECT_GT(drawn, 0.9);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean_drawn[c], mean[c], 3e-3);
 }
 
 TEST(WaterMesh, LosesNoRayThroughItsEdges) {
