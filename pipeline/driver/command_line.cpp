@@ -41,7 +41,8 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--out", shot.out, "output folder; default out/<shot>/<quality>");
   command.add_option("--frames", shot.frames, "1001-1048, 1001-1048x2, or a list of these");
   command.add_option("--device", shot.device, "auto, cpu or cuda")
-      ->transform(CLI::CheckedTransformer(devices, CLI::ignore_case));
+      ->transform(CLI::CheckedTransformer(devices, CLI::ignore_case))
+      ->option_text("NAME");
   command.add_option("--threads", shot.threads, "cores to use; default all")
       ->check(CLI::Range(1, 4096));
   command.add_option("--memory", shot.memory_gib, "GiB; a run that needs more stops")

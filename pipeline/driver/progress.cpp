@@ -21,6 +21,8 @@ std::string clock_text(double seconds) {
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
+bool is_framed(Step step) { return step != Step::contact_sheet && step != Step::movie; }
+
 std::string_view log_part(Step step) { return step == Step::simulate ? "sim" : step_name(step); }
 
 }  // namespace
@@ -54,10 +56,9 @@ void Progress::done(Step step, int frame, double seconds, std::string_view line)
     count.share = 0;
   }
   if (style_ != ProgressStyle::lines) return;
-  const bool framed = step != Step::contact_sheet && step != Step::movie;
   log_info(log_part(step),
-           fmt::format("{}{}{}ms={:.0f}", framed ? fmt::format("frame={} ", frame) : "", line,
-                       line.empty() ? "" : " ", seconds * 1000));
+           fmt::format("{}{}{}ms={:.0f}", is_framed(step) ? fmt::format("frame={} ", frame) : "",
+                       line, line.empty() ? "" : " ", seconds * 1000));
 }
 
 void Progress::not_needed(Step step, int frame) {
@@ -91,7 +92,7 @@ std::string Progress::text() const {
     if (count.ran > 0) {
       left = std::max(left, (count.planned - finished) * count.seconds / count.ran);
     }
-    frames = count.ran > 0 ? count.ran : frames;
+    if (count.ran > 0 && is_framed(step)) frames = count.ran;  // of the last stage at work
   }
   const double share = planned > 0 ? done / planned : 1;
   constexpr int width = 20;

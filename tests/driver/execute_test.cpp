@@ -350,6 +350,30 @@ TEST(Execute, GivesTheSameFilesForAnyNumberOfThreads) {
   }
 }
 
+// A mesh cannot be interrupted. When it takes longer than the patience after a stop, the process
+// may end: the simulation's checkpoint is written by then.
+TEST(Execute, GivesUpALongMeshOnlyAfterTheCheckpointIsWritten) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  std::atomic<bool> stop{false}, abandoned{false}, had_checkpoint{false};
+  stages.hook = [&](Step step, int frame) {
+    if (step != Step::mesh || frame != 3) return;
+    stop = true;
+    for (int k = 0; k < 2000 && !abandoned; ++k) std::this_thread::sleep_for(10ms);
+  };
+  ExecuteOptions options;
+  options.stop_requested = [&] { return stop.load(); };
+  options.patience_s = 0.05;
+  options.abandon = [&] {
+    had_checkpoint = std::filesystem::exists(folder.path() / layout::stop_checkpoint);
+    abandoned = true;
+  };
+  EXPECT_THROW(make_toy(settings, stages, folder.path(), options), Stopped);
+  EXPECT_TRUE(abandoned);
+  EXPECT_TRUE(had_checkpoint);
+}
+
 TEST(Execute, StopsWithACheckpointAboveItsMemoryLimit) {
   const TemporaryFolder folder;
   const ToySettings settings;
