@@ -75,6 +75,39 @@ void press_onto_ground(std::vector<V3f>& position, float ground, float spacing) 
   }
 }
 
+/// Of the vertices over the shutter; the last entry is padding.
+Imath::Box3f bounds_of(const SceneObject& object) {
+  Imath::Box3f box;
+  for (const std::vector<V3f>* positions : {&object.position, &object.position_close})
+    for (size_t k = 0; k + 1 < positions->size(); ++k) box.extendBy((*positions)[k]);
+  return box;
+}
+
+RTCRay embree_ray(const Ray& ray, float reach) {
+  const V3f &o = ray.origin, &d = ray.direction;
+  return {o.x, o.y, o.z, 0, d.x, d.y, d.z, ray.time, reach, 0xffffffffu, 0, 0};
+}
+
+/// The slab test of a ray against boxes, grown by its own rounding.
+struct InverseDirection {
+  V3f inverse;
+
+  explicit InverseDirection(const V3f& d) : inverse(1 / d.x, 1 / d.y, 1 / d.z) {}
+
+  bool meets(const Imath::Box3f& box, const V3f& origin, float reach) const {
+    float from = 0, to = reach;
+    for (int c = 0; c < 3; ++c) {
+      const float a = (box.min[c] - origin[c]) * inverse[c];
+      const float b = (box.max[c] - origin[c]) * inverse[c];
+      if (std::isnan(a) || std::isnan(b)) continue;  // 0 x infinity: it runs in a side's plane
+      const float near = a < b ? a : b, far = a < b ? b : a;
+      from = near > from ? near : from;
+      to = far < to ? far : to;
+    }
+    return from <= to * (1 + 8 * 0x1p-24f);
+  }
+};
+
 }  // namespace
 
 V3f Surface::leave(const V3f& direction) const {
@@ -121,7 +154,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                       cloth.name, material));
     add_object(cloth.mesh, fmt::format("cloth '{}'", cloth.name), index);
   }
-  assemble();
+  for (SceneObject& object : objects_) build(object);
   find_features();
 }
 
@@ -142,13 +175,11 @@ void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
     for (std::vector<V3f>* p : {&fluid.position, &fluid.position_close})
       press_onto_ground(*p, ground_center_.y, float(shot.fluid.spacing));
 
-  Imath::Box3f bounds;
-  for (const std::vector<V3f>* positions : {&fluid.position, &fluid.position_close})
-    for (const V3f& p : *positions) bounds.extendBy(p);
   for (const ShapeLight& light : lights_.shapes()) {
     V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
     if (light.type == LightType::sphere) reach = V3f(light.radius);
-    lights_in_fluid_ |= bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
+    lights_in_fluid_ |=
+        bounds_of(fluid).intersects(Imath::Box3f(light.center - reach, light.center + reach));
   }
 }
 
@@ -195,6 +226,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& what, uint32
 }
 
 void Scene::build(SceneObject& object) {
+  object.bounds = bounds_of(object);
   EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
@@ -215,21 +247,6 @@ void Scene::build(SceneObject& object) {
   rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   rtcAttachGeometry(object.scene.get(), geometry.get());
   rtcJoinCommitScene(object.scene.get());
-  check_embree(device_.get());
-}
-
-void Scene::assemble() {
-  if (objects_.empty()) return;
-  scene_.reset(rtcNewScene(device_.get()));
-  for (SceneObject& object : objects_) {
-    build(object);
-    EmbreeGeometry instance(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-    rtcSetGeometryInstancedScene(instance.get(), object.scene.get());
-    rtcSetGeometryMask(instance.get(), 0xffffffffu);
-    rtcCommitGeometry(instance.get());
-    rtcAttachGeometry(scene_.get(), instance.get());
-  }
-  rtcJoinCommitScene(scene_.get());
   check_embree(device_.get());
 }
 
@@ -256,47 +273,33 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   }
   const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
   if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
-  if (!scene_) return hit;
-  RTCRayHit query;
-  query.ray = {ray.origin.x,
-               ray.origin.y,
-               ray.origin.z,
-               0,
-               ray.direction.x,
-               ray.direction.y,
-               ray.direction.z,
-               ray.time,
-               hit.distance,
-               0xffffffffu,
-               0,
-               0};
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  embree_intersect(scene_.get(), query, coherence);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
-  return {Hit::Kind::object, query.ray.tfar, query.hit.instID[0],
-          query.hit.primID,  query.hit.u,    query.hit.v};
+  if (objects_.empty()) return hit;
+  RTCRayHit query{embree_ray(ray, hit.distance), {}};
+  const InverseDirection inverse(ray.direction);
+  for (size_t k = 0; k < objects_.size(); ++k) {
+    if (!inverse.meets(objects_[k].bounds, ray.origin, query.ray.tfar)) continue;
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    embree_intersect(objects_[k].scene.get(), query, coherence);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    hit = {Hit::Kind::object, query.ray.tfar, uint32_t(k),
+           query.hit.primID,  query.hit.u,    query.hit.v};
+  }
+  return hit;
 }
 
 bool Scene::occluded(const Ray& ray, float distance) const {
   const float reach = distance * (1 - 1e-4f);
   if (has_ground_ && ground_distance(ray.origin, ray.direction) < reach) return true;
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
-  if (!scene_) return false;
-  RTCRay query{ray.origin.x,
-               ray.origin.y,
-               ray.origin.z,
-               0,
-               ray.direction.x,
-               ray.direction.y,
-               ray.direction.z,
-               ray.time,
-               reach,
-               0xffffffffu,
-               0,
-               0};
-  embree_occluded(scene_.get(), query);
-  return query.tfar < 0;
+  if (objects_.empty()) return false;
+  RTCRay query = embree_ray(ray, reach);
+  const InverseDirection inverse(ray.direction);
+  for (const SceneObject& object : objects_) {
+    if (!inverse.meets(object.bounds, ray.origin, reach)) continue;
+    embree_occluded(object.scene.get(), query);
+    if (query.tfar < 0) return true;
+  }
+  return false;
 }
 
 template <bool moving>
@@ -340,14 +343,14 @@ template Surface Scene::surface<true>(const Ray&, const Hit&) const;
 bool Scene::inside_fluid(const V3f& point, float time) const {
   if (fluid_ < 0) return false;
   // The mesh is closed and outward: a point is inside if the first side met is an inner one.
-  RTCRayHit query;
-  query.ray = {point.x, point.y, point.z, 0, 0, 1, 0, time, kInfinity, 0xffffffffu, 0, 0};
+  const Ray up{point, V3f(0, 1, 0), time};
+  RTCRayHit query{embree_ray(up, kInfinity), {}};
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   embree_intersect(objects_[fluid_].scene.get(), query, Coherence::incoherent);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
   Hit hit{Hit::Kind::object, query.ray.tfar, uint32_t(fluid_),
           query.hit.primID,  query.hit.u,    query.hit.v};
-  return surface<true>({point, V3f(0, 1, 0), time}, hit).geometric_normal.y > 0;
+  return surface<true>(up, hit).geometric_normal.y > 0;
 }
 
 }  // namespace drench

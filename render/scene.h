@@ -2,6 +2,8 @@
 // Everything a ray can meet in one frame: Embree scenes of the fluid and the cloth, the ground, the
 // lights, and which features of the path loop the frame needs.
 
+#include <Imath/ImathBox.h>
+
 #include "pipeline/contract/frames.h"
 #include "render/camera.h"
 #include "render/embree.h"
@@ -18,6 +20,7 @@ struct SceneObject {
   std::vector<V3f> normal;                    // unit, per vertex; empty: flat
   std::vector<V2f> uv;                        // may be empty
   uint32_t material = 0;
+  Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
   bool moves() const { return !position_close.empty(); }
@@ -70,7 +73,6 @@ class Scene {
   void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void build(SceneObject& object);
-  void assemble();
   void find_features();
   bool moves_visibly(const TriangleMesh& mesh) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
@@ -82,7 +84,6 @@ class Scene {
   EmbreeDevice device_;
   std::vector<ShadingMaterial> materials_;
   std::vector<SceneObject> objects_;
-  EmbreeScene scene_;  // instances of the objects' scenes; null without objects
   bool has_ground_ = false;
   V3f ground_center_;
   float ground_half_size_ = 0;
