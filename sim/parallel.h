@@ -13,6 +13,7 @@
 #endif
 
 #include <algorithm>
+#include <atomic>
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -108,5 +109,14 @@ T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
 }
 
 #endif
+
+/// Integer sums do not depend on order: the only atomics there are.
+DRENCH_HD void add_atomic(long long* sum, long long value) {
+#if defined(__CUDA_ARCH__)
+  atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value));
+#elif !defined(__CUDACC__)
+  std::atomic_ref<long long>(*sum).fetch_add(value, std::memory_order_relaxed);
+#endif
+}
 
 }  // namespace drench::sim::DRENCH_BACKEND

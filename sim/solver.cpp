@@ -151,6 +151,7 @@ class BackendSolver : public Solver {
     if (allocated_ & column_contact) {
       for (VecColumn* c : {&f.drag, &f.impulse, &f.start}) c->resize(n);
       f.held.resize(n);
+      f.stopped.resize(n);
       state_.contact.key.resize(n);
     }
     if (allocated_ & column_memory) {
@@ -185,6 +186,7 @@ class BackendSolver : public Solver {
     c.cell.resize(c.triangles);
     c.share.resize(c.vertices);
     c.held.resize(c.vertices);
+    c.stop_sum.resize(size_t(4) * c.vertices);
   }
 
   /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices as

@@ -43,7 +43,7 @@ struct FluidState {
   Column<float> cloth_share;          // share of density that the sheet replaces
   VecColumn drag, impulse;            // kg m/s, tangential part; last change
   VecColumn start;                    // m, position at the start of the step
-  Column<int> held;                   // 1 where the path test stops a particle for this substep
+  Column<int> held, stopped;          // by the path test for this substep; triangle it stopped, -1 none
 };
 
 /// All sheets in one: vertices, springs by vertex, triangles.
@@ -77,7 +77,8 @@ struct ClothState {
   VecColumn predicted;                  // m/s, mean over the step
   Column<float> share;                  // sum of contact weights
   VecColumn force;                      // N from the fluid, constant over the step
-  Column<int> held;                     // 1 where the path test stops a vertex for this substep
+  Column<int> held;                     // by the path test for this substep
+  Column<long long> stop_sum;           // 4 a vertex: see PathTest
 };
 
 /// Contacts sorted by triangle.

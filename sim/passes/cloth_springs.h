@@ -56,7 +56,7 @@ inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   const VecView fluid_force = c.force.view();
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
-  const float margin = 0.1f * p.spacing;  // room for a particle between cloth and wall
+  const float margin = 0.25f * p.spacing;  // room for a particle (move.h) between cloth and wall
   const float open = 1e30f;
   const Vec3<float> low{p.wall[0] ? p.low[0] + margin : -open, p.wall[1] ? p.low[1] + margin : -open,
                         p.wall[2] ? p.low[2] + margin : -open};

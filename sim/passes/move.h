@@ -71,7 +71,7 @@ struct AddGuardCounts {
   }
 };
 
-inline PathTest path_test_of(State& state, float dt) {
+inline PathTest path_test_of(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const VecView next = c.next.view(), start = c.start.view();
@@ -81,21 +81,25 @@ inline PathTest path_test_of(State& state, float dt) {
   const Parameters& p = state.parameters;
   return {polygons_of(c), c.position.view(), next, c.next_velocity.view(), f.velocity.view(),
           f.normal.view(), f.start.view(), f.position.view(), f.owed.view(), f.triangle.data(),
-          f.held.data(), c.held.data(), f.sheet_distance.data(), c.inverse_mass.data(), p.particle_mass,
-          1e-3f * p.spacing, std::sqrt(moved2), dt, 4};
+          c.held.data(), c.stop_sum.data(), f.stopped.data(), f.sheet_distance.data(), c.mass.data(),
+          c.inverse_mass.data(), c.share.data(),
+          p.particle_mass, 1e-3f * p.spacing, std::sqrt(moved2), 4};
 }
 
-/// One round over the near particles (or all, when cloth moves so far that any could meet it): where each
-/// ends, into f.impulse.
+/// The near particles, or all when cloth moves so far that any could meet it.
+inline int path_test_count(const State& state, const PathTest& test) {
+  const bool all = test.cloth_moved > 0.4f * state.parameters.support_radius;
+  return all ? state.fluid.count : state.contact.near;
+}
+
+/// One round: where each particle ends, into f.impulse.
 inline GuardCount test_paths(State& state, const PathTest& test, float dt) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
   const Mover mover = mover_of(state.parameters, dt);
-  const bool all = test.cloth_moved > 0.4f * state.parameters.support_radius;
-  const int count = all ? f.count : state.contact.near;
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int* held = f.held.data();
-  return parallel_reduce("path test", count, GuardCount{}, DRENCH_LAMBDA(int k) {
+  return parallel_reduce("path test", path_test_count(state, test), GuardCount{}, DRENCH_LAMBDA(int k) {
     const int i = order[k];  // the near ones come first
     Vec3<float> velocity = held[i] ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
     Vec3<float> to = mover(x[i], velocity);
@@ -103,22 +107,46 @@ inline GuardCount test_paths(State& state, const PathTest& test, float dt) {
     GuardCount result;
     if (triangle[i] < 0 || test.in_reach(i, to)) {
       const Vec3<float> wanted = to;
-      if (!test.resolve(i, x[i], to)) to = x[i], held[i] = 1, result.unresolved = 1;
-      result.hits = to.x != wanted.x || to.y != wanted.y || to.z != wanted.z;
+      if (!test.resolve(i, x[i], to)) {
+        result.unresolved = 1;
+        held[i] = held[i] || test.stopped[i] < 0;  // nothing left to stop but itself
+      }
+      result.hits = result.unresolved || to.x != wanted.x || to.y != wanted.y || to.z != wanted.z;
     }
     end.set(i, to);
     return result;
   }, AddGuardCounts{});
 }
 
-/// The cloth's substep is taken back where the path test stops vertices, or everywhere.
-inline void hold_cloth(ClothState& c, bool everywhere) {
-  const VecView next = c.next.view(), next_v = c.next_velocity.view(), x = c.position.view();
-  const int* held = c.held.data();
+/// Takes back the substep of the vertices that particles stopped in this round, or of all. A stopped vertex
+/// takes on the mean velocity of those particles; what that changes of its momentum they share.
+inline void hold_cloth(State& state, const PathTest& test, bool everywhere) {
+  ClothState& c = state.cloth;
+  FluidState& f = state.fluid;
+  const VecView next = c.next.view(), next_v = c.next_velocity.view(), x = c.position.view(),
+                velocity = f.velocity.view();
+  const int *order = state.contact.order.data(), *corner = c.corner.data();
+  int* hold = c.held.data();
+  const float* mass = c.mass.data();
+  const float inverse_mass = 1.f / state.parameters.particle_mass;
+  parallel_for("path test: share momentum", path_test_count(state, test), DRENCH_LAMBDA(int k) {
+    const int i = order[k], t = test.stopped[i];
+    if (t < 0) return;
+    Vec3<float> gain{0.f, 0.f, 0.f};
+    for (int e = 0; e < 3; ++e) {
+      const int v = corner[3 * t + e];
+      if (hold[v] || test.inverse_mass[v] == 0.f) continue;
+      gain = gain + (next_v[v] - test.stop_velocity(v)) * (mass[v] / float(test.stop_count(v)));
+    }
+    velocity.set(i, velocity[i] + gain * inverse_mass);
+  });
   parallel_for("path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
-    if (!everywhere && !held[v]) return;
+    const bool stopped = test.stop_count(v) > 0;
+    if (!everywhere && !stopped) return;
+    if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v));
+    for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
+    hold[v] = 1;
     next.set(v, x[v]);
-    next_v.set(v, {0.f, 0.f, 0.f});
   });
 }
 
@@ -145,18 +173,21 @@ inline void move_coupled(State& state) {
   for (int s = 0; s < state.substeps; ++s) {
     cloth_verlet(state, cloth_buffers(c), dt);
     f.held.clear_bytes(0);
+    f.stopped.clear_bytes(0xff);
     c.held.clear_bytes(0);
+    c.stop_sum.clear_bytes(0);
     move_far_particles(state, dt);
     for (int round = 0;; ++round) {
-      const GuardCount count = test_paths(state, path_test_of(state, dt), dt);
+      const PathTest test = path_test_of(state);
+      const GuardCount count = test_paths(state, test, dt);
       state.guard_hits += count.hits;
       if (count.unresolved == 0) break;
       ++state.guard_holds;
-      const bool everywhere = round >= 16;  // nothing moves: free of crossings whatever the tangle
-      hold_cloth(c, everywhere);
+      const bool everywhere = round >= 24;
+      hold_cloth(state, test, everywhere);
       if (!everywhere) continue;
       f.held.clear_bytes(1);
-      test_paths(state, path_test_of(state, dt), dt);
+      test_paths(state, path_test_of(state), dt);
       break;
     }
     f.position.swap(f.impulse);

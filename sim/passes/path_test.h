@@ -1,9 +1,11 @@
 #pragma once
 // The last guard of the exact coupling: the straight path of a particle over a cloth substep against
 // the triangles that move meanwhile. In double on the stored floats, so that whoever counts crossings
-// from the stored states finds none. A particle that would cross is put back on its side, a small
-// clearance off the triangle where it met it; if it finds no free place, it and the vertices there are
-// held for the substep, which is free of crossings because nothing moves.
+// from the stored states finds none. Where they would cross, the lighter one yields: a triangle lighter
+// than the particle is held for the substep and takes on the velocity of the particles that stopped it; a
+// lighter particle is put back on its side of the triangle, a small clearance off the place where they
+// met, by an impulse shared with the vertices. What finds no free place is held; if all is held nothing
+// moves, which is free of crossings whatever the tangle.
 
 #include "sim/geometry.h"
 #include "sim/passes/polygon_grid.h"
@@ -68,11 +70,13 @@ struct PathTest {
   PolygonView polygons;           // cells from the start of the step
   VecView cloth, cloth_next;      // this substep
   VecView cloth_velocity, velocity, normal, start, position, owed;
-  const int *triangle, *held;
-  int* hold;                      // set to 1 for vertices to stop
-  const float *distance, *inverse_mass;
+  const int* triangle;
+  const int* hold;                // by vertex: 1 once stopped
+  long long* stop_sum;            // by vertex, 4: how many particles stop it in this round, sum of their
+                                  // velocities in units of velocity_unit
+  int* stopped;                   // by particle: triangle it stopped in this round, -1 none
+  const float *distance, *cloth_mass, *inverse_mass, *vertex_share;
   float mass, clearance, cloth_moved;  // cloth_moved: m, farthest vertex from its place at the step's start
-  float dt;                       // s, of the substep
   int attempts;                   // 0: the particle is held at once
 
   struct Hit {
@@ -101,21 +105,57 @@ struct PathTest {
     return hit;
   }
 
-  /// Where the particle ends this substep; false if it must be held with the vertices around.
+  /// Do all three corners stand still already?
+  DRENCH_HD bool still(int t) const {
+    const int* k = polygons.corner + 3 * t;
+    return (hold[k[0]] || inverse_mass[k[0]] == 0.f) && (hold[k[1]] || inverse_mass[k[1]] == 0.f) &&
+           (hold[k[2]] || inverse_mass[k[2]] == 0.f);
+  }
+  DRENCH_HD bool lighter(int t) const {
+    const int* k = polygons.corner + 3 * t;
+    return (cloth_mass[k[0]] + cloth_mass[k[1]] + cloth_mass[k[2]]) / 3.f < mass;
+  }
+
+  static constexpr double velocity_unit = 1.0 / (1 << 24);  // m/s
+
+  DRENCH_HD void add_stop(int vertex, Vec3<float> v) const {
+    long long* sum = stop_sum + 4 * vertex;
+    add_atomic(sum, 1);
+    add_atomic(sum + 1, (long long)(v.x / velocity_unit));
+    add_atomic(sum + 2, (long long)(v.y / velocity_unit));
+    add_atomic(sum + 3, (long long)(v.z / velocity_unit));
+  }
+  DRENCH_HD int stop_count(int vertex) const { return int(stop_sum[4 * vertex]); }
+  DRENCH_HD Vec3<float> stop_velocity(int vertex) const {  // mean of the particles that stop it
+    const long long* sum = stop_sum + 4 * vertex;
+    const double scale = velocity_unit / double(sum[0]);
+    return {float(sum[1] * scale), float(sum[2] * scale), float(sum[3] * scale)};
+  }
+
+  /// Where the particle ends this substep; false if another round is needed because it stopped a
+  /// triangle or had to be held itself.
   DRENCH_HD bool resolve(int i, Vec3<float> from, Vec3<float>& to) const {
-    for (int attempt = 0; attempt <= attempts; ++attempt) {
+    stopped[i] = -1;
+    for (int attempt = 0;; ++attempt) {
       const Hit hit = first_hit(from, to);
       if (hit.triangle < 0) return true;
-      if (attempt == attempts) break;
+      if (!still(hit.triangle) && (lighter(hit.triangle) || attempt >= attempts)) {
+        stopped[i] = hit.triangle;
+        for (int k = 0; k < 3; ++k) add_stop(polygons.corner[3 * hit.triangle + k], velocity[i]);
+        return false;
+      }
+      if (attempt >= attempts) {
+        to = from;
+        return false;
+      }
       bounce(i, from, to, hit);
     }
-    const Hit hit = first_hit(from, to);
-    for (int k = 0; k < 3; ++k) hold[polygons.corner[3 * hit.triangle + k]] = 1;
-    return false;
   }
 
   /// Puts the end of the path back on the particle's side of the triangle it met and takes the normal
-  /// part of the relative velocity, shared by the reduced mass; the cloth's part is owed to it.
+  /// part of the relative velocity, once a step and shared by the reduced mass of all contacts on the
+  /// vertices (as in contact_exact.h, or many hits would throw light cloth back); the cloth's part is
+  /// owed to it until the next step.
   DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
     const MovingTriangle m = moving(hit.triangle);
     const Vec3<double> p0 = to_double(from), p1 = to_double(to);
@@ -136,13 +176,15 @@ struct PathTest {
     float row = 1.f / mass;
     for (int c = 0; c < 3; ++c) {
       wall = wall + cloth_velocity[k[c]] * w[c];
-      row += w[c] * w[c] * inverse_mass[k[c]];
+      row += w[c] * maximum(w[c], vertex_share[k[c]]) * inverse_mass[k[c]];
     }
     const float approach = dot(direction, velocity[i] - wall);
     if (approach >= 0.f) return;
     const Vec3<float> impulse = direction * (-approach / row);
-    velocity.set(i, velocity[i] + impulse * (1.f / mass));
     owed.set(i, owed[i] + impulse);
+    // Between fluid on both sides a light sheet can neither move nor take more than its share, and the
+    // rest of the velocity would pile up in a particle that does not move: there it is given up.
+    velocity.set(i, velocity[i] + (still(hit.triangle) ? direction * -approach : impulse * (1.f / mass)));
   }
 
   /// Can the particle meet the sheet at all? Its distance at the start of the step against all motion.
