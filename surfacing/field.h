@@ -12,8 +12,11 @@ namespace drench::surfacing {
 /// c(x) = sum_j weight_j s W(|x - x_j| / support), W the cubic spline with W(0) = 1, W(1) = 0 and
 /// s = 8 / (pi support^3) its normalisation per spacing^3, so that c is 1 inside a full lattice.
 struct ColourKernel {
-  float support;    // spacings
-  float iso_value;  // c of the surface
+  float support;      // spacings
+  float iso_value;    // c of the surface
+  float lone_weight;  // of a particle without neighbours
+
+  ColourKernel(float support, float voxel, float iso_value);  // support and voxel in spacings
 
   float scale() const;
   /// Shape at q = r / support.
@@ -21,12 +24,17 @@ struct ColourKernel {
   /// Weight of a particle at which the field of equal weights is c, from the mean place of its
   /// neighbours (weighted by W, itself among them), `offset` supports away from it.
   ///
-  /// In the bulk it is constant. Where neighbours are missing it grows as wanted / c, which evens
-  /// out the noise of their number. What is wanted follows from how they are missing: on one side,
-  /// the particle lies at a surface of the bulk; on all sides, it is a drop or part of a sheet, and
-  /// then `wanted` is such that the iso surface of a lone particle is a ball of spacing^3. The
-  /// three constants were fitted on relaxed spheres of 65 thousand particles at support 2.5 and iso
-  /// value 0.45: bias 0.020 -> 0.005, scatter 0.026 -> 0.015 spacings against equal weights.
+  /// In the bulk it is constant. Where neighbours are missing it grows as c falls, which evens out
+  /// the noise of their number:
+  /// * missing on one side (a large offset), the particle lies at a surface of the bulk: as 1 / c,
+  /// a
+  ///   little, so that the field there is what it is where the particles lie evenly;
+  /// * missing all around, it is a drop or part of a sheet: from 1 in a sheet one particle thick up
+  /// to
+  ///   the weight that gives a lone particle the volume spacing^3, and between them so that a sheet
+  ///   stretched to 1.5 spacings does not tear.
+  /// The constants were fitted at support 2.5 and iso value 0.45. Relaxed sphere of 65 thousand
+  /// particles, against equal weights: scatter 0.026 -> 0.017, bias 0.020 -> 0.003 spacings.
   float weight(float c, float offset) const;
   float bulk_weight() const;
 };

@@ -168,6 +168,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.bin_s = watch.lap();
 
   const ColourKernel kernel{static_cast<float>(settings.support),
+                            static_cast<float>(settings.voxel),
                             static_cast<float>(settings.iso_value)};
   const std::vector<uint8_t> interior = count_interior(binned);
   binned.weight = weigh_particles(binned, kernel, interior);
@@ -200,7 +201,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.smooth_s = watch.lap();
 
   const float velocity_reach =
-      std::min(2.f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
+      std::min(2.5f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
   std::vector<V3f> velocity = vertex_velocities(mesh, binned, particles.velocity, velocity_reach);
   report.velocity_s = watch.lap();
   return world_mesh(std::move(mesh), binned.lattice, std::move(velocity), std::move(normal));

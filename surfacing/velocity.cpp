@@ -13,13 +13,16 @@ struct PackVector {
   Pack x{}, y{}, z{};
 };
 
+Pack dot(const PackVector& a, const PackVector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
 /// Weighted sums over the particles around eight vertices. d: from the vertex to the particle, in
 /// units of the reach; u: velocity of the particle relative to a nearby one.
 struct Moments {
   Pack weight{};
   PackVector d, u;
   Pack dxx{}, dyy{}, dzz{}, dxy{}, dxz{}, dyz{};
-  std::array<PackVector, 3> ud;  // sums of u_k d
+  PackVector ud[3];  // sums of u_k d
+  Pack uu{};
 
   void add(Pack dx, Pack dy, Pack dz, const V3f& velocity) {
     const Pack near = larger(1.f - (dx * dx + dy * dy + dz * dz), Pack{});
@@ -32,6 +35,7 @@ struct Moments {
     dxz = multiply_add(wx, dz, dxz), dyz = multiply_add(wy, dz, dyz);
     const Pack v[3] = {pack(velocity.x), pack(velocity.y), pack(velocity.z)};
     u = {multiply_add(w, v[0], u.x), multiply_add(w, v[1], u.y), multiply_add(w, v[2], u.z)};
+    uu = multiply_add(w, v[0] * v[0] + v[1] * v[1] + v[2] * v[2], uu);
     for (int k = 0; k < 3; ++k) {
       ud[k].x = multiply_add(wx, v[k], ud[k].x);
       ud[k].y = multiply_add(wy, v[k], ud[k].y);
@@ -39,7 +43,8 @@ struct Moments {
     }
   }
 
-  /// The fit at the vertices themselves: mean of u, less the fitted gradient times the mean of d.
+  /// The fit at the vertices themselves: the mean of u, less the fitted gradient times the mean of
+  /// d.
   PackVector fit() const {
     const Pack one = pack(1.f), inverse = one / larger(weight, pack(1e-30f));
     const PackVector m{d.x * inverse, d.y * inverse, d.z * inverse};
@@ -49,7 +54,7 @@ struct Moments {
                cyz = dyz * inverse - m.y * m.z;
     // A direction spanned by less than a twentieth of the mean extent gives no gradient worth
     // having.
-    const Pack lean = multiply_add(cxx + cyy + czz, pack(2e-3f), pack(1e-6f));
+    const Pack lean = multiply_add(cxx + cyy + czz, pack(1e-3f), pack(1e-6f));
     cxx += lean, cyy += lean, czz += lean;
     // g = C^-1 m by the adjugate of the symmetric matrix; then G m = sum of cov(u, d) g.
     const Pack axx = cyy * czz - cyz * cyz, ayy = cxx * czz - cxz * cxz,
@@ -60,12 +65,19 @@ struct Moments {
     const PackVector g{(axx * m.x + axy * m.y + axz * m.z) * scale,
                        (axy * m.x + ayy * m.y + ayz * m.z) * scale,
                        (axz * m.x + ayz * m.y + azz * m.z) * scale};
-    const auto component = [&](Pack sum, const PackVector& sums) {
-      const Pack mean = sum * inverse;
-      return mean - ((sums.x * inverse - mean * m.x) * g.x + (sums.y * inverse - mean * m.y) * g.y +
-                     (sums.z * inverse - mean * m.z) * g.z);
+    const PackVector mean{u.x * inverse, u.y * inverse, u.z * inverse};
+    const auto slope = [&](Pack average, const PackVector& sums) {
+      return (sums.x * inverse - average * m.x) * g.x + (sums.y * inverse - average * m.y) * g.y +
+             (sums.z * inverse - average * m.z) * g.z;
     };
-    return {component(u.x, ud[0]), component(u.y, ud[1]), component(u.z, ud[2])};
+    const PackVector step{slope(mean.x, ud[0]), slope(mean.y, ud[1]), slope(mean.z, ud[2])};
+    // The step from the mean stays within twice the spread of the particles' velocities: in a
+    // rotation it is about as large as the spread, in a wild splash a gradient of noise would
+    // overshoot.
+    const Pack spread2 = larger(uu * inverse - dot(mean, mean), Pack{});
+    const Pack limit = square_root(4.f * spread2 / larger(dot(step, step), pack(1e-30f)));
+    const Pack share = smaller(limit, one);
+    return {mean.x - share * step.x, mean.y - share * step.y, mean.z - share * step.z};
   }
 };
 

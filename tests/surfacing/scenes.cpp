@@ -1,0 +1,207 @@
+#include "tests/surfacing/scenes.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace drench::surfacing_scenes {
+namespace {
+
+using Imath::V2i;
+using Imath::V3d;
+using Imath::V3f;
+using Imath::V3i;
+
+/// Even numbers from the generator's own bits: std's distributions differ between libraries.
+double even(std::mt19937& random, double low, double high) {
+  return low + (high - low) * (static_cast<double>(random()) / 4294967296.0);
+}
+
+V3d even_vector(std::mt19937& random, double half) {
+  const double x = even(random, -half, half), y = even(random, -half, half);
+  return {x, y, even(random, -half, half)};
+}
+
+ParticleFrame frame_of(const std::vector<V3d>& points, double spacing) {  // points in spacings
+  ParticleFrame frame;
+  frame.spacing = static_cast<float>(spacing);
+  for (const V3d& p : points) frame.position.emplace_back(p * spacing);
+  frame.velocity.resize(points.size(), V3f(0));
+  return frame;
+}
+
+/// Points sorted into cells of one repulsion radius.
+struct CellGrid {
+  int edge;
+  double radius, half;
+  std::vector<uint32_t> first, member;
+
+  CellGrid(const std::vector<V3d>& points, double cell, double half_size)
+      : edge(static_cast<int>(2 * half_size / cell) + 3), radius(cell), half(half_size) {
+    first.assign(static_cast<size_t>(edge) * edge * edge + 1, 0);
+    for (const V3d& p : points) ++first[index(place(p)) + 1];
+    for (size_t c = 1; c < first.size(); ++c) first[c] += first[c - 1];
+    std::vector<uint32_t> next(first.begin(), first.end() - 1);
+    member.resize(points.size());
+    for (uint32_t i = 0; i < points.size(); ++i) member[next[index(place(points[i]))]++] = i;
+  }
+  V3i place(V3d p) const { return V3i((p + V3d(half)) / radius) + V3i(1); }
+  size_t index(V3i c) const { return (static_cast<size_t>(c.z) * edge + c.y) * edge + c.x; }
+};
+
+V3d repulsion(const std::vector<V3d>& points, const CellGrid& grid, uint32_t i) {
+  V3d sum(0);
+  const V3i at = grid.place(points[i]);
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y) {
+      const size_t row = grid.index(at + V3i(-1, y, z));
+      for (uint32_t k = grid.first[row]; k < grid.first[row + 3]; ++k) {
+        const V3d d = points[i] - points[grid.member[k]];
+        const double r2 = d.length2();
+        if (r2 == 0 || r2 >= grid.radius * grid.radius) continue;
+        const double r = std::sqrt(r2), near = 1 - r / grid.radius;
+        sum += d * (near * near / r);
+      }
+    }
+  return sum;
+}
+
+}  // namespace
+
+double ball_radius(size_t n, double spacing) {
+  return spacing * std::cbrt(3 * static_cast<double>(n) / (4 * std::numbers::pi));
+}
+
+ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed) {
+  const double radius = ball_radius(n, 1);
+  const int half = static_cast<int>(radius) + 2;
+  std::mt19937 random(seed);
+  const V3d shift = even_vector(random, 0.5);
+  std::vector<V3d> points;
+  for (int z = -half; z <= half; ++z)
+    for (int y = -half; y <= half; ++y)
+      for (int x = -half; x <= half; ++x)
+        if (const V3d p = V3d(x, y, z) + shift; p.length() < radius + 1) points.push_back(p);
+  std::vector<double> distance;
+  for (const V3d& p : points) distance.push_back(p.length2());
+  std::nth_element(distance.begin(), distance.begin() + static_cast<long>(n), distance.end());
+  const double limit = distance[n];
+  std::erase_if(points, [&](const V3d& p) { return p.length2() >= limit; });
+  for (V3d& p : points) p += even_vector(random, 0.25);
+  for (int step = 0; step < steps; ++step) {
+    const CellGrid grid(points, 1.4, half + 1);
+    std::vector<V3d> moved(points.size());
+    tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(points.size()), [&](uint32_t i) {
+      moved[i] = points[i] + 0.15 * repulsion(points, grid, i);
+      const double r = moved[i].length(), wall = radius - 0.5;
+      if (r > wall) moved[i] *= wall / r;
+    });
+    points.swap(moved);
+  }
+  ParticleFrame frame = frame_of(points, spacing);
+  for (size_t i = 0; i < points.size(); ++i)
+    frame.velocity[i] = V3f(frame.position[i].z, 0, -frame.position[i].x);
+  return frame;
+}
+
+ParticleFrame shaken_box(V3f corner, V3i cells, double spacing, double shake, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<V3d> points;
+  for (int z = 0; z < cells.z; ++z)
+    for (int y = 0; y < cells.y; ++y)
+      for (int x = 0; x < cells.x; ++x)
+        points.push_back(V3d(corner) / spacing + V3d(x + 0.5, y + 0.5, z + 0.5) +
+                         even_vector(random, shake));
+  return frame_of(points, spacing);
+}
+
+ParticleFrame random_cloud(size_t n, double per_cell, double spacing, uint32_t seed) {
+  std::mt19937 random(seed);
+  const double half = 0.5 * std::cbrt(static_cast<double>(n) / per_cell);
+  std::vector<V3d> points(n);
+  for (V3d& p : points) p = even_vector(random, half);
+  ParticleFrame frame = frame_of(points, spacing);
+  for (V3f& v : frame.velocity) v = V3f(even_vector(random, 1));
+  return frame;
+}
+
+ParticleFrame lone_particles(size_t count, double spacing, uint32_t seed) {
+  std::mt19937 random(seed);
+  const int edge = static_cast<int>(std::ceil(std::cbrt(static_cast<double>(count))));
+  std::vector<V3d> points;
+  for (size_t i = 0; i < count; ++i) {
+    const int k = static_cast<int>(i);
+    points.push_back(6.0 * V3d(k % edge, k / edge % edge, k / edge / edge) +
+                     even_vector(random, 0.5));
+  }
+  return frame_of(points, spacing);
+}
+
+ParticleFrame sheet(V2i cells, double stretch, double spacing, double shake, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<V3d> points;
+  for (int y = 0; y < cells.y; ++y)
+    for (int x = 0; x < cells.x; ++x)
+      points.push_back(V3d(x * stretch, y * stretch, 0) + even_vector(random, shake));
+  return frame_of(points, spacing);
+}
+
+ParticleFrame splash(size_t n, double spacing, uint32_t seed) {
+  std::mt19937 random(seed);
+  const double wanted = static_cast<double>(n);
+  const int depth = std::max(4, static_cast<int>(std::cbrt(wanted) / 4));
+  const int width = static_cast<int>(std::sqrt(0.93 * wanted / depth));
+  std::vector<V3d> points;
+  const auto wave = [&](double x, double z) {
+    return 1.5 * std::sin(0.21 * x) * std::cos(0.17 * z);
+  };
+  for (int z = 0; z < width; ++z)
+    for (int x = 0; x < width; ++x)
+      for (int y = 0; y < depth + wave(x, z); ++y)
+        points.push_back(V3d(x, y, z) + even_vector(random, 0.3));
+  // The crown: a cone that opens upwards, 1.05 spacings between its particles.
+  const double radius = width * 0.25;
+  const int around = static_cast<int>(2 * std::numbers::pi * radius / 1.05);
+  const int layers = static_cast<int>(0.04 * wanted / around);
+  for (int layer = 0; layer < layers; ++layer)
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * std::numbers::pi * k / around, r = radius + 0.3 * layer;
+      points.push_back(V3d(width / 2.0 + r * std::cos(angle), depth + 1.0 * layer,
+                           width / 2.0 + r * std::sin(angle)) +
+                       even_vector(random, 0.1));
+    }
+  while (points.size() < n) {  // drops
+    const V3d middle(even(random, 0, width), depth + even(random, 5, width),
+                     even(random, 0, width));
+    const double size = even(random, 0, 1);
+    const int count = 1 + static_cast<int>(30 * size * size * size);
+    const double drop = 0.62 * std::cbrt(count);
+    for (int k = 0; k < count; ++k) {
+      V3d p = even_vector(random, drop);
+      while (p.length() > drop) p = even_vector(random, drop);
+      points.push_back(middle + p);
+    }
+  }
+  ParticleFrame frame = frame_of(points, spacing);
+  for (V3f& v : frame.velocity) v = V3f(0, -1, 0) + V3f(even_vector(random, 0.5));
+  return frame;
+}
+
+void shuffle(ParticleFrame& frame, uint32_t seed) {
+  std::mt19937 random(seed);
+  for (size_t i = frame.position.size(); i-- > 1;) {
+    const size_t j = random() % (i + 1);
+    std::swap(frame.position[i], frame.position[j]);
+    std::swap(frame.velocity[i], frame.velocity[j]);
+  }
+}
+
+void append(ParticleFrame& frame, const ParticleFrame& more) {
+  frame.position.insert(frame.position.end(), more.position.begin(), more.position.end());
+  frame.velocity.insert(frame.velocity.end(), more.velocity.begin(), more.velocity.end());
+}
+
+}  // namespace drench::surfacing_scenes
