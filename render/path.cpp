@@ -12,6 +12,7 @@
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_dielectric.h"
+#include "render/color.h"
 #include "render/guide.h"
 
 namespace drench {
@@ -132,19 +133,28 @@ class PathTracer {
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
+    V3f found = state.throughput;
     if (hit.kind == Hit::Kind::light) {
       const float pdf =
           kLights && state.bsdf_pdf > 0
               ? lights.shape_pdf(int(hit.index), state.vertex, direction, hit.distance)
               : 0.f;
-      radiance_ +=
-          state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf);
-      return;
+      found *= lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf);
+    } else {
+      if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
+      found *= lights.infinite_radiance(state.vertex, direction, state.bsdf_pdf > 0,
+                                        [&](float pdf) { return emission_weight(state, pdf); });
     }
-    if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
-    radiance_ += state.throughput *
-                 lights.infinite_radiance(state.vertex, direction, state.bsdf_pdf > 0,
-                                          [&](float pdf) { return emission_weight(state, pdf); });
+    if constexpr (kWater) found = limit_caustic(state, found);
+    radiance_ += found;
+  }
+
+  /// What a surface got through or off the water, held below the shot's limit if it sets one.
+  V3f limit_caustic(const PathState& state, const V3f& found) const {
+    if (settings_.caustic_limit == 0 || state.diffuse == 0 || state.bsdf_pdf > 0) return found;
+    const float brightness = luminance(found);
+    return brightness > settings_.caustic_limit ? found * (settings_.caustic_limit / brightness)
+                                                : found;
   }
 
   /// Continues the path along `direction` from the surface.

@@ -26,6 +26,7 @@ struct PathSample {
 
 struct PathSettings {
   int depth = 8;
+  float caustic_limit = 0;  // W/(sr m^2); 0: none
   Estimator estimator = Estimator::mis;
   FirstInterface first_interface = FirstInterface::one;
   WaterGuide water_guide = WaterGuide::on;

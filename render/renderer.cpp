@@ -139,6 +139,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   const Scene scene(shot, frame, geometry, options);
   PathSettings path;
   path.depth = shot.render.depth;
+  path.caustic_limit = float(shot.render.caustic_limit);
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;

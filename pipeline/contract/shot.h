@@ -185,6 +185,8 @@ struct RenderSettings {
   int samples = 64;               // camera samples a pixel
   int depth = 8;                  // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
+  double caustic_limit =
+      0;  // W/(sr m^2), most that one path through water to a lamp adds; 0: no limit
   uint32_t seed = 1;
 };
 
