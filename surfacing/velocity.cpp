@@ -74,7 +74,9 @@ struct Moments {
     // The step from the mean stays within twice the spread of the particles' velocities: in a
     // rotation it is about as large as the spread, in a wild splash a gradient of noise would
     // overshoot.
-    const Pack spread2 = larger(uu * inverse - dot(mean, mean), Pack{});
+    // A millionth is taken off for rounding, so that a lone particle has no spread at all.
+    const Pack square = uu * inverse;
+    const Pack spread2 = larger(square * (1 - 1e-6f) - dot(mean, mean), Pack{});
     const Pack limit = square_root(4.f * spread2 / larger(dot(step, step), pack(1e-30f)));
     const Pack share = smaller(limit, one);
     return {mean.x - share * step.x, mean.y - share * step.y, mean.z - share * step.z};
