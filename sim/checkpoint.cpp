@@ -18,7 +18,7 @@ void transfer(Archive& archive, C& c) {
   for (auto* v : {&s.position, &s.velocity, &s.owed, &s.cloth_position, &s.cloth_velocity}) {
     archive(v->x), archive(v->y), archive(v->z);
   }
-  archive(s.id), archive(s.memory_triangle), archive(s.memory_side), archive(s.lambda);
+  archive(s.id), archive(s.memory_triangle), archive(s.memory_side);
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
 }
 

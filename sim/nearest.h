@@ -30,8 +30,6 @@ inline void find_nearest_triangles(State& state, float reach) {
     }
     float best = reach * reach;
     polygons.for_each_near_box(p, p, reach, [&](int t) {
-      const float away = length(p - polygons.centroid[t]) - sqrtf(polygons.radius2[t]);
-      if (away > 0.f && away * away > best) return;
       Vec3<float> a, b, c;
       polygons.corners(t, a, b, c);
       const ClosestPoint<float> foot = closest_point(p, a, b, c);
@@ -46,41 +44,97 @@ inline void find_nearest_triangles(State& state, float reach) {
 #else
 
 /// Candidate triangles of one fluid cell: those whose bounding sphere comes within reach of the box.
-inline void gather_candidates(const PolygonView& polygons, Vec3<float> low, Vec3<float> high, float reach,
-                              std::vector<int>& candidates) {
-  candidates.clear();
-  polygons.for_each_near_box(low, high, reach, [&](int t) {
-    const Vec3<float> m = polygons.centroid[t];
-    const Vec3<float> out{max0(maximum(low.x - m.x, m.x - high.x)), max0(maximum(low.y - m.y, m.y - high.y)),
-                          max0(maximum(low.z - m.z, m.z - high.z))};
-    const float limit = reach + std::sqrt(polygons.radius2[t]);
-    if (length2(out) <= limit * limit) candidates.push_back(t);
-  });
-}
+/// Bounding spheres lie in the order of the polygon grid, so eight are tested at once.
+struct Candidates {
+  std::vector<int> triangle;
+  std::vector<float> x, y, z, radius;  // padded by eight
 
-/// Eight particles (the last repeated) against all candidates.
-inline void nearest_of_pack(const PolygonView& polygons, const VecView& position, int begin, int count,
-                            float reach, const std::vector<int>& candidates, const NearestOutput& out) {
-  alignas(32) float lane[6][8];
-  for (int k = 0; k < 8; ++k) {
-    const Vec3<float> p = position[begin + std::min(k, count - 1)];
-    lane[0][k] = p.x, lane[1][k] = p.y, lane[2][k] = p.z;
+  void gather(const PolygonView& polygons, Vec3<float> low, Vec3<float> high, float reach) {
+    triangle.clear(), x.clear(), y.clear(), z.clear(), radius.clear();
+    polygons.for_each_range(low, high, reach, [&](int begin, int end) {
+      for (int k = begin; k < end; k += 8) {
+        int bits = polygons.sphere_near(Lanes{k}, low, high, reach).bits();
+        if (k + 8 > end) bits &= (1 << (end - k)) - 1;
+        for (; bits; bits &= bits - 1) add(polygons, k + __builtin_ctz(bits));
+      }
+    });
+    for (std::vector<float>* column : {&x, &y, &z, &radius}) column->resize(triangle.size() + 8, 1e15f);
   }
-  const Vec3<Pack> p{Pack::load(lane[0]), Pack::load(lane[1]), Pack::load(lane[2])};
-  Pack best(reach * reach), which(-1.f), wb(0.f), wc(0.f);
-  for (size_t k = 0; k < candidates.size(); ++k) {
+
+ private:
+  void add(const PolygonView& polygons, int k) {
+    triangle.push_back(polygons.order[k]);
+    x.push_back(polygons.sorted_centroid.x[k]), y.push_back(polygons.sorted_centroid.y[k]);
+    z.push_back(polygons.sorted_centroid.z[k]), radius.push_back(polygons.sorted_radius[k]);
+  }
+};
+
+/// Nearest triangles of eight particles as they are known so far.
+struct NearestOfPack {
+  Vec3<Pack> p;
+  Pack best, which{-1.f}, wb{0.f}, wc{0.f};
+
+  DRENCH_HD void test(const PolygonView& polygons, int triangle, int k) {
     Vec3<float> a, b, c;
-    polygons.corners(candidates[k], a, b, c);
+    polygons.corners(triangle, a, b, c);
     const ClosestPoint<Pack> foot =
         closest_point<Pack>(p, {a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z});
     const Mask closer = foot.distance2 < best;
     best = select(closer, foot.distance2, best), which = select(closer, Pack(float(k)), which);
     wb = select(closer, foot.wb, wb), wc = select(closer, foot.wc, wc);
   }
-  which.store(lane[3]), wb.store(lane[4]), wc.store(lane[5]);
+  /// Could the triangle in this bounding sphere be nearer than what any of the eight has?
+  DRENCH_HD bool may_improve(Vec3<float> m, float radius) const {
+    const Vec3<Pack> d = p - Vec3<Pack>{m.x, m.y, m.z};
+    const Pack away = max0(square_root(length2(d)) - Pack(radius));
+    return (away * away < best).bits() != 0;
+  }
+  float farthest() const {
+    alignas(32) float lane[8];
+    best.store(lane);
+    return std::sqrt(*std::max_element(lane, lane + 8));
+  }
+};
+
+/// Eight particles (the last repeated) against the candidates: the one whose centroid is nearest first,
+/// then those whose bounding sphere could still hold a nearer point for one of the eight.
+inline void nearest_of_pack(const PolygonView& polygons, const VecView& position, int begin, int count,
+                            float reach, const Candidates& candidates, const NearestOutput& out) {
+  alignas(32) float lane[3][8];
+  Bounds box;
+  for (int k = 0; k < 8; ++k) {
+    const Vec3<float> p = position[begin + std::min(k, count - 1)];
+    box = JoinBounds{}(box, bounds_of(p));
+    lane[0][k] = p.x, lane[1][k] = p.y, lane[2][k] = p.z;
+  }
+  NearestOfPack pack{{Pack::load(lane[0]), Pack::load(lane[1]), Pack::load(lane[2])}, Pack(reach * reach)};
+  const Vec3<float> centre = (box.low + box.high) * 0.5f;
+  const float half = 0.5f * length(box.high - box.low);
+  const int n = int(candidates.triangle.size());
+  static thread_local std::vector<float> bound;  // centroid distance less both radii
+  bound.resize(n + 8);
+  int first = 0;
+  float least = 1e30f;
+  for (int k = 0; k < n; k += 8) {
+    const Vec3<Pack> d{Pack::load(&candidates.x[k]) - Pack(centre.x), Pack::load(&candidates.y[k]) - Pack(centre.y),
+                       Pack::load(&candidates.z[k]) - Pack(centre.z)};
+    (square_root(length2(d)) - Pack::load(&candidates.radius[k]) - Pack(half)).store(&bound[k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    if (bound[k] < least) least = bound[k], first = k;
+  }
+  pack.test(polygons, candidates.triangle[first], first);
+  float limit = pack.farthest();
+  for (int k = 0; k < n; ++k) {
+    if (bound[k] > limit || k == first) continue;
+    if (!pack.may_improve({candidates.x[k], candidates.y[k], candidates.z[k]}, candidates.radius[k])) continue;
+    pack.test(polygons, candidates.triangle[k], k);
+    limit = pack.farthest();
+  }
+  pack.which.store(lane[0]), pack.wb.store(lane[1]), pack.wc.store(lane[2]);
   for (int k = 0; k < count; ++k) {
-    out.triangle[begin + k] = lane[3][k] < 0.f ? -1 : candidates[size_t(lane[3][k])];
-    out.weight_b[begin + k] = lane[4][k], out.weight_c[begin + k] = lane[5][k];
+    out.triangle[begin + k] = lane[0][k] < 0.f ? -1 : candidates.triangle[size_t(lane[0][k])];
+    out.weight_b[begin + k] = lane[1][k], out.weight_c[begin + k] = lane[2][k];
   }
 }
 
@@ -94,7 +148,7 @@ inline void find_nearest_triangles(State& state, float reach) {
   std::fill_n(out.triangle, f.count, -1);
   const GridShape g = f.grid;
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
-    static thread_local std::vector<int> candidates;
+    static thread_local Candidates candidates;
     for (int row = range.begin(); row < range.end(); ++row) {
       for (int cell = row * g.nx; cell < (row + 1) * g.nx; ++cell) {
         const int begin = cell_start[cell], end = cell_start[cell + 1];
@@ -106,8 +160,8 @@ inline void find_nearest_triangles(State& state, float reach) {
             box.low.z > sheet_high.z + reach || box.high.z < sheet_low.z - reach) {
           continue;
         }
-        gather_candidates(polygons, box.low, box.high, reach, candidates);
-        if (candidates.empty()) continue;
+        candidates.gather(polygons, box.low, box.high, reach);
+        if (candidates.triangle.empty()) continue;
         for (int i = begin; i < end; i += 8) {
           nearest_of_pack(polygons, position, i, std::min(8, end - i), reach, candidates, out);
         }

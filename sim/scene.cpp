@@ -271,7 +271,6 @@ Scene build_scene(const Shot& shot) {
   start.memory_triangle.assign(start.id.size(), -1);
   start.memory_side.assign(start.id.size(), 1);
   start.owed.resize(start.id.size());
-  start.lambda.assign(start.id.size(), 0.f);
   double dt_limit = 1e30;
   for (size_t s = 0; s < shot.cloth.size(); ++s) {
     scene.sheet.push_back(build_sheet(shot.cloth[s]));

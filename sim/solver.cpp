@@ -41,7 +41,6 @@ class BackendSolver : public Solver {
       from_host(state_.fluid.memory_triangle, host.memory_triangle);
       from_host(state_.fluid.memory_side, host.memory_side);
       upload(state_.fluid.owed, host.owed);
-      from_host(state_.fluid.lambda, host.lambda);
     }
     if (allocated_ & column_cloth) {
       upload(state_.cloth.position, host.cloth_position);
@@ -64,7 +63,6 @@ class BackendSolver : public Solver {
       host.memory_triangle = to_host(f.memory_triangle, n);
       host.memory_side = to_host(f.memory_side, n);
       host.owed = download(f.owed, n);
-      host.lambda = to_host(f.lambda, n);
     }
     if (allocated_ & column_cloth) {
       host.cloth_position = download(state_.cloth.position, state_.cloth.vertices);
@@ -98,7 +96,6 @@ class BackendSolver : public Solver {
       f.memory_side.upload(std::vector<int>(more, 1).data(), more, at);
       const std::vector<float> none(more, 0.f);
       put(f.owed, {none, none, none});
-      f.lambda.upload(none.data(), more, at);
     }
     f.count = int(at + more);
   }
@@ -150,6 +147,7 @@ class BackendSolver : public Solver {
     }
     if (allocated_ & column_contact) {
       for (VecColumn* c : {&f.drag, &f.impulse, &f.start}) c->resize(n);
+      f.lambda.resize(n);
       f.held.resize(n);
       f.stopped.resize(n);
       state_.contact.key.resize(n);
@@ -158,7 +156,6 @@ class BackendSolver : public Solver {
       f.memory_triangle.resize(n);
       f.memory_side.resize(n);
       f.owed.resize(n);
-      f.lambda.resize(n);
     }
   }
 
@@ -183,6 +180,8 @@ class BackendSolver : public Solver {
     c.force.clear();
     c.centroid.resize(c.triangles);
     c.radius2.resize(c.triangles);
+    c.sorted_centroid.resize(c.triangles + 8);
+    c.sorted_radius.resize(c.triangles + 8);
     c.cell.resize(c.triangles);
     c.share.resize(c.vertices);
     c.held.resize(c.vertices);

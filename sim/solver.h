@@ -23,7 +23,6 @@ struct HostState {
   HostVec position, velocity;  // m local, m/s
   std::vector<int> id, memory_triangle, memory_side;
   HostVec owed;                // kg m/s
-  std::vector<float> lambda;   // N
   HostVec cloth_position, cloth_velocity;
   Limits limits;               // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;

@@ -26,7 +26,6 @@ struct FluidState {
   Column<int> id;
   Column<int> memory_triangle;        // triangle whose side is remembered, -1 none   (exact coupling)
   Column<int> memory_side;            // +1 or -1
-  Column<float> lambda;               // N, normal contact force of the last step: the next one's first guess
   VecColumn owed;                     // kg m/s that the path test took and cloth has not received yet
   // rebuilt every step
   VecColumn acceleration;             // m/s^2
@@ -41,6 +40,7 @@ struct FluidState {
   Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
   Column<float> edge;                 // 0 beyond a free edge .. 1 half a spacing inside it
   Column<float> cloth_share;          // share of density that the sheet replaces
+  Column<float> lambda;               // kg m/s, normal impulse of the contact solve
   VecColumn drag, impulse;            // kg m/s, tangential part; last change
   VecColumn start;                    // m, position at the start of the step
   Column<int> held, stopped;          // by the path test for this substep; triangle it stopped, -1 none
@@ -71,6 +71,8 @@ struct ClothState {
   VecColumn centroid;
   Column<float> radius2;                // m^2, centroid to farthest corner
   Column<int> cell, order, cell_start;  // polygons by centroid
+  VecColumn sorted_centroid;            // m, in that order, padded by 8
+  Column<float> sorted_radius;          // m
   GridShape grid{};
   float largest_radius = 0;             // m
   Vec3<float> low{}, high{};            // m, bounds of all vertices

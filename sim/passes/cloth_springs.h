@@ -89,8 +89,8 @@ inline ClothBuffers cloth_buffers(ClothState& c) {
   return {c.position.view(), c.velocity.view(), c.next.view(), c.next_velocity.view()};
 }
 
-// The mean velocity each vertex would have over the step under the contact impulses known so far: the
-// substeps themselves, made into spare columns. Whatever the springs do within a step is then in it.
+// The mean velocity each vertex would have over the step without contact: the substeps themselves, made
+// into spare columns. Whatever the springs do within a step is then in it.
 inline void cloth_predict(State& state) {
   if (state.contact.near == 0) return;
   ClothState& c = state.cloth;

@@ -94,11 +94,7 @@ struct PathTest {
     Hit hit;
     const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
     const Vec3<float> high{maximum(from.x, to.x), maximum(from.y, to.y), maximum(from.z, to.z)};
-    const Vec3<float> middle = (low + high) * 0.5f;
-    const float half = 0.5f * length(to - from) + cloth_moved + clearance;
     polygons.for_each_near_box(low, high, cloth_moved + clearance, [&](int t) {
-      const float limit = half + sqrtf(polygons.radius2[t]);
-      if (length2(polygons.centroid[t] - middle) > limit * limit) return;
       const double time = crossing_time(moving(t), to_double(from), to_double(to));
       if (time >= 0 && time < hit.time) hit = {t, time};
     });

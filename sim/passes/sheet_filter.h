@@ -27,13 +27,9 @@ struct SheetFilter {
     const Vec3<float> from = swap ? q : p, to = swap ? p : q;
     const Vec3<float> low{minimum(p.x, q.x), minimum(p.y, q.y), minimum(p.z, q.z)};
     const Vec3<float> high{maximum(p.x, q.x), maximum(p.y, q.y), maximum(p.z, q.z)};
-    const Vec3<float> middle = (low + high) * 0.5f;
-    const float half = 0.5f * length(q - p);
     bool hidden = false;
     polygons.for_each_near_box(low, high, 0.f, [&](int t) {
       if (hidden) return;
-      const float limit = half + sqrtf(polygons.radius2[t]);
-      if (length2(polygons.centroid[t] - middle) > limit * limit) return;
       Vec3<float> a, b, c;
       polygons.corners(t, a, b, c);
       hidden = segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));

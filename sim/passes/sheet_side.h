@@ -89,8 +89,7 @@ inline void find_sheet_sides(State& state) {
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
-  float *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data(),
-        *lambda = f.lambda.data();
+  float *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
   parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
@@ -99,7 +98,6 @@ inline void find_sheet_sides(State& state) {
     distance[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f;
     if (t < 0) {
       memory_triangle[i] = -1;
-      lambda[i] = 0.f;
       return;
     }
     const float wb = weight_b[i], wc = weight_c[i], wa = 1.f - wb - wc;
