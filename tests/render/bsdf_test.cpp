@@ -1,0 +1,161 @@
+// Surfaces: Fresnel and Snell, the cloth's densities and energy, textures where they belong.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <random>
+
+#include "render/bsdf_cloth.h"
+#include "render/bsdf_dielectric.h"
+#include "render/material.h"
+#include "tests/render/support.h"
+
+namespace drench::test {
+namespace {
+
+V3f at_angle(double angle) {  // towards a surface with normal +y
+  return {float(std::sin(angle)), float(-std::cos(angle)), 0};
+}
+
+TEST(Interface, BendsBySnellsLaw) {
+  for (double degrees = 1; degrees < 90; degrees += 4) {
+    const double sin_in = std::sin(degrees * kPi64 / 180);
+    const InterfaceSplit split =
+        split_at_interface(at_angle(degrees * kPi64 / 180), {0, 1, 0}, 1.333f);
+    EXPECT_NEAR(split.refracted.x, sin_in / 1.333, 1e-6);
+    EXPECT_LT(split.refracted.y, 0);
+    EXPECT_NEAR(split.reflected.x, sin_in, 1e-6);
+    EXPECT_GT(split.reflected.y, 0);
+  }
+}
+
+TEST(Interface, ReflectsHalfOfOnePolarisationAtBrewstersAngle) {
+  // There the parallel part vanishes and the other is ((n^2 - 1) / (n^2 + 1))^2.
+  const double n = 1.333;
+  const InterfaceSplit split = split_at_interface(at_angle(std::atan(n)), {0, 1, 0}, float(n));
+  EXPECT_NEAR(split.reflectance, 0.5 * std::pow((n * n - 1) / (n * n + 1), 2), 1e-6);
+}
+
+TEST(Interface, ReflectsTheSameShareFromBothSides) {
+  for (double degrees = 1; degrees < 88; degrees += 3) {
+    const InterfaceSplit out = split_at_interface(at_angle(degrees * kPi64 / 180), {0, 1, 0}, 1.5f);
+    const InterfaceSplit back = split_at_interface(-out.refracted, {0, -1, 0}, 1 / 1.5f);
+    EXPECT_NEAR(out.reflectance, back.reflectance, 2e-5) << degrees;
+  }
+}
+
+TEST(Interface, ReflectsTotallyBeyondTheCriticalAngle) {
+  const double critical = std::asin(1 / 1.333);
+  EXPECT_EQ(split_at_interface(at_angle(critical + 1e-3), {0, 1, 0}, 1 / 1.333f).reflectance, 1);
+  EXPECT_LT(split_at_interface(at_angle(critical - 1e-3), {0, 1, 0}, 1 / 1.333f).reflectance, 1);
+}
+
+struct RandomCloth {
+  std::mt19937 random{9};
+  float uniform() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
+  V3f direction() { return Basis({0, 0, 1}).world(sample_cone({uniform(), uniform()}, 2)); }
+  ClothBsdf bsdf(float bend) {
+    const V3f geometric = direction();
+    V3f shading = normalized(geometric + direction() * bend);
+    if (dot(shading, geometric) < 0.05f) shading = geometric;
+    return {direction(), geometric, shading, V3f(0.5f, 0.3f, 0.1f), V3f(0.2f, 0.3f, 0.4f)};
+  }
+};
+
+TEST(Cloth, SamplesWithTheDensityAndValueItStates) {
+  RandomCloth cloth;
+  int kept = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const ClothBsdf bsdf = cloth.bsdf(0.5f);
+    const ClothScatter s = bsdf.sample(cloth.uniform(), {cloth.uniform(), cloth.uniform()});
+    if (!(s.pdf > 0)) continue;
+    ++kept;
+    float pdf = 0;
+    const V3f value = bsdf.value(s.direction, pdf);
+    ASSERT_NEAR(pdf, s.pdf, 1e-5f * pdf + 1e-7f);
+    for (int c = 0; c < 3; ++c)
+      ASSERT_NEAR(value[c], s.weight[c] * s.pdf, 1e-5f * value[c] + 1e-7f);
+  }
+  EXPECT_GT(kept, 15000);
+}
+
+TEST(Cloth, ReturnsReflectanceAndTransmittanceWhenFlatAndNeverMore) {
+  RandomCloth cloth;
+  for (const float bend : {0.f, 0.4f}) {
+    const ClothBsdf bsdf = cloth.bsdf(bend);
+    V3d sum(0);
+    constexpr int kDraws = 1 << 18;
+    for (int k = 0; k < kDraws; ++k) {  // uniform over the sphere
+      float pdf = 0;
+      sum += V3d(bsdf.value(cloth.direction(), pdf)) * (4 * kPi64 / kDraws);
+    }
+    for (int c = 0; c < 3; ++c) {
+      const double albedo = bsdf.albedo()[c];
+      // |cos| over the sphere varies by 0.58 of its mean: 4 sigma of 2^18 draws is 0.5 %; the two
+      // sides differ, which at most doubles that.
+      EXPECT_LT(sum[c], albedo * 1.01);
+      if (bend == 0) {
+        EXPECT_NEAR(sum[c], albedo, albedo * 0.01);
+      }
+    }
+  }
+}
+
+TEST(Cloth, IsTheSameSeenFromTheOtherEnd) {
+  // f(a, b) = f(b, a): value / cos, on a flat sheet.
+  RandomCloth cloth;
+  for (int k = 0; k < 1000; ++k) {
+    const V3f n = cloth.direction(), a = cloth.direction(), b = cloth.direction();
+    const V3f r(0.5f), t(0.25f);
+    float pdf = 0;
+    const float forth = ClothBsdf(a, n, n, r, t).value(b, pdf).x / std::abs(dot(b, n));
+    const float back = ClothBsdf(b, n, n, r, t).value(a, pdf).x / std::abs(dot(a, n));
+    ASSERT_NEAR(forth, back, 1e-5f);
+  }
+}
+
+TEST(Texture, LiesOnTheClothByItsCoordinates) {
+  // A 2 x 2 picture: red, green above; blue, white below. u runs along x, v along z (sheet_mesh).
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("drench_weave_" + std::to_string(::getpid()) + ".png");
+  write_png(path, 2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255});
+  Shot shot = plain_shot(16, 4);
+  shot.light = {sky(1)};
+  Material cotton = diffuse("cotton", 0.8f);
+  cotton.texture = path;
+  shot.material = {cotton};
+  const TriangleMesh sheet = sheet_mesh(2, [](float, float) { return 0.f; });
+  const auto seen = [&](double x, double z) {
+    aim_narrow(shot, {x, 3, z}, {x, 0, z});
+    const Film film = render_frame(shot, 1001, {{}, {{"cloth", sheet}}});
+    return V3f(float(channel_mean(film, 0).value), float(channel_mean(film, 1).value),
+               float(channel_mean(film, 2).value));
+  };
+  // v = 0 is the picture's bottom and z = -1. Flat cloth under a sky of 1 shows its reflectance.
+  const V3f blue = seen(-0.5, -0.5), white = seen(0.5, -0.5), red = seen(-0.5, 0.5),
+            green = seen(0.5, 0.5);
+  std::filesystem::remove(path);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 0.8, 0.01);
+  EXPECT_NEAR(red.x, 0.8 * 0.613, 0.01);
+  EXPECT_NEAR(green.y, 0.8 * 0.916, 0.01);
+  EXPECT_NEAR(blue.z, 0.8 * 0.870, 0.01);
+}
+
+TEST(Checker, AlternatesInSquaresOfItsSize) {
+  Shot shot;
+  Material ground = diffuse("ground", 0.6f);
+  ground.checker = true;
+  ground.checker_size = 0.25;
+  shot.material = {ground};
+  const ShadingMaterial material = find_material(shot, "ground");
+  const float light = material.reflectance_at({0.1f, 0.1f}).x;
+  EXPECT_FLOAT_EQ(light, 0.6f);
+  EXPECT_LT(material.reflectance_at({0.3f, 0.1f}).x, light);
+  EXPECT_LT(material.reflectance_at({-0.1f, 0.1f}).x, light);
+  EXPECT_FLOAT_EQ(material.reflectance_at({-0.1f, -0.1f}).x, light);
+  EXPECT_FLOAT_EQ(material.reflectance_at({0.6f, 0.1f}).x, light);
+}
+
+}  // namespace
+}  // namespace drench::test
