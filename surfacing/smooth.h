@@ -37,7 +37,7 @@ std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
 /// rounding: a small one (a drop) by scaling, others by an even shift along the normals.
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
 
-/// One pass of averaging unit normals over the ring.
+/// Averages unit normals over the ring, `passes` times.
 void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int passes);
 
 }  // namespace drench::surfacing
