@@ -68,7 +68,7 @@ struct ContactSolve {
   float* lambda;
   VecView predicted;
   const float *inverse_mass, *vertex_share;
-  float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
+  float relaxation, beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
 
   /// One Jacobi update of particle i; the vertices take theirs in gather().
   DRENCH_HD void update(int i) const {
@@ -102,7 +102,7 @@ struct ContactSolve {
     const float depth = contact_distance + half_thickness[t] - distance[i];
     const float least = depth > 0.f ? minimum(0.2f * depth / dt, push_speed) : depth / dt;
     const float by_contact = (least - approach) / row;
-    const float after = max0(before + maximum(by_pressure, by_contact));
+    const float after = max0(before + relaxation * maximum(by_pressure, by_contact));
     lambda[i] = after;
 
     const float rate = dt * mass * viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
@@ -121,8 +121,11 @@ struct ContactSolve {
   }
 };
 
-/// Iterations of the Jacobi solve.
-constexpr int contact_iterations = 4;
+/// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly twice as
+/// far. A pool of 0.3 m on 0.4 kg/m^2: 4 plain iterations left 18,413 particles to the path test in half a
+/// second, 12 plain ones 2, these 6 left 3.
+constexpr int contact_iterations = 6;
+constexpr float over_relaxation = 1.8f;
 
 inline ContactSolve contact_solve(State& state) {
   FluidState& f = state.fluid;
@@ -131,7 +134,7 @@ inline ContactSolve contact_solve(State& state) {
   return {contacts_of(state), f.velocity.view(), f.normal.view(), f.drag.view(), f.impulse.view(),
           f.owed.view(), f.sheet_distance.data(), f.pressure.data(), f.inverse_density.data(),
           c.half_thickness.data(), f.lambda.data(), c.predicted.view(), c.inverse_mass.data(),
-          c.share.data(), 0.5f * (state.substeps + 1) / state.substeps, float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed,
+          c.share.data(), 1.f, 0.5f * (state.substeps + 1) / state.substeps, float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed,
           p.support_radius, 0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed};
 }
 
@@ -155,13 +158,14 @@ inline void start_contacts(State& state) {
 
 inline void solve_contacts(State& state) {
   ClothState& c = state.cloth;
-  const ContactSolve solve = contact_solve(state);
+  ContactSolve solve = contact_solve(state);
   const ContactView contacts = solve.contacts;
   const VecView impulse = state.fluid.impulse.view(), predicted = c.predicted.view(), force = c.force.view();
   const float* inverse_mass = c.inverse_mass.data();
   const float inverse_dt = 1.f / float(state.dt);
   if (state.contact.near == 0) return;
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
+    solve.relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
     parallel_for("contact: particles", state.contact.near,
                  DRENCH_LAMBDA(int k) { solve.update(contacts.order[k]); });
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
