@@ -3,8 +3,6 @@
 
 #include <cstdint>
 
-#include "pipeline/contract/shot.h"
-
 namespace drench::sim {
 
 struct Parameters {
