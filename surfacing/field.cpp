@@ -27,7 +27,7 @@ float lone_radius(float voxel, float support) {
   float radius = 0.7f;
   for (int step = 0; step < 8; ++step)  // radius^3 (1 - 0.63 (voxel / radius)^2) = cubed
     radius = std::cbrt(cubed + 0.63f * voxel * voxel * radius);
-  return std::min(radius, 0.8f * support);
+  return std::min(radius, 0.5f * support);  // on coarser lattices drops get smaller
 }
 
 template <class F>
@@ -204,8 +204,10 @@ float ColourKernel::shape(float q) {
 
 float ColourKernel::weight(float c, float offset) const {
   constexpr float sheet_colour = 0.66f, surface_colour = 0.78f, one_sided = 0.12f;
-  const float missing =
-      std::max(0.f, (1 / c - 1 / sheet_colour) / (1 / scale() - 1 / sheet_colour));
+  // At supports below 1.6 a particle's own share is above the sheet's colour, and nothing is
+  // missing.
+  const float alone = std::max(1 / scale() - 1 / sheet_colour, 1e-3f);
+  const float missing = std::max(0.f, 1 / c - 1 / sheet_colour) / alone;
   const float thin = 1 + (lone_weight - 1) * missing * (0.5f + 0.5f * missing);
   const float surface = std::min(surface_colour / c, 1.3f) - 1;
   return bulk * std::max(thin, 1 + surface * std::min(offset / one_sided, 1.f));

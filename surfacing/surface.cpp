@@ -25,8 +25,8 @@ void check_range(const char* name, double value, double low, double high) {
 }
 
 void check_settings(const ParticleFrame& particles, const SurfaceSettings& settings) {
-  check_range("voxel", settings.voxel, 0.1, 2);
-  check_range("support", settings.support, std::max(1.0, settings.voxel), 6);
+  check_range("voxel", settings.voxel, 0.05, 4);  // the limits of the shot file
+  check_range("support", settings.support, std::max(1.0, settings.voxel), 8);
   check_range("iso_value", settings.iso_value, 0.01, 0.99);
   check_range("smoothing", settings.smoothing, 0, 1000);
   check_range("memory_gib", settings.memory_gib, 1e-6, 1e6);
