@@ -40,12 +40,16 @@ class Column {
     size_ = size;
   }
   void upload(const T* source, size_t size, size_t at = 0) {
+    if (size == 0) return;
     check_cuda(cudaMemcpy(data_ + at, source, size * sizeof(T), cudaMemcpyHostToDevice), "uploading");
   }
   void download(T* target, size_t size) const {
+    if (size == 0) return;
     check_cuda(cudaMemcpy(target, data_, size * sizeof(T), cudaMemcpyDeviceToHost), "downloading");
   }
-  void clear_bytes(int byte) { check_cuda(cudaMemsetAsync(data_, byte, size_ * sizeof(T)), "clearing"); }
+  void clear_bytes(int byte) {
+    if (size_) check_cuda(cudaMemsetAsync(data_, byte, size_ * sizeof(T)), "clearing");
+  }
   T* data() const { return data_; }
   size_t size() const { return size_; }
   void swap(Column& other) noexcept {

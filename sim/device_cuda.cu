@@ -14,6 +14,11 @@ bool device_available(std::string& name_or_reason) {
   cudaDeviceProp properties;
   check_cuda(cudaGetDeviceProperties(&properties, 0), "asking for the device's name");
   name_or_reason = properties.name;
+  if (properties.major < 8) {  // cmake/cuda.cmake builds code for 8.0 and later
+    name_or_reason += ": compute capability " + std::to_string(properties.major) + "." +
+                      std::to_string(properties.minor) + " is below 8.0";
+    return false;
+  }
   return true;
 }
 

@@ -21,6 +21,7 @@ std::unique_ptr<sim::Solver> make_solver(const sim::Scene& scene, Device device,
   if (device != Device::cpu && sim::cuda::device_available(name)) {
     return sim::cuda::make_solver(scene.parameters, scene.cloth);
   }
+  if (device == Device::automatic) log_info("sim", "no usable GPU (" + name + "); running on the CPU");
   if (device == Device::cuda) {
     throw Error("--device cuda: no usable GPU (" + name + "). Install a driver or use --device cpu");
   }

@@ -146,8 +146,8 @@ class BackendSolver : public Solver {
       f.normal.resize(n);
     }
     if (allocated_ & column_contact) {
-      for (VecColumn* c : {&f.drag, &f.impulse, &f.start}) c->resize(n);
-      f.lambda.resize(n);
+      for (VecColumn* c : {&f.impulse, &f.start}) c->resize(n);
+      state_.contact.rows.resize(n);
       f.held.resize(n);
       f.stopped.resize(n);
       state_.contact.key.resize(n);

@@ -40,8 +40,7 @@ struct FluidState {
   Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
   Column<float> edge;                 // 0 beyond a free edge .. 1 half a spacing inside it
   Column<float> cloth_share;          // share of density that the sheet replaces
-  Column<float> lambda;               // kg m/s, normal impulse of the contact solve
-  VecColumn drag, impulse;            // kg m/s, tangential part; last change
+  VecColumn impulse;                  // paper coupling: kg m/s; path test: m, where particles end
   VecColumn start;                    // m, position at the start of the step
   Column<int> held, stopped;          // by the path test for this substep; triangle it stopped, -1 none
 };
@@ -83,9 +82,23 @@ struct ClothState {
   Column<long long> stop_sum;           // 4 a vertex: see PathTest
 };
 
+/// One contact of the exact coupling: everything its Jacobi update reads, side by side.
+struct ContactRow {
+  int particle, vertex[3];
+  float weight[3];                                       // barycentric
+  Vec3<float> normal, velocity;                          // unit; m/s of the particle
+  float inverse_row;                                     // kg, 1 / row sum; 0: no contact
+  float pressure_target, pressure_rate, pressure_scale;  // kg m/s, kg, 1
+  float least;                                           // m/s, slowest separation that is allowed
+  float drag_rate, drag_scale;                           // kg, 1
+  float lambda;                                          // kg m/s, normal impulse
+  Vec3<float> drag, change;                              // kg m/s, tangential impulse; last change of both
+};
+
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
+  Column<ContactRow> rows;
   int near = 0;  // particles within the support radius of a sheet: the first of order
 };
 

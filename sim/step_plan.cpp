@@ -106,10 +106,12 @@ struct JoinLimits {
     Limits joined = a;
     joined.max_speed = a.max_speed > b.max_speed ? a.max_speed : b.max_speed;
     joined.max_acceleration = a.max_acceleration > b.max_acceleration ? a.max_acceleration : b.max_acceleration;
-    if (joined.bad_particle < 0) joined.bad_particle = b.bad_particle;
-    if (joined.bad_vertex < 0) joined.bad_vertex = b.bad_vertex;
+    joined.bad_particle = first(a.bad_particle, b.bad_particle);
+    joined.bad_vertex = first(a.bad_vertex, b.bad_vertex);
     return joined;
   }
+  /// The smaller index, whatever the order of the reduction; -1 is none.
+  DRENCH_HD static int first(int a, int b) { return a < 0 || (b >= 0 && b < a) ? b : a; }
 };
 
 }  // namespace

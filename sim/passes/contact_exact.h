@@ -30,12 +30,12 @@ struct ContactView {
   DRENCH_HD float weight(int i, int k) const {
     return k == 1 ? weight_b[i] : k == 2 ? weight_c[i] : 1.f - weight_b[i] - weight_c[i];
   }
-  /// Calls f(particle, weight) for every contact on a vertex, in a fixed order.
+  /// Calls f(place in order, corner) for every contact on a vertex, in a fixed order.
   template <class F>
   DRENCH_HD void for_each_on_vertex(int vertex, const F& f) const {
     for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s) {
       const int t = fan_entry[s] / 3, k = fan_entry[s] % 3;
-      for (int c = start[t]; c < start[t + 1]; ++c) f(order[c], weight(order[c], k));
+      for (int c = start[t]; c < start[t + 1]; ++c) f(c, k);
     }
   }
 };
@@ -61,65 +61,59 @@ inline void sort_contacts(State& state) {
   state.contact.near = value_at(state.contact.start, triangles);
 }
 
-struct ContactSolve {
+/// What the solve reads of the particles and the sheet to set a contact up.
+struct ContactSetup {
   ContactView contacts;
-  VecView velocity, normal, drag, impulse, owed;
-  const float *distance, *pressure, *inverse_density, *half_thickness;
-  float* lambda;
-  VecView predicted;
-  const float *inverse_mass, *vertex_share;
-  float relaxation, beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
+  VecView velocity, normal;
+  const float *distance, *pressure, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
+  float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
 
-  /// One Jacobi update of particle i; the vertices take theirs in gather().
-  DRENCH_HD void update(int i) const {
-    const int t = contacts.triangle[i];
-    impulse.set(i, {0.f, 0.f, 0.f});
-    if (contacts.edge[i] <= 0.f) return;
-    const Vec3<float> n = normal[i];
-    Vec3<float> cloth_velocity{0.f, 0.f, 0.f};
-    float row = 1.f / mass;
+  DRENCH_HD void prepare(ContactRow& row) const {
+    const int i = row.particle, t = contacts.triangle[i];
+    float sum = 1.f / mass;
     for (int k = 0; k < 3; ++k) {
-      const int vertex = contacts.corner[3 * t + k];
-      const float w = contacts.weight(i, k);
-      cloth_velocity = cloth_velocity + predicted[vertex] * w;
-      row += w * vertex_share[vertex] * beta * inverse_mass[vertex];
+      sum += row.weight[k] * vertex_share[row.vertex[k]] * beta * inverse_mass[row.vertex[k]];
     }
-    const Vec3<float> relative = velocity[i] - cloth_velocity;
-    const float approach = dot(n, relative);
-    const Vec3<float> slip = relative - n * approach;
+    row.inverse_row = contacts.edge[i] > 0.f ? 1.f / sum : 0.f;  // no force at and beyond a free edge
+    row.normal = normal[i];
+    row.velocity = velocity[i];
+    row.lambda = 0.f;
+    row.drag = row.change = {0.f, 0.f, 0.f};
 
-    const float edge = contacts.edge[i], inverse_h = 1.f / support_radius;
+    const float inverse_h = 1.f / support_radius;
     const float gap = max0(distance[i] - half_thickness[t]), q = minimum(gap * inverse_h, 1.f);
-    const float share = edge * rest_density * inverse_density[i] * inverse_density[i];
+    const float share = contacts.edge[i] * rest_density * inverse_density[i] * inverse_density[i];
     const float push = 2.f * share * pressure[i] * spiky_plane(q) * inverse_h;
     const float density_slope = pressure[i] > 0.f ? sound_speed2 * rest_density * poly6_plane(q) : 0.f;
     const float kappa = 2.f * share * inverse_h * inverse_h *
                         (density_slope * spiky_plane(q) + pressure[i] * spiky_plane_slope(q));
-    const float before = lambda[i];
-    const float by_pressure = (dt * mass * (push - kappa * dt * approach) - before) /
-                              (1.f + dt * dt * mass * kappa * row);
-
+    row.pressure_target = dt * mass * push;
+    row.pressure_rate = dt * dt * mass * kappa;
+    row.pressure_scale = 1.f / (1.f + row.pressure_rate * sum);
     const float depth = contact_distance + half_thickness[t] - distance[i];
-    const float least = depth > 0.f ? minimum(0.2f * depth / dt, push_speed) : depth / dt;
-    const float by_contact = (least - approach) / row;
-    const float after = max0(before + relaxation * maximum(by_pressure, by_contact));
-    lambda[i] = after;
-
-    const float rate = dt * mass * viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
-    const Vec3<float> hold = (slip * -rate - drag[i]) * (1.f / (1.f + rate * row));
-    drag.set(i, drag[i] + hold);
-    const Vec3<float> change = n * (after - before) + hold;
-    velocity.set(i, velocity[i] + change * (1.f / mass));
-    impulse.set(i, change);
-  }
-
-  DRENCH_HD void start(int i) const {
-    lambda[i] = 0.f;
-    drag.set(i, {0.f, 0.f, 0.f});
-    impulse.set(i, owed[i]);
-    owed.set(i, {0.f, 0.f, 0.f});
+    row.least = depth > 0.f ? minimum(0.2f * depth / dt, push_speed) : depth / dt;
+    row.drag_rate = dt * mass * viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+    row.drag_scale = 1.f / (1.f + row.drag_rate * sum);
   }
 };
+
+/// One Jacobi update of a contact against the predicted vertices; they take theirs afterwards.
+DRENCH_HD void update_contact(ContactRow& row, const VecView& predicted, float inverse_mass, float relaxation) {
+  if (row.inverse_row == 0.f) return;
+  const Vec3<float> sheet = predicted[row.vertex[0]] * row.weight[0] + predicted[row.vertex[1]] * row.weight[1] +
+                            predicted[row.vertex[2]] * row.weight[2];
+  const Vec3<float> relative = row.velocity - sheet;
+  const float approach = dot(row.normal, relative);
+  const Vec3<float> slip = relative - row.normal * approach;
+  const float by_pressure = (row.pressure_target - row.pressure_rate * approach - row.lambda) * row.pressure_scale;
+  const float by_contact = (row.least - approach) * row.inverse_row;
+  const float lambda = max0(row.lambda + relaxation * maximum(by_pressure, by_contact));
+  const Vec3<float> hold = (slip * -row.drag_rate - row.drag) * row.drag_scale;
+  row.change = row.normal * (lambda - row.lambda) + hold;
+  row.lambda = lambda;
+  row.drag = row.drag + hold;
+  row.velocity = row.velocity + row.change * inverse_mass;
+}
 
 /// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly twice as
 /// far. A pool of 0.3 m on 0.4 kg/m^2: 4 plain iterations left 18,413 particles to the path test in half a
@@ -127,55 +121,72 @@ struct ContactSolve {
 constexpr int contact_iterations = 6;
 constexpr float over_relaxation = 1.8f;
 
-inline ContactSolve contact_solve(State& state) {
+inline ContactSetup contact_setup(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  return {contacts_of(state), f.velocity.view(), f.normal.view(), f.drag.view(), f.impulse.view(),
-          f.owed.view(), f.sheet_distance.data(), f.pressure.data(), f.inverse_density.data(),
-          c.half_thickness.data(), f.lambda.data(), c.predicted.view(), c.inverse_mass.data(),
-          c.share.data(), 1.f, 0.5f * (state.substeps + 1) / state.substeps, float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed,
-          p.support_radius, 0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed};
+  const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
+  return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure.data(),
+          f.inverse_density.data(), c.half_thickness.data(), c.inverse_mass.data(), c.share.data(), beta,
+          float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed, p.support_radius,
+          0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed};
 }
 
-/// Clears what the solve accumulates; the vertices receive what the path test took from particles.
+/// Rows of the near list; the vertices receive what the path test took from particles.
 inline void start_contacts(State& state) {
   ClothState& c = state.cloth;
-  const ContactSolve solve = contact_solve(state);
-  const ContactView contacts = solve.contacts;
-  const VecView impulse = state.fluid.impulse.view(), force = c.force.view();
-  parallel_for("contact: start", state.contact.near, DRENCH_LAMBDA(int k) { solve.start(contacts.order[k]); });
+  const ContactView contacts = contacts_of(state);
+  ContactRow* rows = state.contact.rows.data();
+  const VecView owed = state.fluid.owed.view(), force = c.force.view();
+  parallel_for("contact: start", state.contact.near, DRENCH_LAMBDA(int k) {
+    ContactRow& row = rows[k];
+    row.particle = contacts.order[k];
+    const int t = contacts.triangle[row.particle];
+    for (int corner = 0; corner < 3; ++corner) {
+      row.vertex[corner] = contacts.corner[3 * t + corner];
+      row.weight[corner] = contacts.weight(row.particle, corner);
+    }
+    row.change = owed[row.particle];
+    owed.set(row.particle, {0.f, 0.f, 0.f});
+  });
   float* share = c.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for("contact: weights by vertex", c.vertices, DRENCH_LAMBDA(int v) {
     Vec3<float> sum{0.f, 0.f, 0.f};
     float weights = 0.f;
-    contacts.for_each_on_vertex(v, [&](int i, float w) { sum = sum + impulse[i] * w, weights += w; });
+    contacts.for_each_on_vertex(v, [&](int k, int corner) {
+      sum = sum + rows[k].change * rows[k].weight[corner];
+      weights += rows[k].weight[corner];
+    });
     force.set(v, sum * -inverse_dt);
     share[v] = weights;
   });
 }
 
 inline void solve_contacts(State& state) {
-  ClothState& c = state.cloth;
-  ContactSolve solve = contact_solve(state);
-  const ContactView contacts = solve.contacts;
-  const VecView impulse = state.fluid.impulse.view(), predicted = c.predicted.view(), force = c.force.view();
-  const float* inverse_mass = c.inverse_mass.data();
-  const float inverse_dt = 1.f / float(state.dt);
   if (state.contact.near == 0) return;
+  ClothState& c = state.cloth;
+  const ContactSetup setup = contact_setup(state);
+  const ContactView contacts = setup.contacts;
+  ContactRow* rows = state.contact.rows.data();
+  const VecView predicted = c.predicted.view(), force = c.force.view(), velocity = state.fluid.velocity.view();
+  const float *inverse_mass = c.inverse_mass.data(), inverse_dt = 1.f / float(state.dt);
+  parallel_for("contact: prepare", state.contact.near, DRENCH_LAMBDA(int k) { setup.prepare(rows[k]); });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
-    solve.relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
-    parallel_for("contact: particles", state.contact.near,
-                 DRENCH_LAMBDA(int k) { solve.update(contacts.order[k]); });
+    const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
+    parallel_for("contact: particles", state.contact.near, DRENCH_LAMBDA(int k) {
+      update_contact(rows[k], predicted, 1.f / setup.mass, relaxation);
+    });
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for("contact: vertices", c.vertices, DRENCH_LAMBDA(int v) {
       Vec3<float> sum{0.f, 0.f, 0.f};
-      contacts.for_each_on_vertex(v, [&](int i, float w) { sum = sum + impulse[i] * w; });
-      predicted.set(v, predicted[v] - sum * (solve.beta * inverse_mass[v]));
+      contacts.for_each_on_vertex(v, [&](int k, int corner) { sum = sum + rows[k].change * rows[k].weight[corner]; });
+      predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
       force.set(v, force[v] - sum * inverse_dt);
     });
   }
+  parallel_for("contact: velocities", state.contact.near,
+               DRENCH_LAMBDA(int k) { velocity.set(rows[k].particle, rows[k].velocity); });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

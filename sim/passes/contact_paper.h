@@ -98,7 +98,10 @@ inline void gather_paper_reaction(State& state) {
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for("paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
     Vec3<float> sum{0.f, 0.f, 0.f};
-    contacts.for_each_on_vertex(v, [&](int i, float w) { sum = sum + impulse[i] * w; });
+    contacts.for_each_on_vertex(v, [&](int k, int corner) {
+      const int i = contacts.order[k];
+      sum = sum + impulse[i] * contacts.weight(i, corner);
+    });
     force.set(v, sum * -inverse_dt);
   });
 }
