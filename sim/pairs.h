@@ -113,7 +113,8 @@ class Tile {
     for (int c = 0; c < columns; ++c) {
       float* to = data_.data() + size_t(c) * stride_;
       for (int r = 0; r < rows; ++r) to = std::copy_n(in.column[c] + begin[r], count[r], to);
-      std::fill_n(to, stride_ - size_, c < 3 ? far_away : 0.f);
+      // Far away in position; the last column may be the plane of a sheet, which must be far as well.
+      std::fill_n(to, stride_ - size_, c < 3 || c == columns - 1 ? far_away : 0.f);
     }
   }
   int size() const { return size_; }

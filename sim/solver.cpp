@@ -139,7 +139,7 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.density, &f.pressure, &f.inverse_density}) c->resize(n);
     }
     if (allocated_ & column_sheet) {
-      for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.edge, &f.cloth_share}) {
+      for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {
         c->resize(n);
       }
       f.triangle.resize(n);

@@ -14,12 +14,12 @@ struct SheetFilter {
   static constexpr int columns = 4;
   const int* triangle;  // nearest, -1: not near
   VecView position, normal;
-  const float* distance;
+  const float* plane;
   PolygonView polygons;
   float support_radius;
 
   DRENCH_HD bool near(int i) const { return triangle[i] >= 0; }
-  DRENCH_HD Inputs<4> inputs() const { return {{normal.x, normal.y, normal.z, distance}}; }
+  DRENCH_HD Inputs<4> inputs() const { return {{normal.x, normal.y, normal.z, plane}}; }
 
   /// The same answer for (i, j) and (j, i): the segment always starts at the smaller end.
   DRENCH_HD bool segment_hidden(Vec3<float> p, Vec3<float> q) const {
@@ -39,11 +39,10 @@ struct SheetFilter {
 
 #if defined(__CUDACC__)
   DRENCH_HD bool hides(int i, int j) const {
-    const Vec3<float> x = position[j] - position[i];
-    if (length2(x) >= support_radius * support_radius || i == j) return false;
     const Vec3<float> ni = normal[i], nj = normal[j];
-    const bool front_i = distance[i] + dot(ni, x) > 0.f, front_j = distance[j] - dot(nj, x) > 0.f;
-    if (front_i && front_j) return false;
+    const bool front_i = dot(ni, position[j]) + plane[i] > 0.f, front_j = dot(nj, position[i]) + plane[j] > 0.f;
+    if ((front_i && front_j) || i == j) return false;
+    if (length2(position[j] - position[i]) >= support_radius * support_radius) return false;
     if (!front_i && !front_j && dot(ni, nj) < 0.f) return true;
     return segment_hidden(position[i], position[j]);
   }
@@ -51,34 +50,41 @@ struct SheetFilter {
   /// Moves the lanes of a pack of neighbours that the sheet hides out of every support.
   DRENCH_HD void move_hidden_away(const float* const* column, int first, int place, int k,
                                   Pack* value) const {
-    const Vec3<float> p{column[0][place], column[1][place], column[2][place]};
-    const Vec3<Pack> pi{p.x, p.y, p.z};
     const Vec3<Pack> ni{column[first][place], column[first + 1][place], column[first + 2][place]};
-    const Pack di(column[first + 3][place]);
     const Vec3<Pack> nj{Pack::load(column[first] + k), Pack::load(column[first + 1] + k),
                         Pack::load(column[first + 2] + k)};
-    const Pack dj = Pack::load(column[first + 3] + k);
-    const Vec3<Pack> x = Vec3<Pack>{value[0], value[1], value[2]} - pi;
-    const Mask back_i = di + dot(ni, x) <= Pack(0.f), back_j = dj - dot(nj, x) <= Pack(0.f);
-    const Mask within = length2(x) < Pack(support_radius * support_radius);
+    const Vec3<Pack> pi{column[0][place], column[1][place], column[2][place]};
+    const Vec3<Pack> pj{value[0], value[1], value[2]};
+    const Mask back_i = dot(ni, pj) + Pack(column[first + 3][place]) <= Pack(0.f);
+    const Mask back_j = dot(nj, pi) + Pack::load(column[first + 3] + k) <= Pack(0.f);
+    if ((back_i | back_j).bits() == 0) return;  // all eight in front of each other
+    const Mask within = length2(pj - pi) < Pack(support_radius * support_radius);
     const Mask surely = back_i & back_j & (dot(ni, nj) < Pack(0.f));
-    const Mask doubtful = (back_i | back_j) & within & !surely;
-    alignas(32) float hidden[8];
-    select(surely, Pack(1.f), Pack(0.f)).store(hidden);
-    for (int bits = doubtful.bits(); bits; bits &= bits - 1) {
+    const int doubtful = ((back_i | back_j) & within & !surely).bits();
+    value[0] = select(Mask{hidden_lanes(column, place, k, surely.bits(), doubtful)}, Pack(Tile::far_away), value[0]);
+  }
+
+  /// Lanes that are hidden for sure and those of the doubtful ones whose segment meets a triangle.
+  __attribute__((noinline)) Mask::Native hidden_lanes(const float* const* column, int place, int k, int surely,
+                                                      int doubtful) const {
+    const Vec3<float> p{column[0][place], column[1][place], column[2][place]};
+    int hidden = surely;
+    for (int bits = doubtful; bits; bits &= bits - 1) {
       const int lane = __builtin_ctz(bits), j = k + lane;
-      if (j == place) continue;  // a particle that has been pushed through still sees itself
-      if (segment_hidden(p, {column[0][j], column[1][j], column[2][j]})) hidden[lane] = 1.f;
+      if (segment_hidden(p, {column[0][j], column[1][j], column[2][j]})) hidden |= 1 << lane;
     }
-    if (place - k >= 0 && place - k < 8) hidden[place - k] = 0.f;
-    value[0] = select(Pack::load(hidden) > Pack(0.5f), Pack(Tile::far_away), value[0]);
+    // A particle that has been pushed behind its own plane still sees itself.
+    if (place >= k && place < k + 8) hidden &= ~(1 << (place - k));
+    Mask::Native mask;
+    for (int lane = 0; lane < 8; ++lane) mask[lane] = hidden >> lane & 1 ? -1 : 0;
+    return mask;
   }
 #endif
 };
 
 inline SheetFilter sheet_filter(const State& state) {
   const FluidState& f = state.fluid;
-  return {f.triangle.data(), f.position.view(), f.normal.view(), f.sheet_distance.data(),
+  return {f.triangle.data(), f.position.view(), f.normal.view(), f.plane.data(),
           polygons_of(state.cloth), state.parameters.support_radius};
 }
 

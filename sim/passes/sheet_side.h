@@ -89,13 +89,13 @@ inline void find_sheet_sides(State& state) {
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
-  float *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
+  float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
   parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
     const int t = triangle[i];
     normal.set(i, {0.f, 0.f, 0.f});
-    distance[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f;
+    distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f;
     if (t < 0) {
       memory_triangle[i] = -1;
       return;
@@ -121,6 +121,7 @@ inline void find_sheet_sides(State& state) {
     const float flip = side == seen ? 1.f : -1.f;
     normal.set(i, clear ? to_particle * (flip / d) : pseudo);
     distance[i] = flip * d;
+    plane[i] = distance[i] - dot(normal[i], position[i]);
     edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
     share[i] = edge[i] * poly6_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
   });
