@@ -145,10 +145,16 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int place, const Physics& physics
   for (int c = 0; c < N + Filter::columns; ++c) column[c] = tile.column(c);
   for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][place]);
   const P i = self.as();
+  const auto hidden_from = [&] {
+    if constexpr (Filter::columns > 0) return filter.template self<N>(column, place);
+    else return 0;
+  }();
   for (int k = 0; k < tile.size(); k += Pack::size) {
     Members<P, Pack, N> m;
     for (int c = 0; c < N; ++c) m.value[c] = Pack::load(column[c] + k);
-    if constexpr (Filter::columns > 0) filter.move_hidden_away(column, N, place, k, m.value);
+    if constexpr (Filter::columns > 0) {
+      m.value[0] = filter.template move_hidden_away<N>(hidden_from, column, k, {m.value[0], m.value[1], m.value[2]});
+    }
     physics.pair(i, m.as(), sum);
   }
   return sum;

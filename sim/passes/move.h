@@ -101,9 +101,10 @@ inline GuardCount test_paths(State& state, const PathTest& test, float dt) {
   int* held = f.held.data();
   return parallel_reduce("path test", path_test_count(state, test), GuardCount{}, DRENCH_LAMBDA(int k) {
     const int i = order[k];  // the near ones come first
-    Vec3<float> velocity = held[i] ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
+    const bool still = held[i] || triangle[i] < 0;
+    Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
     Vec3<float> to = mover(x[i], velocity);
-    if (!held[i]) v.set(i, velocity);
+    if (!still) v.set(i, velocity);
     GuardCount result;
     if (triangle[i] < 0 || test.in_reach(i, to)) {
       const Vec3<float> wanted = to;
@@ -150,18 +151,25 @@ inline void hold_cloth(State& state, const PathTest& test, bool everywhere) {
   });
 }
 
-/// Particles out of reach of any sheet: nothing to test.
-inline void move_far_particles(State& state, float dt) {
+/// Particles out of reach of any sheet move once, over the whole step: nothing to test.
+inline void move_far_particles(State& state) {
   FluidState& f = state.fluid;
-  const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
-  const Mover mover = mover_of(state.parameters, dt);
+  const VecView x = f.position.view(), v = f.velocity.view();
+  const Mover mover = mover_of(state.parameters, float(state.dt));
   const int* triangle = f.triangle.data();
   parallel_for("move far particles", f.count, DRENCH_LAMBDA(int i) {
     if (triangle[i] >= 0) return;
     Vec3<float> velocity = v[i];
-    end.set(i, mover(x[i], velocity));
+    x.set(i, mover(x[i], velocity));
     v.set(i, velocity);
   });
+}
+
+/// Far particles have made their step already; should cloth come as far as them they stand still for it.
+inline void accept_paths(State& state, int count) {
+  const VecView x = state.fluid.position.view(), end = state.fluid.impulse.view();
+  const int* order = state.contact.order.data();
+  parallel_for("path test: accept", count, DRENCH_LAMBDA(int k) { x.set(order[k], end[order[k]]); });
 }
 
 inline void move_coupled(State& state) {
@@ -170,15 +178,17 @@ inline void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
   copy_vectors("keep starts", f.start.view(), f.position.view(), f.count);
   copy_vectors("keep cloth starts", c.start.view(), c.position.view(), c.vertices);
+  move_far_particles(state);
   for (int s = 0; s < state.substeps; ++s) {
     cloth_verlet(state, cloth_buffers(c), dt);
     f.held.clear_bytes(0);
     f.stopped.clear_bytes(0xff);
     c.held.clear_bytes(0);
     c.stop_sum.clear_bytes(0);
-    move_far_particles(state, dt);
+    int tested = 0;
     for (int round = 0;; ++round) {
       const PathTest test = path_test_of(state);
+      tested = std::max(tested, path_test_count(state, test));
       const GuardCount count = test_paths(state, test, dt);
       state.guard_hits += count.hits;
       if (count.unresolved == 0) break;
@@ -190,7 +200,7 @@ inline void move_coupled(State& state) {
       test_paths(state, path_test_of(state), dt);
       break;
     }
-    f.position.swap(f.impulse);
+    accept_paths(state, tested);
     finish_substep(c);
   }
 }

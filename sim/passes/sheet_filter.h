@@ -47,21 +47,30 @@ struct SheetFilter {
     return segment_hidden(position[i], position[j]);
   }
 #else
-  /// Moves the lanes of a pack of neighbours that the sheet hides out of every support.
-  DRENCH_HD void move_hidden_away(const float* const* column, int first, int place, int k,
-                                  Pack* value) const {
-    const Vec3<Pack> ni{column[first][place], column[first + 1][place], column[first + 2][place]};
-    const Vec3<Pack> nj{Pack::load(column[first] + k), Pack::load(column[first + 1] + k),
-                        Pack::load(column[first + 2] + k)};
-    const Vec3<Pack> pi{column[0][place], column[1][place], column[2][place]};
-    const Vec3<Pack> pj{value[0], value[1], value[2]};
-    const Mask back_i = dot(ni, pj) + Pack(column[first + 3][place]) <= Pack(0.f);
-    const Mask back_j = dot(nj, pi) + Pack::load(column[first + 3] + k) <= Pack(0.f);
-    if ((back_i | back_j).bits() == 0) return;  // all eight in front of each other
-    const Mask within = length2(pj - pi) < Pack(support_radius * support_radius);
-    const Mask surely = back_i & back_j & (dot(ni, nj) < Pack(0.f));
+  /// What the test of a particle's neighbours reads of the particle itself.
+  struct Self {
+    Vec3<Pack> position, normal;
+    Pack plane;
+    int place;
+  };
+  template <int N>
+  DRENCH_HD Self self(const float* const* column, int place) const {
+    const auto all = [&](int c) { return Pack(column[c][place]); };
+    return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), place};
+  }
+
+  /// Moves the neighbours that the sheet hides out of every support.
+  template <int N>
+  DRENCH_HD Pack move_hidden_away(const Self& i, const float* const* column, int k, Vec3<Pack> position) const {
+    const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k), Pack::load(column[N + 2] + k)};
+    const Mask back_i = dot(i.normal, position) + i.plane <= Pack(0.f);
+    const Mask back_j = dot(normal_j, i.position) + Pack::load(column[N + 3] + k) <= Pack(0.f);
+    if ((back_i | back_j).bits() == 0) [[likely]] return position.x;  // all eight in front of each other
+    const Mask within = length2(position - i.position) < Pack(support_radius * support_radius);
+    const Mask surely = back_i & back_j & (dot(i.normal, normal_j) < Pack(0.f));
     const int doubtful = ((back_i | back_j) & within & !surely).bits();
-    value[0] = select(Mask{hidden_lanes(column, place, k, surely.bits(), doubtful)}, Pack(Tile::far_away), value[0]);
+    const Mask hidden{hidden_lanes(column, i.place, k, surely.bits(), doubtful)};
+    return select(hidden, Pack(Tile::far_away), position.x);
   }
 
   /// Lanes that are hidden for sure and those of the doubtful ones whose segment meets a triangle.
