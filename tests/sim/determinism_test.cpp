@@ -1,0 +1,140 @@
+// Same bits for any number of threads, after a resume, and wherever the scene stands.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "pipeline/contract/error.h"
+#include "sim/simulator.h"
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+/// A block that falls on a sheet over a floor, moved by `shift` m.
+Shot splash(double shift = 0) {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.domain.min = V3d(shift - 0.3, -0.2, -0.3), shot.domain.max = V3d(shift + 0.3, 0.6, 0.3);
+  shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
+  add_box(shot, V3d(shift - 0.08, 0.01, -0.08), {16, 8, 16}, V3d(0, -1, 0));
+  add_sheet(shot, 0.3, 0, 24).corner.x += shift;
+  return shot;
+}
+
+void expect_same(const sim::HostVec& a, const sim::HostVec& b) {
+  EXPECT_EQ(a.x, b.x);
+  EXPECT_EQ(a.y, b.y);
+  EXPECT_EQ(a.z, b.z);
+}
+
+void expect_same(const sim::HostState& a, const sim::HostState& b) {
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.memory_triangle, b.memory_triangle);
+  EXPECT_EQ(a.memory_side, b.memory_side);
+  EXPECT_EQ(a.guard_hits, b.guard_hits);
+  expect_same(a.position, b.position);
+  expect_same(a.velocity, b.velocity);
+  expect_same(a.owed, b.owed);
+  expect_same(a.cloth_position, b.cloth_position);
+  expect_same(a.cloth_velocity, b.cloth_velocity);
+}
+
+sim::HostState after_steps(const Shot& shot, int steps) {
+  Stepper run(shot);
+  for (int k = 0; k < steps; ++k) run.step();
+  return run.solver->save();
+}
+
+TEST(Determinism, AnyNumberOfThreadsGivesTheSameBits) {
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
+  for (CouplingScheme scheme : {CouplingScheme::exact, CouplingScheme::paper}) {
+    Shot shot = splash();
+    shot.coupling.scheme = scheme;
+    if (scheme == CouplingScheme::paper)
+      shot.cloth[0].areal_density = 5;  // it diverges on light cloth
+    std::vector<sim::HostState> state;
+    for (int threads : {1, 2, 16}) {
+      tbb::task_arena arena(threads);
+      arena.execute([&] { state.push_back(after_steps(shot, 60)); });
+    }
+    expect_same(state[0], state[1]);
+    expect_same(state[0], state[2]);
+  }
+}
+
+// A million lattice steps away the local state is the same to the last bit.
+TEST(Determinism, ALatticeShiftOfTenKilometresGivesTheSameBits) {
+  expect_same(after_steps(splash(), 60), after_steps(splash(1e4), 60));
+}
+
+class Resume : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("drench_resume_" + std::to_string(::getpid()) + "_" +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  Shot shot() const {
+    Shot shot = splash();
+    shot.timeline = {1001, 1010, 60};
+    FluidEmitter emitter;
+    emitter.center = V3d(0.1, 0.4, 0.1), emitter.radius = 0.03, emitter.speed = 1;
+    shot.fluid.emitter.push_back(emitter);
+    return shot;
+  }
+  std::string bytes(const std::filesystem::path& path) const {
+    std::ifstream file(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  std::filesystem::path folder_;
+};
+
+// A checkpoint holds every state there is, so equal checkpoints at the end are equal runs.
+TEST_F(Resume, GivesTheSameBitsAsARunWithoutPause) {
+  Simulator whole(shot(), {});
+  for (int k = 0; k < 2; ++k) whole.advance_frame();
+  whole.write_checkpoint(folder_ / "middle");
+  for (int k = 0; k < 2; ++k) whole.advance_frame();
+  whole.write_checkpoint(folder_ / "whole");
+
+  Simulator resumed(shot(), {});
+  resumed.read_checkpoint(folder_ / "middle");
+  EXPECT_EQ(resumed.frame(), 1003);
+  for (int k = 0; k < 2; ++k) resumed.advance_frame();
+  resumed.write_checkpoint(folder_ / "resumed");
+  EXPECT_GT(bytes(folder_ / "whole").size(), 10000u);
+  EXPECT_TRUE(bytes(folder_ / "whole") == bytes(folder_ / "resumed"));
+}
+
+TEST_F(Resume, RefusesADamagedCheckpoint) {
+  Simulator simulator(shot(), {});
+  simulator.write_checkpoint(folder_ / "good");
+  const std::string good = bytes(folder_ / "good");
+  for (size_t k = 0; k < 40; ++k) {
+    std::string bad = good;
+    bad[k * (good.size() - 1) / 39] ^= 0x10;  // from the first byte to the last
+    if (k % 4 == 3) bad = good.substr(0, k * good.size() / 40);
+    std::ofstream(folder_ / "bad", std::ios::binary) << bad;
+    EXPECT_THROW(simulator.read_checkpoint(folder_ / "bad"), Error) << k;
+  }
+  EXPECT_NO_THROW(simulator.read_checkpoint(folder_ / "good"));
+}
+
+TEST_F(Resume, RefusesTheCheckpointOfAnotherShot) {
+  Simulator(shot(), {}).write_checkpoint(folder_ / "one");
+  Shot other = shot();
+  other.gravity.y = -3;
+  Simulator simulator(other, {});
+  EXPECT_THROW(simulator.read_checkpoint(folder_ / "one"), Error);
+}
+
+}  // namespace
+}  // namespace drench::sim_tests

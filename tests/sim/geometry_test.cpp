@@ -1,0 +1,130 @@
+// Point, segment and path against triangles, by brute force and by hand.
+
+#include "sim/geometry.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sim/parallel.h"
+#include "sim/passes/path_test.h"
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+using sim::cpu::MovingTriangle;
+using D3 = sim::cpu::Vec3<double>;
+using F3 = sim::cpu::Vec3<float>;
+
+F3 draw(Random& random) {
+  return {float(2 * random() - 1), float(2 * random() - 1), float(2 * random() - 1)};
+}
+
+// A grid of 200 x 200 points on the triangle: none is nearer than the answer, and the nearest is no
+// farther than the answer by more than a cell of the grid.
+TEST(ClosestPoint, IsTheNearestOfAllPointsOfTheTriangle) {
+  Random random(11);
+  for (int trial = 0; trial < 300; ++trial) {
+    const F3 p = draw(random), a = draw(random), b = draw(random);
+    F3 c = draw(random);
+    if (trial % 5 == 0) c = a + (b - a) * float(random()) + draw(random) * 1e-3f;  // a sliver
+    const auto found = sim::cpu::closest_point(p, a, b, c);
+    EXPECT_GE(found.wa, -1e-6f);
+    EXPECT_GE(found.wb, -1e-6f);
+    EXPECT_GE(found.wc, -1e-6f);
+    constexpr int n = 200;
+    double nearest = 1e30;
+    for (int i = 0; i <= n; ++i) {
+      for (int j = 0; i + j <= n; ++j) {
+        const double u = double(i) / n, v = double(j) / n;
+        const D3 x = sim::cpu::to_double(a) * (1 - u - v) + sim::cpu::to_double(b) * u +
+                     sim::cpu::to_double(c) * v;
+        nearest = std::min(nearest, length(sim::cpu::to_double(p) - x));
+      }
+    }
+    const F3 foot = a * found.wa + b * found.wb + c * found.wc;
+    const double distance = std::sqrt(found.distance2);
+    EXPECT_NEAR(length(p - foot), distance, 2e-4) << trial;  // slivers lose digits in their weights
+    EXPECT_LE(distance, nearest + 2e-4) << trial;
+    EXPECT_GE(distance, nearest - 3.5 / n) << trial;  // edges are at most 2 sqrt(3) long
+  }
+}
+
+const D3 corner_a{0, 0, 0}, corner_b{1, 0, 0}, corner_c{0, 1, 0};
+
+TEST(Segment, CrossesATriangleOnlyWithinItsOutline) {
+  using sim::cpu::segment_crosses;
+  EXPECT_TRUE(segment_crosses({0.2, 0.2, 1}, {0.2, 0.2, -1}, corner_a, corner_b, corner_c));
+  EXPECT_TRUE(segment_crosses({0.2, 0.2, -1}, {0.3, 0.3, 1}, corner_a, corner_b, corner_c));
+  EXPECT_TRUE(
+      segment_crosses({0.5, 0.5, 1}, {0.5, 0.5, -1}, corner_a, corner_b, corner_c));  // on an edge
+  EXPECT_FALSE(segment_crosses({0.6, 0.6, 1}, {0.6, 0.6, -1}, corner_a, corner_b, corner_c));
+  EXPECT_FALSE(segment_crosses({0.2, 0.2, 2}, {0.2, 0.2, 1}, corner_a, corner_b, corner_c));
+  EXPECT_FALSE(segment_crosses({-1, 0.2, 0.1}, {2, 0.2, 0.1}, corner_a, corner_b, corner_c));
+}
+
+MovingTriangle moved_by(D3 step) {
+  return {corner_a, corner_b, corner_c, corner_a + step, corner_b + step, corner_c + step};
+}
+
+// Linear motions, whose meeting times are plain fractions.
+TEST(CrossingTime, IsThatOfLinearMotion) {
+  using sim::cpu::crossing_time;
+  EXPECT_NEAR(crossing_time(moved_by({0, 0, 0}), {0.2, 0.2, 1}, {0.2, 0.2, -3}), 0.25, 1e-12);
+  EXPECT_NEAR(crossing_time(moved_by({0, 0, 1}), {0.2, 0.2, 1}, {0.2, 0.2, -3}), 0.2, 1e-12);
+  EXPECT_NEAR(crossing_time(moved_by({0, 0, 2}), {0.2, 0.2, 1}, {0.2, 0.2, 1}), 0.5, 1e-12);
+  EXPECT_NEAR(crossing_time(moved_by({1, 0, 0}), {1.2, 0.2, 1}, {1.2, 0.2, -1}), 0.5, 1e-12);
+}
+
+TEST(CrossingTime, IsNoneForPathsThatMiss) {
+  using sim::cpu::crossing_time;
+  EXPECT_LT(crossing_time(moved_by({0, 0, 0}), {0.2, 0.2, 1}, {0.2, 0.2, 0.5}), 0);
+  EXPECT_LT(crossing_time(moved_by({0, 0, 0}), {0.9, 0.9, 1}, {0.9, 0.9, -1}), 0);
+  EXPECT_LT(crossing_time(moved_by({0, 0, -3}), {0.2, 0.2, 1}, {0.2, 0.2, -1}), 0);  // it runs away
+  EXPECT_LT(crossing_time(moved_by({5, 0, 0}), {0.2, 0.2, 1}, {0.2, 0.2, -1}), 0);  // gone sideways
+}
+
+// Two corners swap sides while the third, at x = 1, stands: the plane sweeps through a point that
+// rests near it. a and c go from z = -1 to 1, so at b + s (..) the height is linear: the point at
+// height 0.2 over the middle between a and b is met when (2 t - 1)/2 = 0.2, t = 0.7.
+TEST(CrossingTime, OfATriangleThatTurns) {
+  const MovingTriangle m{{0, 0, -1}, {1, 0, 0}, {0, 1, -1}, {0, 0, 1}, {1, 0, 0}, {0, 1, 1}};
+  EXPECT_NEAR(sim::cpu::crossing_time(m, {0.5, 0.25, 0.2}, {0.5, 0.25, 0.2}), 0.7, 1e-12);
+}
+
+/// Velocity after one step of one particle at `place` near a sheet of 0.2 m at height 0.
+V3d pushed(V3d place, V3d velocity) {
+  Shot shot = empty_shot();
+  add_box(shot, V3d(0.5, 0.5, 0.5), {1, 1, 1});
+  add_sheet(shot, 0.2, 0, 10);
+  sim::Scene scene = sim::build_scene(shot);
+  sim::HostState& s = scene.start;
+  const V3d p = place - V3d(-1);  // local
+  s.position.x[0] = float(p.x), s.position.y[0] = float(p.y), s.position.z[0] = float(p.z);
+  s.velocity.x[0] = float(velocity.x), s.velocity.y[0] = float(velocity.y),
+  s.velocity.z[0] = float(velocity.z);
+  Stepper run(std::move(scene));
+  run.step(2e-4);
+  return at(run.solver->save().velocity, 0);
+}
+
+TEST(FreeEdge, PushesNothingBesideIt) {
+  for (double d = 0.1; d <= 2; d += 0.1) {
+    for (double up : {0.0, 0.05, 0.3}) {
+      const V3d beside(0.1 + 0.01 * d, 0.01 * up, 0.013), v(0, -0.5, 0.25);
+      EXPECT_EQ(pushed(beside, v), v) << d << ' ' << up;
+      const V3d corner(0.1 + 0.01 * d, 0.01 * up, 0.1 + 0.01 * d);
+      EXPECT_EQ(pushed(corner, v), v) << d << ' ' << up;
+    }
+  }
+}
+
+// The same particle over the sheet itself is slowed: it has 1 g, the vertices of its triangle 0.24
+// g in all.
+TEST(FreeEdge, TheSheetItselfDoesPush) {
+  EXPECT_GT(pushed(V3d(0.013, 0.004, 0.017), V3d(0, -0.5, 0)).y, -0.45);
+}
+
+}  // namespace
+}  // namespace drench::sim_tests

@@ -1,0 +1,90 @@
+// What a scene does not contain costs nothing and changes nothing.
+
+#include <gtest/gtest.h>
+
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+constexpr unsigned cloth_columns =
+    sim::column_cloth | sim::column_sheet | sim::column_memory | sim::column_contact;
+
+TEST(Skip, FluidAloneHasNoClothPassAndNoClothColumn) {
+  Shot shot = empty_shot();
+  add_box(shot, V3d(0), {4, 4, 4});
+  const Stepper run(shot);
+  ASSERT_FALSE(run.solver->plan().empty());
+  for (const sim::PassInfo& pass : run.solver->plan())
+    EXPECT_EQ((pass.reads | pass.writes) & cloth_columns, 0u) << pass.name;
+  EXPECT_EQ(run.solver->allocated() & cloth_columns, 0u);
+}
+
+TEST(Skip, ClothAloneHasNoFluidPassAndNoFluidColumn) {
+  Shot shot = empty_shot();
+  add_sheet(shot, 0.2, 0, 4);
+  const Stepper run(shot);
+  ASSERT_FALSE(run.solver->plan().empty());
+  EXPECT_EQ(run.solver->allocated(), unsigned(sim::column_cloth));
+}
+
+TEST(Skip, EachCouplingBringsItsOwnPassesOnly) {
+  Shot shot = empty_shot();
+  add_box(shot, V3d(0, 0.05, 0), {4, 4, 4});
+  add_sheet(shot, 0.2, 0, 4);
+  for (CouplingScheme scheme : {CouplingScheme::exact, CouplingScheme::paper}) {
+    shot.coupling.scheme = scheme;
+    const bool published = scheme == CouplingScheme::paper;
+    const Stepper run(shot);
+    for (const sim::PassInfo& pass : run.solver->plan()) {
+      EXPECT_EQ(pass.name == "contact_exact" && published, false);
+      EXPECT_EQ(pass.name.rfind("paper", 0) == 0 && !published, false) << pass.name;
+    }
+    EXPECT_EQ((run.solver->allocated() & sim::column_memory) != 0, !published);
+  }
+}
+
+/// A block that falls onto a floor, with or without a sheet 0.5 m away.
+sim::HostState splash(int steps, bool with_cloth) {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.domain.axis[1] = Axis::walls;
+  add_box(shot, V3d(0, -0.98, 0), {8, 8, 8});
+  if (with_cloth) pin_edges(add_sheet(shot, 0.2, 0, 8));
+  Stepper run(shot);
+  for (int k = 0; k < steps; ++k) run.step(5e-4);
+  return run.solver->save();
+}
+
+TEST(Skip, ClothFarAwayChangesNoBitOfTheFluid) {
+  const sim::HostState without = splash(200, false), with = splash(200, true);
+  EXPECT_EQ(without.id, with.id);
+  EXPECT_EQ(without.position.x, with.position.x);
+  EXPECT_EQ(without.position.y, with.position.y);
+  EXPECT_EQ(without.position.z, with.position.z);
+  EXPECT_EQ(without.velocity.x, with.velocity.x);
+  EXPECT_EQ(without.velocity.y, with.velocity.y);
+  EXPECT_EQ(without.velocity.z, with.velocity.z);
+}
+
+// refresh() between steps, as every frame's end makes it, changes nothing either.
+TEST(Skip, RefreshChangesNoBit) {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  add_box(shot, V3d(-0.04, 0.01, -0.04), {8, 8, 8});
+  add_sheet(shot, 0.2, 0, 8);
+  Stepper plain(shot), refreshed(shot);
+  for (int k = 0; k < 60; ++k) {
+    plain.step(3e-4), refreshed.step(3e-4);
+    refreshed.solver->refresh();
+  }
+  plain.solver->refresh();
+  const sim::HostState a = plain.solver->save(), b = refreshed.solver->save();
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.position.y, b.position.y);
+  EXPECT_EQ(a.velocity.y, b.velocity.y);
+  EXPECT_EQ(a.cloth_position.y, b.cloth_position.y);
+}
+
+}  // namespace
+}  // namespace drench::sim_tests
