@@ -1,6 +1,6 @@
 #pragma once
-// SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6 for density,
-// spiky for pressure gradients, and the viscosity kernel's Laplacian; and their integrals over a flat
+// SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6, spiky, and the
+// viscosity kernel's Laplacian; and their integrals over a flat
 // layer and over the half-space beyond it, the wall functions of the seed's eqs (8) and (9).
 // q = distance / h throughout. Closed forms and their derivation: tests/validation/README.md, section 4.
 
@@ -14,6 +14,11 @@ constexpr float pi = 3.14159265358979f;
 DRENCH_HD float poly6_factor(float h) {
   const float h3 = h * h * h;
   return 315.f / (64.f * pi * h3 * h3 * h3);
+}
+/// spiky: W(r) = spiky_factor(h) (h - r)^3, 1/m^3.
+DRENCH_HD float spiky_factor(float h) {
+  const float h3 = h * h * h;
+  return 15.f / (pi * h3 * h3);
 }
 /// spiky: dW/dr = -spiky_gradient_factor(h) (h - r)^2; viscosity: lap W = the same factor (h - r).
 DRENCH_HD float spiky_gradient_factor(float h) {
@@ -39,6 +44,11 @@ DRENCH_HD float spiky_plane(float q) {
   const float u = max0(1.f - q), u4 = u * u * u * u;
   return 7.5f * u4 - 6.f * u4 * u;
 }
+/// Integral of the spiky kernel over everything beyond a plane at distance qh. 1/2 at q = 0.
+DRENCH_HD float spiky_halfspace(float q) {
+  const float u = max0(1.f - q), u5 = u * u * u * u * u;
+  return 1.5f * u5 - u5 * u;
+}
 /// -d spiky_plane / dq.
 DRENCH_HD float spiky_plane_slope(float q) {
   const float u = max0(1.f - q);
@@ -54,5 +64,23 @@ DRENCH_HD float viscosity_halfspace(float q) {
   const float p = q < 1.f ? q : 1.f;
   return max0(15.f * (0.5f - p + p * p * p - 0.5f * p * p * p * p));
 }
+
+/// Shapes (without factor) of the two kernels that density may be summed with, of the squared distance.
+struct Spiky {
+  template <class T>
+  static DRENCH_HD T shape(T r2, T h) {
+    const T u = max0(h - square_root(r2));
+    return u * u * u;
+  }
+  static float factor(float h) { return spiky_factor(h); }
+};
+struct Poly6 {
+  template <class T>
+  static DRENCH_HD T shape(T r2, T h) {
+    const T u = max0(h * h - r2);
+    return u * u * u;
+  }
+  static float factor(float h) { return poly6_factor(h); }
+};
 
 }  // namespace drench::sim::DRENCH_BACKEND

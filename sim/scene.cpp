@@ -10,6 +10,7 @@
 
 #include "pipeline/contract/error.h"
 #include "sim/geometry.h"
+#include "sim/kernels.h"
 
 namespace drench::sim {
 
@@ -28,19 +29,17 @@ LocalFrame local_frame(const Shot& shot) {
   return frame;
 }
 
-/// Sum of a^3 W_poly6 over a cubic lattice of spacing a.
+/// Sum of a^3 W over a cubic lattice of spacing a, for the kernel that density is summed with.
+template <class Kernel>
 double lattice_sum(double a, double h) {
   const int reach = int(std::ceil(h / a));
   double sum = 0;
   for (int z = -reach; z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) {
-        const double s = h * h - (x * x + y * y + z * z) * a * a;
-        if (s > 0) sum += s * s * s;
-      }
+      for (int x = -reach; x <= reach; ++x) sum += Kernel::shape((x * x + y * y + z * z) * float(a * a), float(h));
     }
   }
-  return sum * a * a * a * 315 / (64 * M_PI * std::pow(h, 9));
+  return sum * a * a * a * Kernel::factor(float(h));
 }
 
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at start
@@ -70,7 +69,8 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.spacing = float(a), p.support_radius = float(h);
   p.rest_density = float(shot.fluid.rest_density);
   p.particle_mass = float(shot.fluid.rest_density * a * a * a);
-  p.lattice_sum = float(lattice_sum(a, h));
+  const bool poly6 = shot.coupling.scheme == CouplingScheme::paper && !shot.cloth.empty();
+  p.lattice_sum = float(poly6 ? lattice_sum<cpu::Poly6>(a, h) : lattice_sum<cpu::Spiky>(a, h));
   p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.

@@ -136,7 +136,7 @@ class BackendSolver : public Solver {
     for (Column<int>* c : {&f.id, &f.cell, &f.order, &state_.swap_int}) c->resize(n);
     if (allocated_ & column_acceleration) f.acceleration.resize(n);
     if (allocated_ & column_density) {
-      for (Column<float>* c : {&f.density, &f.pressure, &f.inverse_density}) c->resize(n);
+      for (Column<float>* c : {&f.density, &f.pressure_term, &f.inverse_density}) c->resize(n);
     }
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {

@@ -29,7 +29,7 @@ struct FluidState {
   VecColumn owed;                     // kg m/s that the path test took and cloth has not received yet
   // rebuilt every step
   VecColumn acceleration;             // m/s^2
-  Column<float> density, pressure, inverse_density;
+  Column<float> density, pressure_term, inverse_density;  // kg/m^3, p / rho^2, m^3/kg
   Column<int> cell, order;
   Column<int> cell_start;
   GridShape grid{};

@@ -21,24 +21,30 @@ Walls walls_of(const Parameters& p) {
 
 GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
 
-void sum_density(State& state) {
+template <class Kernel>
+DensitySum<Kernel> density_pass(const State& state) {
   const Parameters& p = state.parameters;
-  FluidState& f = state.fluid;
-  const DensitySum pass{f.position.view(), f.cloth_share.size() ? f.cloth_share.data() : nullptr,
-                        f.density.data(), f.pressure.data(), f.inverse_density.data(), p.support_radius,
-                        p.particle_mass * poly6_factor(p.support_radius) / p.lattice_sum, p.rest_density,
-                        p.sound_speed * p.sound_speed, walls_of(p)};
-  if (state.cloth.triangles > 0 && !p.paper) {
-    for_each_pair("density", grid_of(state), f.count, pass, sheet_filter(state));
+  const FluidState& f = state.fluid;
+  return {f.position.view(), f.cloth_share.size() ? f.cloth_share.data() : nullptr, f.density.data(),
+          f.pressure_term.data(), f.inverse_density.data(), p.support_radius,
+          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum, p.rest_density,
+          p.sound_speed * p.sound_speed, walls_of(p)};
+}
+
+void sum_density(State& state) {
+  if (state.cloth.triangles == 0) {
+    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state));
+  } else if (state.parameters.paper) {
+    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
-    for_each_pair("density", grid_of(state), f.count, pass);
+    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state), sheet_filter(state));
   }
 }
 
 void pressure_viscosity(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
-  const PressureViscosity pass{f.position.view(), f.velocity.view(), f.pressure.data(),
+  const PressureViscosity pass{f.position.view(), f.velocity.view(), f.pressure_term.data(),
                                f.inverse_density.data(), f.acceleration.view(), p.support_radius,
                                p.particle_mass * spiky_gradient_factor(p.support_radius),
                                p.dynamic_viscosity, p.wall_viscosity, p.rest_density,

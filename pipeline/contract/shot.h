@@ -78,7 +78,7 @@ struct Fluid {
   double support_ratio = 2;            // support radius / spacing
   double rest_density = 1000;          // kg/m^3
   double kinematic_viscosity = 1e-6;   // m^2/s
-  double artificial_viscosity = 0.05;  // alpha of Monaghan 1992, dimensionless; 0 is none
+  double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none
   double sound_speed = 0;              // m/s; 0: ten times the largest speed expected
   std::string material = "water";
   std::vector<FluidBox> box;

@@ -65,7 +65,7 @@ inline void sort_contacts(State& state) {
 struct ContactSetup {
   ContactView contacts;
   VecView velocity, normal;
-  const float *distance, *pressure, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
+  const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
   float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
 
   DRENCH_HD void prepare(ContactRow& row) const {
@@ -82,11 +82,12 @@ struct ContactSetup {
 
     const float inverse_h = 1.f / support_radius;
     const float gap = max0(distance[i] - half_thickness[t]), q = minimum(gap * inverse_h, 1.f);
-    const float share = contacts.edge[i] * rest_density * inverse_density[i] * inverse_density[i];
-    const float push = 2.f * share * pressure[i] * spiky_plane(q) * inverse_h;
-    const float density_slope = pressure[i] > 0.f ? sound_speed2 * rest_density * poly6_plane(q) : 0.f;
-    const float kappa = 2.f * share * inverse_h * inverse_h *
-                        (density_slope * spiky_plane(q) + pressure[i] * spiky_plane_slope(q));
+    const float layer = contacts.edge[i] * rest_density, push_term = 2.f * layer * pressure_term[i];
+    const float share = layer * inverse_density[i] * inverse_density[i];
+    const float push = push_term * spiky_plane(q) * inverse_h;
+    const float density_slope = pressure_term[i] > 0.f ? sound_speed2 * rest_density * spiky_plane(q) : 0.f;
+    const float kappa = inverse_h * inverse_h *
+                        (2.f * share * density_slope * spiky_plane(q) + push_term * spiky_plane_slope(q));
     row.pressure_target = dt * mass * push;
     row.pressure_rate = dt * dt * mass * kappa;
     row.pressure_scale = 1.f / (1.f + row.pressure_rate * sum);
@@ -126,7 +127,7 @@ inline ContactSetup contact_setup(State& state) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure.data(),
+  return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure_term.data(),
           f.inverse_density.data(), c.half_thickness.data(), c.inverse_mass.data(), c.share.data(), beta,
           float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed, p.support_radius,
           0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed};

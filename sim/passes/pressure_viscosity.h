@@ -4,14 +4,15 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 // Pressure and viscosity between particles, and gravity and walls on each (seed eq 2 without cloth):
-//   a_i = -sum_j m (p_i + p_j)/(rho_i rho_j) grad W_spiky + mu sum_j m (v_j - v_i)/(rho_i rho_j) lap W_vis + g
+//   a_i = -sum_j m (p_i/rho_i^2 + p_j/rho_j^2) grad W_spiky + mu sum_j m (v_j - v_i)/(rho_i rho_j) lap W_vis + g
 // Mueller, Charypar, Gross 2003 average the two pressures, which gives half the gradient of a smooth
-// field (sum_j V_j grad W = 0); the sum gives all of it. Both are antisymmetric in i and j.
+// field (sum_j V_j grad W = 0). This sum (Monaghan 1992) gives all of it and is the gradient of the energy
+// that belongs to the summed density. Both are antisymmetric in i and j.
 // A wall is a half-space of the particle's own pressure and rest density; free slip but for mu.
 struct PressureViscosity {
   static constexpr int columns = 8;
   VecView position, velocity;
-  const float *pressure, *inverse_density;
+  const float *pressure_term, *inverse_density;  // p / rho^2, 1 / rho
   VecView acceleration;
   float support_radius;     // m
   float scale;              // m spiky_gradient_factor(h), m^-1 kg...: see kernels.h
@@ -22,13 +23,13 @@ struct PressureViscosity {
   Walls walls;
 
   DRENCH_HD Inputs<8> inputs() const {
-    return {{position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, pressure,
-             inverse_density}};
+    return {{position.x, position.y, position.z, velocity.x, velocity.y, velocity.z,
+             pressure_term, inverse_density}};
   }
   template <class T>
   struct Particle {
     Vec3<T> position, velocity;
-    T pressure, inverse_density;
+    T pressure_term, inverse_density;
   };
   template <class T>
   struct Sum {
@@ -39,14 +40,12 @@ struct PressureViscosity {
     const Vec3<T> x = i.position - j.position;
     const T r = square_root(length2(x));
     const T u = max0(T(support_radius) - r);
-    const T s = u * j.inverse_density;
-    const T push = s * u * (i.pressure + j.pressure) / maximum(r, T(1e-12f));
-    const T drag = s * T(dynamic_viscosity);
+    const T push = u * u * (i.pressure_term + j.pressure_term) / maximum(r, T(1e-12f));
+    const T drag = u * T(dynamic_viscosity) * (i.inverse_density * j.inverse_density);
     sum.force = sum.force + x * push + (j.velocity - i.velocity) * drag;
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
-    const Vec3<float> pair_part = sum.force * (scale * inverse_density[i]);
-    acceleration.set(i, pair_part + wall_acceleration(i) + gravity);
+    acceleration.set(i, sum.force * scale + wall_acceleration(i) + gravity);
   }
 
   /// -2 p_i rho_0 / rho_i^2 times the half-space gradient of each wall, shares as in the density.
@@ -56,14 +55,14 @@ struct PressureViscosity {
     const float inverse_h = 1.f / support_radius, inverse_rho = inverse_density[i];
     float open[3], a[3] = {0.f, 0.f, 0.f};
     for (int k = 0; k < 3; ++k) {
-      open[k] = 1.f - poly6_halfspace(minimum(max0(walls.distance(k, x[k])) * inverse_h, 1.f));
+      open[k] = 1.f - spiky_halfspace(minimum(max0(walls.distance(k, x[k])) * inverse_h, 1.f));
     }
     for (int k = 0; k < 3; ++k) {
       const float q = max0(walls.distance(k, x[k])) * inverse_h;
       if (q >= 1.f) continue;
-      const float share = open[(k + 1) % 3] * open[(k + 2) % 3] * rest_density * inverse_rho * inverse_rho;
-      a[k] += 2.f * pressure[i] * share * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
-      const float drag = wall_viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+      const float share = open[(k + 1) % 3] * open[(k + 2) % 3] * rest_density;
+      a[k] += 2.f * pressure_term[i] * share * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
+      const float drag = wall_viscosity * share * inverse_rho * inverse_rho * viscosity_halfspace(q) * inverse_h * inverse_h;
       for (int m = 0; m < 3; ++m) {
         if (m != k) a[m] -= drag * u[m];
       }

@@ -123,7 +123,7 @@ inline void find_sheet_sides(State& state) {
     distance[i] = flip * d;
     plane[i] = distance[i] - dot(normal[i], position[i]);
     edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
-    share[i] = edge[i] * poly6_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
+    share[i] = edge[i] * spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
   });
 }
 
