@@ -10,6 +10,7 @@ struct Parameters {
   float spacing = 0, support_radius = 0;       // m, a and h
   float particle_mass = 0, rest_density = 0;   // kg, kg/m^3
   float lattice_sum = 1;                       // of the density kernel over a cubic lattice, times a^3
+  float wall_scale = 1;                        // of the half-space integral: a lattice at a wall is whole
   float sound_speed = 0;                       // m/s
   float dynamic_viscosity = 0;                 // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;                    // Pa s, fluid on domain walls: the physical one

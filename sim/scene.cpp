@@ -29,17 +29,25 @@ LocalFrame local_frame(const Shot& shot) {
   return frame;
 }
 
-/// Sum of a^3 W over a cubic lattice of spacing a, for the kernel that density is summed with.
+/// Sum of a^3 W over the part of a cubic lattice of spacing a with z >= low, for the density kernel.
 template <class Kernel>
-double lattice_sum(double a, double h) {
+double lattice_sum(double a, double h, int low) {
   const int reach = int(std::ceil(h / a));
   double sum = 0;
-  for (int z = -reach; z <= reach; ++z) {
+  for (int z = std::max(low, -reach); z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
       for (int x = -reach; x <= reach; ++x) sum += Kernel::shape((x * x + y * y + z * z) * float(a * a), float(h));
     }
   }
   return sum * a * a * a * Kernel::factor(float(h));
+}
+
+/// Sets the two numbers that make a lattice stress-free inside and half a spacing before a wall.
+template <class Kernel>
+void calibrate(double a, double h, Parameters& p) {
+  const double whole = lattice_sum<Kernel>(a, h, -1000), cut = lattice_sum<Kernel>(a, h, 0);
+  p.lattice_sum = float(whole);
+  p.wall_scale = float((whole - cut) / whole) / cpu::spiky_halfspace(float(0.5 * a / h));
 }
 
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at start
@@ -70,7 +78,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.rest_density = float(shot.fluid.rest_density);
   p.particle_mass = float(shot.fluid.rest_density * a * a * a);
   const bool poly6 = shot.coupling.scheme == CouplingScheme::paper && !shot.cloth.empty();
-  p.lattice_sum = float(poly6 ? lattice_sum<cpu::Poly6>(a, h) : lattice_sum<cpu::Spiky>(a, h));
+  poly6 ? calibrate<cpu::Poly6>(a, h, p) : calibrate<cpu::Spiky>(a, h, p);
   p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.

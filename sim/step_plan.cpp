@@ -15,6 +15,7 @@ namespace {
 
 Walls walls_of(const Parameters& p) {
   Walls walls{};
+  walls.scale = p.wall_scale;
   for (int k = 0; k < 3; ++k) walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
   return walls;
 }

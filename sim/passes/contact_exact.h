@@ -4,7 +4,7 @@
 // and given back to the three vertices by barycentric weights.
 //
 // Normal impulse: the pressure gradient that belongs to the wall density, taken implicitly,
-//     lambda = dt m (a_w - kappa dt v_n),   a_w = 2 p_i rho_0 / rho_i^2 * P_spiky(q)/h,
+//     lambda = dt m (a_w - kappa dt v_n),   a_w = p_i rho_0 / rho_i^2 * P_spiky(q)/h,
 // or, where that is not enough, what keeps the particle at the contact distance at the end of the step
 // (eq 7 with the reduced mass in place of m and no restitution); never negative: cloth does not pull.
 // Tangential impulse: eq 8 with the right sign and the Laplacian, over the half-space, implicit as well.
@@ -66,7 +66,7 @@ struct ContactSetup {
   ContactView contacts;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
-  float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed;
+  float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed, wall_scale;
 
   DRENCH_HD void prepare(ContactRow& row) const {
     const int i = row.particle, t = contacts.triangle[i];
@@ -82,12 +82,12 @@ struct ContactSetup {
 
     const float inverse_h = 1.f / support_radius;
     const float gap = max0(distance[i] - half_thickness[t]), q = minimum(gap * inverse_h, 1.f);
-    const float layer = contacts.edge[i] * rest_density, push_term = 2.f * layer * pressure_term[i];
+    const float layer = contacts.edge[i] * rest_density, push_term = layer * pressure_term[i];
     const float share = layer * inverse_density[i] * inverse_density[i];
     const float push = push_term * spiky_plane(q) * inverse_h;
-    const float density_slope = pressure_term[i] > 0.f ? sound_speed2 * rest_density * spiky_plane(q) : 0.f;
+    const float density_slope = pressure_term[i] > 0.f ? wall_scale * sound_speed2 * rest_density * spiky_plane(q) : 0.f;
     const float kappa = inverse_h * inverse_h *
-                        (2.f * share * density_slope * spiky_plane(q) + push_term * spiky_plane_slope(q));
+                        (share * density_slope * spiky_plane(q) + push_term * spiky_plane_slope(q));
     row.pressure_target = dt * mass * push;
     row.pressure_rate = dt * dt * mass * kappa;
     row.pressure_scale = 1.f / (1.f + row.pressure_rate * sum);
@@ -130,7 +130,7 @@ inline ContactSetup contact_setup(State& state) {
   return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure_term.data(),
           f.inverse_density.data(), c.half_thickness.data(), c.inverse_mass.data(), c.share.data(), beta,
           float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed, p.support_radius,
-          0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed};
+          0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed, p.wall_scale};
 }
 
 /// Rows of the near list; the vertices receive what the path test took from particles.

@@ -8,6 +8,7 @@ namespace drench::sim::DRENCH_BACKEND {
 struct Walls {
   float low[3], high[3];  // m
   bool on[3];
+  float scale;            // Parameters::wall_scale
 
   /// Distance to the nearer wall of an axis; far when the axis is open.
   DRENCH_HD float distance(int axis, float x) const {
@@ -17,13 +18,14 @@ struct Walls {
 };
 
 /// Share of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
-/// corners are not counted twice. H is the half-space integral of the kernel.
+/// corners are not counted twice. H is the half-space integral of the kernel, scaled so that a lattice that
+/// ends half a spacing before a wall has rest density: the kernel is too narrow for the integral itself.
 DRENCH_HD float wall_density_share(const Walls& walls, Vec3<float> p, float inverse_h) {
   const float x[3] = {p.x, p.y, p.z};
   float open = 1.f;
   for (int k = 0; k < 3; ++k) {
     const float q = max0(walls.distance(k, x[k])) * inverse_h;
-    if (q < 1.f) open *= 1.f - spiky_halfspace(q);
+    if (q < 1.f) open *= 1.f - walls.scale * spiky_halfspace(q);
   }
   return 1.f - open;
 }

@@ -8,7 +8,7 @@ namespace drench::sim::DRENCH_BACKEND {
 // Mueller, Charypar, Gross 2003 average the two pressures, which gives half the gradient of a smooth
 // field (sum_j V_j grad W = 0). This sum (Monaghan 1992) gives all of it and is the gradient of the energy
 // that belongs to the summed density. Both are antisymmetric in i and j.
-// A wall is a half-space of the particle's own pressure and rest density; free slip but for mu.
+// A wall is a half-space of rest density; free slip but for mu.
 struct PressureViscosity {
   static constexpr int columns = 8;
   VecView position, velocity;
@@ -48,20 +48,22 @@ struct PressureViscosity {
     acceleration.set(i, sum.force * scale + wall_acceleration(i) + gravity);
   }
 
-  /// -2 p_i rho_0 / rho_i^2 times the half-space gradient of each wall, shares as in the density.
+  /// p_i rho_0 / rho_i^2 times the half-space gradient of each wall, shares as in the density. Mirrored
+  /// pressure would double it; but a wall stores no energy of its own, and twice the force on the way out
+  /// makes energy: 0.2 m of water at rest kept an rms speed of 0.3 m/s, against 0.02 m/s so.
   DRENCH_HD Vec3<float> wall_acceleration(int i) const {
     const Vec3<float> p = position[i], v = velocity[i];
     const float x[3] = {p.x, p.y, p.z}, u[3] = {v.x, v.y, v.z};
     const float inverse_h = 1.f / support_radius, inverse_rho = inverse_density[i];
     float open[3], a[3] = {0.f, 0.f, 0.f};
     for (int k = 0; k < 3; ++k) {
-      open[k] = 1.f - spiky_halfspace(minimum(max0(walls.distance(k, x[k])) * inverse_h, 1.f));
+      open[k] = 1.f - walls.scale * spiky_halfspace(minimum(max0(walls.distance(k, x[k])) * inverse_h, 1.f));
     }
     for (int k = 0; k < 3; ++k) {
       const float q = max0(walls.distance(k, x[k])) * inverse_h;
       if (q >= 1.f) continue;
       const float share = open[(k + 1) % 3] * open[(k + 2) % 3] * rest_density;
-      a[k] += 2.f * pressure_term[i] * share * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
+      a[k] += pressure_term[i] * share * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
       const float drag = wall_viscosity * share * inverse_rho * inverse_rho * viscosity_halfspace(q) * inverse_h * inverse_h;
       for (int m = 0; m < 3; ++m) {
         if (m != k) a[m] -= drag * u[m];

@@ -90,7 +90,8 @@ inline void find_sheet_sides(State& state) {
       *memory_side = f.memory_side.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
   float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
-  const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
+  const float h = state.parameters.support_radius, spacing = state.parameters.spacing,
+              scale = state.parameters.wall_scale;
   const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
   parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
     const int t = triangle[i];
@@ -123,7 +124,7 @@ inline void find_sheet_sides(State& state) {
     distance[i] = flip * d;
     plane[i] = distance[i] - dot(normal[i], position[i]);
     edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
-    share[i] = edge[i] * spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
+    share[i] = scale * edge[i] * spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
   });
 }
 
