@@ -111,24 +111,39 @@ double largest_eigenvalue(const double (&m)[6]) {
   return 1.01 * value;
 }
 
-/// 2 / omega with omega^2 <= max over vertices of the eigenvalue of sum_j 2 k e e^T over m: exact,
-/// 4 (k_adj + k_diag) / m, on a square lattice. 0.7 leaves room for rotated and stretched springs.
-double cloth_dt_limit(const Sheet& sheet) {
+double damping_of(const Sheet& sheet, const Sheet::Spring& s, const Cloth& cloth) {  // N s/m
+  const double reduced = sheet.mass[s.a] * sheet.mass[s.b] / (sheet.mass[s.a] + sheet.mass[s.b]);
+  return cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced);
+}
+
+/// Largest over the free vertices of the eigenvalue of sum_j 2 k e e^T over m, for stiffness or damping k.
+template <class Coefficient>
+double largest_rate(const Sheet& sheet, const Coefficient& coefficient) {
   std::vector<std::array<double, 6>> block(sheet.position.size(), {0, 0, 0, 0, 0, 0});
   for (const Sheet::Spring& s : sheet.spring) {
     const V3d e = (sheet.position[s.b] - sheet.position[s.a]).normalized();
     const double entry[6] = {e.x * e.x, e.x * e.y, e.x * e.z, e.y * e.y, e.y * e.z, e.z * e.z};
     for (int v : {s.a, s.b}) {
-      for (int k = 0; k < 6; ++k) block[v][k] += 2 * s.stiffness * entry[k];
+      for (int k = 0; k < 6; ++k) block[v][k] += 2 * coefficient(s) * entry[k];
     }
   }
-  double omega2 = 0;
+  double largest = 0;
   for (size_t v = 0; v < block.size(); ++v) {
     double m[6];
     std::copy(block[v].begin(), block[v].end(), m);
-    if (!sheet.pinned[v]) omega2 = std::max(omega2, largest_eigenvalue(m) / sheet.mass[v]);
+    if (!sheet.pinned[v]) largest = std::max(largest, largest_eigenvalue(m) / sheet.mass[v]);
   }
-  return omega2 > 0 ? 0.7 * 2 / std::sqrt(omega2) : 1e30;
+  return largest;
+}
+
+/// (2 / omega) (sqrt(1 + xi^2) - xi), the limit of damped symplectic Euler, with omega^2 and 2 xi omega
+/// bounded by largest_rate: exact, 4 (k_adj + k_diag) / m, on a square lattice. 0.7 leaves room for rotated
+/// and stretched springs.
+double cloth_dt_limit(const Sheet& sheet, const Cloth& cloth) {
+  const double omega = std::sqrt(largest_rate(sheet, [](const Sheet::Spring& s) { return s.stiffness; }));
+  if (omega == 0) return 1e30;
+  const double xi = largest_rate(sheet, [&](const Sheet::Spring& s) { return damping_of(sheet, s, cloth); }) / (2 * omega);
+  return 0.7 * 2 / omega * (std::sqrt(1 + xi * xi) - xi);
 }
 
 /// Compressed rows: entries of row r stand at [start[r], start[r + 1]).
@@ -149,8 +164,7 @@ void append_springs(const Sheet& sheet, const Cloth& cloth, ClothTopology& t, in
   std::vector<std::vector<End>> rows(sheet.position.size());
   for (const Sheet::Spring& s : sheet.spring) {
     const double length = (sheet.rest[s.b] - sheet.rest[s.a]).length();
-    const double reduced = sheet.mass[s.a] * sheet.mass[s.b] / (sheet.mass[s.a] + sheet.mass[s.b]);
-    const double damping = cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced);
+    const double damping = damping_of(sheet, s, cloth);
     rows[s.a].push_back({s.b + base, float(length), float(s.stiffness), float(damping)});
     rows[s.b].push_back({s.a + base, float(length), float(s.stiffness), float(damping)});
   }
@@ -285,7 +299,7 @@ Scene build_scene(const Shot& shot) {
     scene.first_vertex.push_back(scene.cloth.vertices());
     scene.first_triangle.push_back(scene.cloth.triangles());
     append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, scene);
-    dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back()));
+    dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back(), shot.cloth[s]));
   }
   scene.first_vertex.push_back(scene.cloth.vertices());
   scene.first_triangle.push_back(scene.cloth.triangles());

@@ -107,7 +107,7 @@ struct Cloth {
   double adjacent_stiffness = 400;  // N/m, the 2-D modulus k_adj
   double diagonal_stiffness = 200;  // N/m, k_diag; isotropic when k_adj = 2 k_diag
   double damping = 0.5;             // 1/s, rate of eq (3): d = exp(-damping dt)
-  double spring_damping = 0.02;     // fraction of critical, along each spring; momentum is kept
+  double spring_damping = 0.1;      // fraction of critical, along each spring; momentum is kept
   double thickness = 0.001;         // m
   std::string material = "cotton";
 };
