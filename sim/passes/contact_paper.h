@@ -60,7 +60,8 @@ inline void find_nearest_centroids(State& state) {
 
 // Contact force m (epsilon - d) n / dt^2 (eq 7, epsilon the particle spacing) and wall viscosity (eq 8)
 // added to the accelerations. Eq 8 is taken with its printed sign and with the Laplacian, the only
-// reading that has the units of a force density. Only the colliding force is given back (eq 10).
+// reading that has the units of a force density, and with the physical viscosity: that sign feeds energy to
+// the fluid, and with the numerical one as well it diverges. Only the colliding force is given back (eq 10).
 inline void add_paper_forces(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
@@ -70,7 +71,7 @@ inline void add_paper_forces(State& state) {
   const float *distance = f.sheet_distance.data(), *inverse_density = f.inverse_density.data();
   const WallTable table{state.wall_table};
   const float h = p.support_radius, spacing = p.spacing, dt = float(state.dt), mass = p.particle_mass;
-  const float viscosity = p.dynamic_viscosity * mass / (spacing * spacing * h * h * h);
+  const float viscosity = p.wall_viscosity * mass / (spacing * spacing * h * h * h);
   parallel_for("paper: forces", f.count, DRENCH_LAMBDA(int i) {
     impulse.set(i, {0.f, 0.f, 0.f});
     const int t = triangle[i];
