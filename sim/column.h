@@ -63,10 +63,11 @@ class Column {
 
 #else
 
+/// Eight elements of room stand behind the last one, so that a pack may be read where the column ends.
 template <class T>
 class Column {
  public:
-  void resize(size_t size) { data_.resize(size); }
+  void resize(size_t size) { data_.resize(size + 8), size_ = size; }
   void upload(const T* source, size_t size, size_t at = 0) {
     if (size) std::memcpy(data_.data() + at, source, size * sizeof(T));
   }
@@ -75,11 +76,12 @@ class Column {
   }
   void clear_bytes(int byte) { if (!data_.empty()) std::memset(data_.data(), byte, data_.size() * sizeof(T)); }
   T* data() const { return const_cast<T*>(data_.data()); }
-  size_t size() const { return data_.size(); }
-  void swap(Column& other) noexcept { data_.swap(other.data_); }
+  size_t size() const { return size_; }
+  void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
 
  private:
   std::vector<T> data_;
+  size_t size_ = 0;
 };
 
 #endif

@@ -75,9 +75,38 @@ DRENCH_HD Pack load(const float* p, Lanes i) { return Pack::load(p + i.base); }
 DRENCH_HD LaneIndex load(const int* p, Lanes i) {
   return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p + i.base))};
 }
+DRENCH_HD LaneIndex load(const int* p, LaneIndex i) { return {_mm256_i32gather_epi32(p, i.v, 4)}; }
 DRENCH_HD Pack load(const float* p, LaneIndex i) { return Pack(_mm256_i32gather_ps(p, i.v, 4)); }
 DRENCH_HD void store(float* p, Lanes i, Pack a) { a.store(p + i.base); }
 DRENCH_HD Lanes operator+(Lanes i, int offset) { return {i.base + offset}; }
+DRENCH_HD LaneIndex same_index(int i) { return {_mm256_set1_epi32(i)}; }
+DRENCH_HD LaneIndex operator+(LaneIndex i, LaneIndex j) { return {_mm256_add_epi32(i.v, j.v)}; }
+DRENCH_HD LaneIndex select(Mask m, LaneIndex a, LaneIndex b) {
+  return {_mm256_blendv_epi8(b.v, a.v, reinterpret_cast<__m256i>(m.v))};
+}
+DRENCH_HD Mask is_index(LaneIndex i) {  // not negative
+  return {reinterpret_cast<Mask::Native>(_mm256_cmpgt_epi32(i.v, _mm256_set1_epi32(-1)))};
+}
+
+/// Lanes 0..count-1.
+DRENCH_HD Mask first_lanes(int count) {
+  const Mask::Native index{0, 1, 2, 3, 4, 5, 6, 7};
+  return {index < count};
+}
+/// Stores the lanes of the mask alone.
+DRENCH_HD void store_lanes(float* p, Mask m, Pack a) {
+  _mm256_maskstore_ps(p, reinterpret_cast<__m256i>(m.v), a.v);
+}
+DRENCH_HD void store_lanes(int* p, Mask m, LaneIndex i) {
+  _mm256_maskstore_epi32(p, reinterpret_cast<__m256i>(m.v), i.v);
+}
+
+DRENCH_HD float smallest_lane(Pack a) {
+  const __m128 four = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+  const __m128 two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+  return _mm_cvtss_f32(_mm_min_ss(two, _mm_shuffle_ps(two, two, 1)));
+}
+DRENCH_HD float largest_lane(Pack a) { return -smallest_lane(-a); }
 
 /// Sum of the lanes by a fixed tree.
 DRENCH_HD float sum_of_lanes(Pack a) {

@@ -60,6 +60,9 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
   };
   const P self = load(i);
   typename Physics::template Sum<float> sum{};
+  [[maybe_unused]] bool any_hidden = false;
+  [[maybe_unused]] bool tested = false;
+  if constexpr (Filter::columns > 0) tested = filter.tests(i);
   const GridShape& g = grid.shape;
   const int cx = g.cell_x(self.position.x), cy = g.cell_y(self.position.y), cz = g.cell_z(self.position.z);
   for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
@@ -69,13 +72,19 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
       for (int j = begin; j < end; ++j) {
         const P other = load(j);
         if constexpr (Filter::columns > 0) {
-          if (filter.near(i) && filter.hides(i, j)) continue;
+          if (tested && filter.hides(i, j)) {
+            any_hidden = true;
+            continue;
+          }
         }
         physics.pair(self, other, sum);
       }
     }
   }
   physics.finish(i, sum);
+  if constexpr (Filter::columns > 0) {
+    if (tested) filter.finish(i, any_hidden);
+  }
 }
 
 template <class Physics, class Filter = NoFilter>
@@ -134,9 +143,10 @@ Inputs<N + M> join(const Inputs<N>& a, const float* const (&b)[M]) {
   return all;
 }
 
-/// All neighbours of one particle, eight at a time.
+/// All neighbours of particle i, eight at a time.
 template <class Physics, class Filter>
-DRENCH_HD auto sum_over_tile(const Tile& tile, int place, const Physics& physics, const Filter& filter) {
+DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& physics, const Filter& filter) {
+  const int place = tile.place_of(particle);
   constexpr int N = Physics::columns;
   using P = typename Physics::template Particle<Pack>;
   typename Physics::template Sum<Pack> sum{};
@@ -145,7 +155,7 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int place, const Physics& physics
   for (int c = 0; c < N + Filter::columns; ++c) column[c] = tile.column(c);
   for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][place]);
   const P i = self.as();
-  const auto hidden_from = [&] {
+  auto hidden_from = [&] {
     if constexpr (Filter::columns > 0) return filter.template self<N>(column, place);
     else return 0;
   }();
@@ -157,6 +167,7 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int place, const Physics& physics
     }
     physics.pair(i, m.as(), sum);
   }
+  if constexpr (Filter::columns > 0) filter.finish(particle, hidden_from.any);
   return sum;
 }
 
@@ -185,7 +196,7 @@ void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[ma
         if (begin == end) continue;
         bool filtered = false;
         if constexpr (Filter::columns > 0) {
-          for (int i = begin; i < end; ++i) filtered |= filter.near(i);
+          for (int i = begin; i < end; ++i) filtered |= filter.tests(i);
         }
         if (filtered) {
           if constexpr (Filter::columns > 0) {
@@ -196,14 +207,13 @@ void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[ma
           tile.fill(grid, cx, cy, cz, physics.inputs(), Physics::columns);
         }
         for (int i = begin; i < end; ++i) {
-          const int place = tile.place_of(i);
           if constexpr (Filter::columns > 0) {
-            if (filtered && filter.near(i)) {
-              physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, place, physics, filter)));
+            if (filtered && filter.tests(i)) {
+              physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, i, physics, filter)));
               continue;
             }
           }
-          physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, place, physics, NoFilter{})));
+          physics.finish(i, add_lanes<Physics>(sum_over_tile(tile, i, physics, NoFilter{})));
         }
       }
     }

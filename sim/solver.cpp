@@ -142,13 +142,14 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {
         c->resize(n);
       }
-      f.triangle.resize(n);
+      f.triangle.resize(n), f.shaded.resize(n);
       f.normal.resize(n);
     }
     if (allocated_ & column_contact) {
       for (VecColumn* c : {&f.impulse, &f.start}) c->resize(n);
       state_.contact.rows.resize(n);
       f.held.resize(n);
+      f.moved.resize(n);
       f.stopped.resize(n);
       state_.contact.key.resize(n);
     }
@@ -179,10 +180,11 @@ class BackendSolver : public Solver {
     }
     c.force.clear();
     c.centroid.resize(c.triangles);
-    c.radius2.resize(c.triangles);
-    c.sorted_centroid.resize(c.triangles + 8);
-    c.sorted_radius.resize(c.triangles + 8);
+    c.sorted_low.resize(c.triangles + 8);
+    c.sorted_high.resize(c.triangles + 8);
     c.cell.resize(c.triangles);
+    state_.contact.impulse.resize(size_t(3) * c.triangles);
+    state_.contact.weight.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);

@@ -40,9 +40,11 @@ struct FluidState {
   Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
   Column<float> plane;                // m, sheet_distance - normal . position: > -normal . x in front
   Column<float> edge;                 // 0 beyond a free edge .. 1 half a spacing inside it
+  Column<int> shaded;                 // 1 where a sheet may hide neighbours; after the density pass: where one does
   Column<float> cloth_share;          // share of density that the sheet replaces
   VecColumn impulse;                  // paper coupling: kg m/s; path test: m, where particles end
   VecColumn start;                    // m, position at the start of the step
+  Column<int> moved;                  // 1: out of reach of any sheet, has made its whole step
   Column<int> held, stopped;          // by the path test for this substep; triangle it stopped, -1 none
 };
 
@@ -69,10 +71,8 @@ struct ClothState {
   VecColumn next, next_velocity;        // the substep being made
   VecColumn start;                      // at the start of the step
   VecColumn centroid;
-  Column<float> radius2;                // m^2, centroid to farthest corner
   Column<int> cell, order, cell_start;  // polygons by centroid
-  VecColumn sorted_centroid;            // m, in that order, padded by 8
-  Column<float> sorted_radius;          // m
+  VecColumn sorted_low, sorted_high;    // m, bounding boxes in that order, padded by 8
   GridShape grid{};
   float largest_radius = 0;             // m
   Vec3<float> low{}, high{};            // m, bounds of all vertices
@@ -91,6 +91,7 @@ struct ContactRow {
   float inverse_row;                                     // kg, 1 / row sum; 0: no contact
   float pressure_target, pressure_rate, pressure_scale;  // kg m/s, kg, 1
   float least;                                           // m/s, slowest separation that is allowed
+  bool soft;                                             // one explicit impulse will do
   float drag_rate, drag_scale;                           // kg, 1
   float lambda;                                          // kg m/s, normal impulse
   Vec3<float> drag, change;                              // kg m/s, tangential impulse; last change of both
@@ -100,6 +101,11 @@ struct ContactRow {
 struct ContactState {
   Column<int> key, order, start;
   Column<ContactRow> rows;
+  VecColumn impulse;     // 3 a triangle: what its contacts give to its corners, kg m/s
+  Column<float> weight;  // 3 a triangle: sum of their weights
+  Column<int> guarded, guard_start;  // places in order of the particles whose paths are tested
+  int guard_count = 0;
+  float cloth_reach = 0;             // m, how far cloth may move in the step before all are tested
   int near = 0;  // particles within the support radius of a sheet: the first of order
 };
 

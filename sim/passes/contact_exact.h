@@ -14,6 +14,8 @@
 // exact where the sheet moves as a whole, a bound where springs hold a vertex back. Starting from the impulses of the step
 // before was tried and dropped: light taut cloth answers them late and flutters (vertex speeds 10 m/s in
 // place of 2 m/s under 0.12 m of water on 0.4 kg/m^2).
+// A contact so soft that one explicit impulse is within a few percent (the second layer of particles) is
+// left alone after the first iteration.
 
 #include "sim/kernels.h"
 #include "sim/parallel.h"
@@ -29,6 +31,12 @@ struct ContactView {
 
   DRENCH_HD float weight(int i, int k) const {
     return k == 1 ? weight_b[i] : k == 2 ? weight_c[i] : 1.f - weight_b[i] - weight_c[i];
+  }
+  /// Sum over the corners that meet in a vertex, in a fixed order.
+  DRENCH_HD Vec3<float> sum_on_vertex(const VecView& of_corner, int vertex) const {
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s) sum = sum + of_corner[fan_entry[s]];
+    return sum;
   }
   /// Calls f(place in order, corner) for every contact on a vertex, in a fixed order.
   template <class F>
@@ -66,7 +74,7 @@ struct ContactSetup {
   ContactView contacts;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
-  float beta, dt, mass, rest_density, sound_speed2, support_radius, contact_distance, viscosity, push_speed, wall_scale;
+  float beta, dt, mass, rest_density, sound_speed, support_radius, contact_distance, viscosity, push_speed, wall_scale;
 
   DRENCH_HD void prepare(ContactRow& row) const {
     const int i = row.particle, t = contacts.triangle[i];
@@ -85,7 +93,7 @@ struct ContactSetup {
     const float layer = contacts.edge[i] * rest_density, push_term = layer * pressure_term[i];
     const float share = layer * inverse_density[i] * inverse_density[i];
     const float push = push_term * spiky_plane(q) * inverse_h;
-    const float density_slope = pressure_term[i] > 0.f ? wall_scale * sound_speed2 * rest_density * spiky_plane(q) : 0.f;
+    const float density_slope = pressure_term[i] > 0.f ? wall_scale * sound_speed * sound_speed * rest_density * spiky_plane(q) : 0.f;
     const float kappa = inverse_h * inverse_h *
                         (share * density_slope * spiky_plane(q) + push_term * spiky_plane_slope(q));
     row.pressure_target = dt * mass * push;
@@ -95,12 +103,12 @@ struct ContactSetup {
     row.least = depth > 0.f ? minimum(0.2f * depth / dt, push_speed) : depth / dt;
     row.drag_rate = dt * mass * viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
     row.drag_scale = 1.f / (1.f + row.drag_rate * sum);
+    row.soft = row.least < -0.25f * sound_speed && maximum(row.pressure_rate, row.drag_rate) * sum < 0.1f;
   }
 };
 
 /// One Jacobi update of a contact against the predicted vertices; they take theirs afterwards.
 DRENCH_HD void update_contact(ContactRow& row, const VecView& predicted, float inverse_mass, float relaxation) {
-  if (row.inverse_row == 0.f) return;
   const Vec3<float> sheet = predicted[row.vertex[0]] * row.weight[0] + predicted[row.vertex[1]] * row.weight[1] +
                             predicted[row.vertex[2]] * row.weight[2];
   const Vec3<float> relative = row.velocity - sheet;
@@ -129,37 +137,51 @@ inline ContactSetup contact_setup(State& state) {
   const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
   return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure_term.data(),
           f.inverse_density.data(), c.half_thickness.data(), c.inverse_mass.data(), c.share.data(), beta,
-          float(state.dt), p.particle_mass, p.rest_density, p.sound_speed * p.sound_speed, p.support_radius,
+          float(state.dt), p.particle_mass, p.rest_density, p.sound_speed, p.support_radius,
           0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed, p.wall_scale};
 }
+
+/// What the contacts of a triangle give to its corners, added up in their order.
+struct CornerSums {
+  Vec3<float> impulse[3] = {};  // kg m/s, on the particles
+  float weight[3] = {};
+
+  DRENCH_HD void add(const ContactRow& row) {
+    for (int k = 0; k < 3; ++k) {
+      impulse[k] = impulse[k] + row.change * row.weight[k];
+      weight[k] += row.weight[k];
+    }
+  }
+};
 
 /// Rows of the near list; the vertices receive what the path test took from particles.
 inline void start_contacts(State& state) {
   ClothState& c = state.cloth;
   const ContactView contacts = contacts_of(state);
   ContactRow* rows = state.contact.rows.data();
-  const VecView owed = state.fluid.owed.view(), force = c.force.view();
-  parallel_for("contact: start", state.contact.near, DRENCH_LAMBDA(int k) {
-    ContactRow& row = rows[k];
-    row.particle = contacts.order[k];
-    const int t = contacts.triangle[row.particle];
-    for (int corner = 0; corner < 3; ++corner) {
-      row.vertex[corner] = contacts.corner[3 * t + corner];
-      row.weight[corner] = contacts.weight(row.particle, corner);
+  const VecView owed = state.fluid.owed.view(), force = c.force.view(), impulse = state.contact.impulse.view();
+  float* weight = state.contact.weight.data();
+  parallel_for("contact: start", c.triangles, DRENCH_LAMBDA(int t) {
+    CornerSums sums;
+    for (int k = contacts.start[t]; k < contacts.start[t + 1]; ++k) {
+      ContactRow& row = rows[k];
+      row.particle = contacts.order[k];
+      for (int corner = 0; corner < 3; ++corner) {
+        row.vertex[corner] = contacts.corner[3 * t + corner];
+        row.weight[corner] = contacts.weight(row.particle, corner);
+      }
+      row.change = owed[row.particle];
+      owed.set(row.particle, {0.f, 0.f, 0.f});
+      sums.add(row);
     }
-    row.change = owed[row.particle];
-    owed.set(row.particle, {0.f, 0.f, 0.f});
+    for (int k = 0; k < 3; ++k) impulse.set(3 * t + k, sums.impulse[k]), weight[3 * t + k] = sums.weight[k];
   });
   float* share = c.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for("contact: weights by vertex", c.vertices, DRENCH_LAMBDA(int v) {
-    Vec3<float> sum{0.f, 0.f, 0.f};
     float weights = 0.f;
-    contacts.for_each_on_vertex(v, [&](int k, int corner) {
-      sum = sum + rows[k].change * rows[k].weight[corner];
-      weights += rows[k].weight[corner];
-    });
-    force.set(v, sum * -inverse_dt);
+    for (int s = contacts.fan_start[v]; s < contacts.fan_start[v + 1]; ++s) weights += weight[contacts.fan_entry[s]];
+    force.set(v, contacts.sum_on_vertex(impulse, v) * -inverse_dt);
     share[v] = weights;
   });
 }
@@ -170,18 +192,28 @@ inline void solve_contacts(State& state) {
   const ContactSetup setup = contact_setup(state);
   const ContactView contacts = setup.contacts;
   ContactRow* rows = state.contact.rows.data();
-  const VecView predicted = c.predicted.view(), force = c.force.view(), velocity = state.fluid.velocity.view();
-  const float *inverse_mass = c.inverse_mass.data(), inverse_dt = 1.f / float(state.dt);
+  const VecView predicted = c.predicted.view(), force = c.force.view(), velocity = state.fluid.velocity.view(),
+                impulse = state.contact.impulse.view();
+  const float *inverse_mass = c.inverse_mass.data(), *share = c.share.data(), inverse_dt = 1.f / float(state.dt);
   parallel_for("contact: prepare", state.contact.near, DRENCH_LAMBDA(int k) { setup.prepare(rows[k]); });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
-    parallel_for("contact: particles", state.contact.near, DRENCH_LAMBDA(int k) {
-      update_contact(rows[k], predicted, 1.f / setup.mass, relaxation);
+    parallel_for("contact: particles", c.triangles, DRENCH_LAMBDA(int t) {
+      const int begin = contacts.start[t], end = contacts.start[t + 1];
+      if (begin == end) return;
+      CornerSums sums;
+      for (int k = begin; k < end; ++k) {
+        ContactRow& row = rows[k];
+        if (row.inverse_row == 0.f || (row.soft && iteration > 0)) continue;
+        update_contact(row, predicted, 1.f / setup.mass, row.soft ? 1.f : relaxation);
+        sums.add(row);
+      }
+      for (int k = 0; k < 3; ++k) impulse.set(3 * t + k, sums.impulse[k]);
     });
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for("contact: vertices", c.vertices, DRENCH_LAMBDA(int v) {
-      Vec3<float> sum{0.f, 0.f, 0.f};
-      contacts.for_each_on_vertex(v, [&](int k, int corner) { sum = sum + rows[k].change * rows[k].weight[corner]; });
+      if (share[v] == 0.f) return;
+      const Vec3<float> sum = contacts.sum_on_vertex(impulse, v);
       predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
       force.set(v, force[v] - sum * inverse_dt);
     });

@@ -57,7 +57,6 @@ inline void move_cloth(State& state) {
   }
 }
 
-/// Particles and cloth together, substep by substep, each path tested against the moving triangles.
 inline void copy_vectors(const char* name, VecView to, VecView from, int n) {
   parallel_for(name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
 }
@@ -83,25 +82,34 @@ inline PathTest path_test_of(State& state) {
           f.normal.view(), f.start.view(), f.position.view(), f.owed.view(), f.triangle.data(),
           c.held.data(), c.stop_sum.data(), f.stopped.data(), f.sheet_distance.data(), c.mass.data(),
           c.inverse_mass.data(), c.share.data(),
-          p.particle_mass, 1e-3f * p.spacing, std::sqrt(moved2), 4};
+          p.particle_mass, path_clearance * p.spacing, std::sqrt(moved2), 4};
 }
 
-/// The near particles, or all when cloth moves so far that any could meet it.
-inline int path_test_count(const State& state, const PathTest& test) {
-  const bool all = test.cloth_moved > 0.4f * state.parameters.support_radius;
-  return all ? state.fluid.count : state.contact.near;
+/// The particles that are tested: the guarded ones, or all once cloth has come farther than they were
+/// chosen for.
+struct Tested {
+  const int *order, *guarded;  // the near list, places in it
+  int count;
+  bool all;
+  DRENCH_HD int operator[](int k) const { return all ? k : order[guarded[k]]; }
+};
+
+inline Tested tested_of(const State& state, float cloth_moved) {
+  const bool all = cloth_moved > state.contact.cloth_reach;
+  return {state.contact.order.data(), state.contact.guarded.data(),
+          all ? state.fluid.count : state.contact.guard_count, all};
 }
 
 /// One round: where each particle ends, into f.impulse.
-inline GuardCount test_paths(State& state, const PathTest& test, float dt) {
+inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
   const Mover mover = mover_of(state.parameters, dt);
-  const int *triangle = f.triangle.data(), *order = state.contact.order.data();
+  const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
-  return parallel_reduce("path test", path_test_count(state, test), GuardCount{}, DRENCH_LAMBDA(int k) {
-    const int i = order[k];  // the near ones come first
-    const bool still = held[i] || triangle[i] < 0;
+  return parallel_reduce("path test", tested.count, GuardCount{}, DRENCH_LAMBDA(int k) {
+    const int i = tested[k];
+    const bool still = held[i] || moved[i];
     Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
     Vec3<float> to = mover(x[i], velocity);
     if (!still) v.set(i, velocity);
@@ -121,17 +129,17 @@ inline GuardCount test_paths(State& state, const PathTest& test, float dt) {
 
 /// Takes back the substep of the vertices that particles stopped in this round, or of all. A stopped vertex
 /// takes on the mean velocity of those particles; what that changes of its momentum they share.
-inline void hold_cloth(State& state, const PathTest& test, bool everywhere) {
+inline void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
   const VecView next = c.next.view(), next_v = c.next_velocity.view(), x = c.position.view(),
                 velocity = f.velocity.view();
-  const int *order = state.contact.order.data(), *corner = c.corner.data();
+  const int* corner = c.corner.data();
   int* hold = c.held.data();
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
-  parallel_for("path test: share momentum", path_test_count(state, test), DRENCH_LAMBDA(int k) {
-    const int i = order[k], t = test.stopped[i];
+  parallel_for("path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
+    const int i = tested[k], t = test.stopped[i];
     if (t < 0) return;
     Vec3<float> gain{0.f, 0.f, 0.f};
     for (int e = 0; e < 3; ++e) {
@@ -151,57 +159,84 @@ inline void hold_cloth(State& state, const PathTest& test, bool everywhere) {
   });
 }
 
-/// Particles out of reach of any sheet move once, over the whole step: nothing to test.
-inline void move_far_particles(State& state) {
+/// Chooses the near particles that could meet a sheet within the step, with room for cloth to move twice as far
+/// as the contact solve predicts. All others make their whole step now: nothing to test.
+inline void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
-  const VecView x = f.position.view(), v = f.velocity.view();
-  const Mover mover = mover_of(state.parameters, float(state.dt));
-  const int* triangle = f.triangle.data();
-  parallel_for("move far particles", f.count, DRENCH_LAMBDA(int i) {
-    if (triangle[i] >= 0) return;
+  ClothState& c = state.cloth;
+  const float dt = float(state.dt), spacing = state.parameters.spacing;
+  const VecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
+  const bool solved = state.contact.near > 0;  // else nothing was predicted
+  const float speed2 = parallel_reduce("guard: cloth speed", c.vertices, 0.f, DRENCH_LAMBDA(int v) {
+    return maximum(length2(cloth_velocity[v]), solved ? length2(predicted[v]) : 0.f);
+  }, Larger{});
+  const float reach = 2.f * dt * std::sqrt(speed2) + 0.05f * spacing;
+  state.contact.cloth_reach = reach;
+  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(), normal = f.normal.view();
+  const float* distance = f.sheet_distance.data();
+  const int *triangle = f.triangle.data(), *order = state.contact.order.data();
+  int *moved = f.moved.data(), *key = state.contact.key.data();
+  const Mover mover = mover_of(state.parameters, dt);
+  const float room = reach + 2.f * path_clearance * spacing;
+  parallel_for("guard: move", f.count, DRENCH_LAMBDA(int i) {
     Vec3<float> velocity = v[i];
+    start.set(i, x[i]);
+    const float d = distance[i] < 0.f ? -distance[i] : distance[i];
+    // Beyond a free edge the distance is not kept.
+    const bool guard = triangle[i] >= 0 && (length2(normal[i]) == 0.f || d <= dt * length(velocity) + room);
+    moved[i] = !guard;
+    if (guard) return;
     x.set(i, mover(x[i], velocity));
     v.set(i, velocity);
   });
+  parallel_for("guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
+  stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded, state.contact.guard_start,
+                   state.scratch);
+  state.contact.guard_count = value_at(state.contact.guard_start, 1);
 }
 
-/// Far particles have made their step already; should cloth come as far as them they stand still for it.
-inline void accept_paths(State& state, int count) {
+/// Others have made their step already; should cloth come as far as them they stand still for it.
+inline void accept_paths(State& state, const Tested& tested) {
   const VecView x = state.fluid.position.view(), end = state.fluid.impulse.view();
-  const int* order = state.contact.order.data();
-  parallel_for("path test: accept", count, DRENCH_LAMBDA(int k) { x.set(order[k], end[order[k]]); });
+  parallel_for("path test: accept", tested.count, DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
 }
 
-inline void move_coupled(State& state) {
+/// Tests the paths of one substep, round by round, until all are free.
+inline void guard_substep(State& state, float dt) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
+  PathTest test = path_test_of(state);
+  Tested tested = tested_of(state, test.cloth_moved);
+  if (tested.count == 0) return;
+  f.held.clear_bytes(0);
+  f.stopped.clear_bytes(0xff);
+  c.held.clear_bytes(0);
+  c.stop_sum.clear_bytes(0);
+  for (int round = 0;; ++round) {
+    const GuardCount count = test_paths(state, test, tested, dt);
+    state.guard_hits += count.hits;
+    if (count.unresolved == 0) break;
+    ++state.guard_holds;
+    const bool everywhere = round >= 24;
+    hold_cloth(state, test, tested, everywhere);
+    test = path_test_of(state);
+    if (!everywhere) continue;
+    f.held.clear_bytes(1);
+    test_paths(state, test, tested, dt);
+    break;
+  }
+  accept_paths(state, tested);
+}
+
+/// Particles and cloth together, substep by substep, each path tested against the moving triangles.
+inline void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
-  copy_vectors("keep starts", f.start.view(), f.position.view(), f.count);
-  copy_vectors("keep cloth starts", c.start.view(), c.position.view(), c.vertices);
-  move_far_particles(state);
+  copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(), state.cloth.vertices);
+  move_unguarded_particles(state);
   for (int s = 0; s < state.substeps; ++s) {
-    cloth_verlet(state, cloth_buffers(c), dt);
-    f.held.clear_bytes(0);
-    f.stopped.clear_bytes(0xff);
-    c.held.clear_bytes(0);
-    c.stop_sum.clear_bytes(0);
-    int tested = 0;
-    for (int round = 0;; ++round) {
-      const PathTest test = path_test_of(state);
-      tested = std::max(tested, path_test_count(state, test));
-      const GuardCount count = test_paths(state, test, dt);
-      state.guard_hits += count.hits;
-      if (count.unresolved == 0) break;
-      ++state.guard_holds;
-      const bool everywhere = round >= 24;
-      hold_cloth(state, test, everywhere);
-      if (!everywhere) continue;
-      f.held.clear_bytes(1);
-      test_paths(state, path_test_of(state), dt);
-      break;
-    }
-    accept_paths(state, tested);
-    finish_substep(c);
+    cloth_verlet(state, cloth_buffers(state.cloth), dt);
+    guard_substep(state, dt);
+    finish_substep(state.cloth);
   }
 }
 

@@ -66,6 +66,8 @@ DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<do
   return -1;
 }
 
+constexpr float path_clearance = 1e-3f;  // spacings off the triangle where a path that met it ends
+
 struct PathTest {
   PolygonView polygons;           // cells from the start of the step
   VecView cloth, cloth_next;      // this substep

@@ -32,35 +32,33 @@ inline Bounds bounds_of_points(const char* name, VecView points, int n) {
                          JoinBounds{});
 }
 
-/// Centroids, radii, bounds and the sorted grid. A cell is at least `reach` plus the largest
-/// centroid-to-corner distance, so that 27 cells hold every triangle within `reach` of a point.
-inline void build_polygon_grid(State& state, float reach) {
+/// Centroids, boxes and the sorted grid, its cells at least as wide as the largest centroid-to-corner
+/// distance plus `room`.
+inline void build_polygon_grid(State& state, float room) {
   ClothState& c = state.cloth;
   const VecView x = c.position.view(), centroid = c.centroid.view();
   const int* corner = c.corner.data();
-  float* radius2 = c.radius2.data();
-  parallel_for("cloth: centroids", c.triangles, DRENCH_LAMBDA(int t) {
+  const float largest = parallel_reduce("cloth: centroids", c.triangles, 0.f, DRENCH_LAMBDA(int t) {
     const Vec3<float> a = x[corner[3 * t]], b = x[corner[3 * t + 1]], d = x[corner[3 * t + 2]];
     const Vec3<float> m = (a + b + d) * (1.f / 3.f);
     centroid.set(t, m);
-    radius2[t] = maximum(length2(a - m), maximum(length2(b - m), length2(d - m)));
-  });
-  const float largest = parallel_reduce("cloth: largest triangle", c.triangles, 0.f,
-                                        DRENCH_LAMBDA(int t) { return radius2[t]; }, Larger{});
+    return maximum(length2(a - m), maximum(length2(b - m), length2(d - m)));
+  }, Larger{});
   c.largest_radius = std::sqrt(largest);
   const Bounds bounds = bounds_of_points("cloth: bounds", x, c.vertices);
   c.low = bounds.low, c.high = bounds.high;
-  c.grid = make_grid_shape(bounds.low, bounds.high, reach + c.largest_radius);
+  c.grid = make_grid_shape(bounds.low, bounds.high, room + c.largest_radius);
   const GridShape grid = c.grid;
   int* cell = c.cell.data();
   parallel_for("cloth: cells", c.triangles, DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
   stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
   const int* order = c.order.data();
-  const VecView sorted = c.sorted_centroid.view();
-  float* sorted_radius = c.sorted_radius.data();
-  parallel_for("cloth: sorted bounds", c.triangles, DRENCH_LAMBDA(int k) {
-    sorted.set(k, centroid[order[k]]);
-    sorted_radius[k] = sqrtf(radius2[order[k]]);
+  const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
+  parallel_for("cloth: sorted boxes", c.triangles, DRENCH_LAMBDA(int k) {
+    const int t = order[k];
+    const Bounds ab = JoinBounds{}(bounds_of(x[corner[3 * t]]), bounds_of(x[corner[3 * t + 1]]));
+    const Bounds box = JoinBounds{}(ab, bounds_of(x[corner[3 * t + 2]]));
+    low.set(k, box.low), high.set(k, box.high);
   });
 }
 
@@ -69,10 +67,8 @@ struct PolygonView {
   GridShape grid;
   const int *cell_start, *order, *corner;
   VecView position, centroid;
-  const float* radius2;
   float largest_radius;
-  VecView sorted_centroid;     // bounding spheres in the order of the cells
-  const float* sorted_radius;
+  VecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
 
   DRENCH_HD void corners(int t, Vec3<float>& a, Vec3<float>& b, Vec3<float>& c) const {
     a = position[corner[3 * t]], b = position[corner[3 * t + 1]], c = position[corner[3 * t + 2]];
@@ -90,30 +86,29 @@ struct PolygonView {
       }
     }
   }
-  /// Calls f(t) for each of those whose bounding sphere comes within `extra` of the box.
+  /// Calls f(t) for each of those whose own box comes within `extra` of the box.
   template <class F>
   DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra, const F& f) const {
     for_each_range(low, high, extra, [&](int begin, int end) {
       for (int k = begin; k < end; ++k) {
-        if (sphere_near(k, low, high, extra)) f(order[k]);
+        if (box_near(k, low, high, extra)) f(order[k]);
       }
     });
   }
   template <class Index>
-  DRENCH_HD auto sphere_near(Index k, Vec3<float> low, Vec3<float> high, float extra) const {
-    using T = decltype(load(sorted_radius, k));
-    const Vec3<T> m = sorted_centroid.at(k);
-    const Vec3<T> out{max0(maximum(T(low.x) - m.x, m.x - T(high.x))),
-                      max0(maximum(T(low.y) - m.y, m.y - T(high.y))),
-                      max0(maximum(T(low.z) - m.z, m.z - T(high.z)))};
-    const T limit = load(sorted_radius, k) + T(extra);
-    return length2(out) <= limit * limit;
+  DRENCH_HD auto box_near(Index k, Vec3<float> low, Vec3<float> high, float extra) const {
+    using T = decltype(load(sorted_low.x, k));
+    const Vec3<T> l = sorted_low.at(k), h = sorted_high.at(k);
+    const Vec3<T> gap{max0(maximum(T(low.x) - h.x, l.x - T(high.x))),
+                      max0(maximum(T(low.y) - h.y, l.y - T(high.y))),
+                      max0(maximum(T(low.z) - h.z, l.z - T(high.z)))};
+    return length2(gap) <= T(extra * extra);
   }
 };
 
 inline PolygonView polygons_of(const ClothState& c) {
   return {c.grid, c.cell_start.data(), c.order.data(), c.corner.data(), c.position.view(),
-          c.centroid.view(), c.radius2.data(), c.largest_radius, c.sorted_centroid.view(), c.sorted_radius.data()};
+          c.centroid.view(), c.largest_radius, c.sorted_low.view(), c.sorted_high.view()};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -2,7 +2,8 @@
 // Fluid must not feel fluid through a sheet. Each near particle knows the plane of its nearest triangle.
 // A pair whose two planes both put the other in front sees each other; a pair whose planes both put it
 // behind, with opposed normals, does not; the rest (curved sheets, free edges) is decided by testing the
-// segment against the triangles themselves.
+// segment against the triangles themselves. The density pass tests all near particles and notes those from
+// which anything is hidden; the pressure pass tests only these.
 
 #include "sim/geometry.h"
 #include "sim/pairs.h"
@@ -12,13 +13,14 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct SheetFilter {
   static constexpr int columns = 4;
-  const int* triangle;  // nearest, -1: not near
+  int* shaded;  // by particle: 1 where neighbours may be hidden
   VecView position, normal;
   const float* plane;
   PolygonView polygons;
   float support_radius;
 
-  DRENCH_HD bool near(int i) const { return triangle[i] >= 0; }
+  DRENCH_HD bool tests(int i) const { return shaded[i] != 0; }
+  DRENCH_HD void finish(int i, bool any) const { shaded[i] = any; }
   DRENCH_HD Inputs<4> inputs() const { return {{normal.x, normal.y, normal.z, plane}}; }
 
   /// The same answer for (i, j) and (j, i): the segment always starts at the smaller end.
@@ -52,16 +54,17 @@ struct SheetFilter {
     Vec3<Pack> position, normal;
     Pack plane;
     int place;
+    bool any;  // hidden neighbours so far
   };
   template <int N>
   DRENCH_HD Self self(const float* const* column, int place) const {
     const auto all = [&](int c) { return Pack(column[c][place]); };
-    return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), place};
+    return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), place, false};
   }
 
   /// Moves the neighbours that the sheet hides out of every support.
   template <int N>
-  DRENCH_HD Pack move_hidden_away(const Self& i, const float* const* column, int k, Vec3<Pack> position) const {
+  DRENCH_HD Pack move_hidden_away(Self& i, const float* const* column, int k, Vec3<Pack> position) const {
     const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k), Pack::load(column[N + 2] + k)};
     const Mask back_i = dot(i.normal, position) + i.plane <= Pack(0.f);
     const Mask back_j = dot(normal_j, i.position) + Pack::load(column[N + 3] + k) <= Pack(0.f);
@@ -70,6 +73,7 @@ struct SheetFilter {
     const Mask surely = back_i & back_j & (dot(i.normal, normal_j) < Pack(0.f));
     const int doubtful = ((back_i | back_j) & within & !surely).bits();
     const Mask hidden{hidden_lanes(column, i.place, k, surely.bits(), doubtful)};
+    i.any |= hidden.bits() != 0;
     return select(hidden, Pack(Tile::far_away), position.x);
   }
 
@@ -93,7 +97,7 @@ struct SheetFilter {
 
 inline SheetFilter sheet_filter(const State& state) {
   const FluidState& f = state.fluid;
-  return {f.triangle.data(), f.position.view(), f.normal.view(), f.plane.data(),
+  return {f.shaded.data(), f.position.view(), f.normal.view(), f.plane.data(),
           polygons_of(state.cloth), state.parameters.support_radius};
 }
 

@@ -87,7 +87,7 @@ inline void find_sheet_sides(State& state) {
   const SheetTopology sheet = topology_of(state.cloth);
   const VecView position = f.position.view(), normal = f.normal.view();
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
-      *memory_side = f.memory_side.data();
+      *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
   float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing,
@@ -96,7 +96,7 @@ inline void find_sheet_sides(State& state) {
   parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
     const int t = triangle[i];
     normal.set(i, {0.f, 0.f, 0.f});
-    distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f;
+    distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
     if (t < 0) {
       memory_triangle[i] = -1;
       return;
