@@ -12,35 +12,73 @@ struct ClosestPoint {
   T distance2;    // m^2
 };
 
-/// Parameter of the closest point to p on segment a + t e, 0..1; a segment of no length gives 0.
+/// A triangle with what every point that asks for its closest point needs.
 template <class T>
-DRENCH_HD T closest_on_segment(Vec3<T> from_a, Vec3<T> e) {
-  const T t = dot(from_a, e) / maximum(dot(e, e), T(1e-30f));
-  return minimum(max0(t), T(1.f));
+struct PreparedTriangle {
+  Vec3<T> a, ab, ac;                          // m
+  T d11, d12, d22;                            // m^2: ab.ab, ab.ac, ac.ac
+  T inverse_ab, inverse_ac, inverse_bc;       // 1/m^2, of the squared lengths
+  T inverse;                                  // 1/m^4, of the squared double area
+};
+
+template <class T>
+DRENCH_HD PreparedTriangle<T> prepare_triangle(Vec3<T> a, Vec3<T> b, Vec3<T> c) {
+  const T tiny(1e-30f), one(1.f);  // an edge of no length has its closest point at its start
+  const Vec3<T> ab = b - a, ac = c - a, bc = c - b;
+  const T d11 = dot(ab, ab), d12 = dot(ab, ac), d22 = dot(ac, ac);
+  return {a, ab, ac, d11, d12, d22, one / maximum(d11, tiny), one / maximum(d22, tiny),
+          one / maximum(dot(bc, bc), tiny), one / maximum(d11 * d22 - d12 * d12, tiny)};
+}
+
+/// The foot of p on the plane of the triangle: p = a + v ab + w ac + something normal.
+template <class T>
+struct PlaneFoot {
+  Vec3<T> ap;   // m, p - a
+  T p1, p2;     // m^2, ap.ab, ap.ac
+  T v, w;
+};
+
+template <class T>
+DRENCH_HD PlaneFoot<T> plane_foot(Vec3<T> p, const PreparedTriangle<T>& t) {
+  const Vec3<T> ap = p - t.a;
+  const T p1 = dot(ap, t.ab), p2 = dot(ap, t.ac);
+  return {ap, p1, p2, (t.d22 * p1 - t.d12 * p2) * t.inverse, (t.d11 * p2 - t.d12 * p1) * t.inverse};
+}
+
+/// A squared distance that the triangle is not nearer than: to its plane and, in the plane, past the edge line
+/// that the foot lies farthest beyond. Cheap, and exact but for corners; less what rounding may add.
+template <class T>
+DRENCH_HD T distance2_bound(const PlaneFoot<T>& f, const PreparedTriangle<T>& t) {
+  const T v = max0(-f.v), w = max0(-f.w), u = max0(f.v + f.w - T(1.f));
+  const T along = length2(f.ap);
+  const T plane = max0(along * T(1.f - 1e-5f) - (f.v * f.p1 + f.w * f.p2));
+  const T past = maximum(v * v * t.inverse_ac, maximum(w * w * t.inverse_ab, u * u * t.inverse_bc));
+  return plane + past * (T(0.9999f) * (t.d11 * t.d22 - t.d12 * t.d12));
 }
 
 /// Exact in all seven regions: the foot on the plane if it lies inside, else the best edge point.
 template <class T>
-DRENCH_HD ClosestPoint<T> closest_point(Vec3<T> p, Vec3<T> a, Vec3<T> b, Vec3<T> c) {
-  const Vec3<T> ab = b - a, ac = c - a, ap = p - a;
-  const T d11 = dot(ab, ab), d12 = dot(ab, ac), d22 = dot(ac, ac);
-  const T p1 = dot(ap, ab), p2 = dot(ap, ac);
-  const T inverse = T(1.f) / maximum(d11 * d22 - d12 * d12, T(1e-30f));
-  const T v = (d22 * p1 - d12 * p2) * inverse, w = (d11 * p2 - d12 * p1) * inverse;
-  const auto inside = (v >= T(0.f)) & (w >= T(0.f)) & (v + w <= T(1.f));
-
-  const Vec3<T> bc = c - b, bp = p - b;
-  const T t_ab = closest_on_segment(ap, ab), t_ac = closest_on_segment(ap, ac),
-          t_bc = closest_on_segment(bp, bc);
-  const T d_ab = length2(ap - ab * t_ab), d_ac = length2(ap - ac * t_ac), d_bc = length2(bp - bc * t_bc);
+DRENCH_HD ClosestPoint<T> closest_point(const PlaneFoot<T>& f, const PreparedTriangle<T>& t) {
+  const auto clamped = [](T x) { return minimum(max0(x), T(1.f)); };
+  const auto inside = (f.v >= T(0.f)) & (f.w >= T(0.f)) & (f.v + f.w <= T(1.f));
+  const Vec3<T> bc = t.ac - t.ab, bp = f.ap - t.ab;
+  const T t_ab = clamped(f.p1 * t.inverse_ab), t_ac = clamped(f.p2 * t.inverse_ac),
+          t_bc = clamped(dot(bp, bc) * t.inverse_bc);
+  const T d_ab = length2(f.ap - t.ab * t_ab), d_ac = length2(f.ap - t.ac * t_ac), d_bc = length2(bp - bc * t_bc);
   T vb = t_ab, vc = T(0.f), best = d_ab;  // weights of b and c
   const auto use_ac = d_ac < best;
   vb = select(use_ac, T(0.f), vb), vc = select(use_ac, t_ac, vc), best = select(use_ac, d_ac, best);
   const auto use_bc = d_bc < best;
   vb = select(use_bc, T(1.f) - t_bc, vb), vc = select(use_bc, t_bc, vc), best = select(use_bc, d_bc, best);
-  vb = select(inside, v, vb), vc = select(inside, w, vc);
-  best = select(inside, length2(ap - ab * v - ac * w), best);
+  vb = select(inside, f.v, vb), vc = select(inside, f.w, vc);
+  best = select(inside, length2(f.ap - t.ab * f.v - t.ac * f.w), best);
   return {T(1.f) - vb - vc, vb, vc, best};
+}
+
+template <class T>
+DRENCH_HD ClosestPoint<T> closest_point(Vec3<T> p, Vec3<T> a, Vec3<T> b, Vec3<T> c) {
+  const PreparedTriangle<T> t = prepare_triangle(a, b, c);
+  return closest_point(plane_foot(p, t), t);
 }
 
 /// Six times the signed volume of (a, b, c, p): positive on the side of the triangle's normal.

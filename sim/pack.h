@@ -81,8 +81,12 @@ DRENCH_HD void store(float* p, Lanes i, Pack a) { a.store(p + i.base); }
 DRENCH_HD Lanes operator+(Lanes i, int offset) { return {i.base + offset}; }
 DRENCH_HD LaneIndex same_index(int i) { return {_mm256_set1_epi32(i)}; }
 DRENCH_HD LaneIndex operator+(LaneIndex i, LaneIndex j) { return {_mm256_add_epi32(i.v, j.v)}; }
+DRENCH_HD LaneIndex operator+(LaneIndex i, int offset) { return i + same_index(offset); }
 DRENCH_HD LaneIndex select(Mask m, LaneIndex a, LaneIndex b) {
   return {_mm256_blendv_epi8(b.v, a.v, reinterpret_cast<__m256i>(m.v))};
+}
+DRENCH_HD Mask same(LaneIndex i, LaneIndex j) {
+  return {reinterpret_cast<Mask::Native>(_mm256_cmpeq_epi32(i.v, j.v))};
 }
 DRENCH_HD Mask is_index(LaneIndex i) {  // not negative
   return {reinterpret_cast<Mask::Native>(_mm256_cmpgt_epi32(i.v, _mm256_set1_epi32(-1)))};

@@ -42,6 +42,7 @@ class BackendSolver : public Solver {
       from_host(state_.fluid.memory_side, host.memory_side);
       upload(state_.fluid.owed, host.owed);
     }
+    state_.fluid.far_by.clear_bytes(0);
     if (allocated_ & column_cloth) {
       upload(state_.cloth.position, host.cloth_position);
       upload(state_.cloth.velocity, host.cloth_velocity);
@@ -96,6 +97,7 @@ class BackendSolver : public Solver {
       f.memory_side.upload(std::vector<int>(more, 1).data(), more, at);
       const std::vector<float> none(more, 0.f);
       put(f.owed, {none, none, none});
+      f.far_by.upload(none.data(), more, at);
     }
     f.count = int(at + more);
   }
@@ -139,7 +141,7 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.density, &f.pressure_term, &f.inverse_density}) c->resize(n);
     }
     if (allocated_ & column_sheet) {
-      for (Column<float>* c : {&f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {
+      for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {
         c->resize(n);
       }
       f.triangle.resize(n), f.shaded.resize(n);
@@ -182,6 +184,7 @@ class BackendSolver : public Solver {
     c.centroid.resize(c.triangles);
     c.sorted_low.resize(c.triangles + 8);
     c.sorted_high.resize(c.triangles + 8);
+    c.sorted_triangle.resize(c.triangles + 8);
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
     state_.contact.weight.resize(size_t(3) * c.triangles);

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "sim/geometry.h"
 #include "sim/grid.h"
 #include "sim/parameters.h"
 #include "sim/sort.h"
@@ -35,6 +36,7 @@ struct FluidState {
   GridShape grid{};
   // coupling
   Column<int> triangle;               // nearest triangle within the support radius, -1 none
+  Column<float> far_by;               // m, how much nearer a sheet must come to be within the support; a lower bound
   Column<float> weight_b, weight_c;   // barycentric weights of its foot point
   VecColumn normal;                   // unit, from the sheet to the particle's side; 0 where none
   Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
@@ -73,8 +75,10 @@ struct ClothState {
   VecColumn centroid;
   Column<int> cell, order, cell_start;  // polygons by centroid
   VecColumn sorted_low, sorted_high;    // m, bounding boxes in that order, padded by 8
+  Column<PreparedTriangle<float>> sorted_triangle;  // in that order as well, a cache line each
   GridShape grid{};
   float largest_radius = 0;             // m
+  float moved = 0;                      // m, what any vertex has moved at most since far_by was set
   Vec3<float> low{}, high{};            // m, bounds of all vertices
   VecColumn predicted;                  // m/s, mean over the step
   Column<float> share;                  // sum of contact weights

@@ -176,6 +176,7 @@ inline void move_unguarded_particles(State& state) {
   const float* distance = f.sheet_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
+  float* far_by = f.far_by.data();
   const Mover mover = mover_of(state.parameters, dt);
   const float room = reach + 2.f * path_clearance * spacing;
   parallel_for("guard: move", f.count, DRENCH_LAMBDA(int i) {
@@ -188,6 +189,7 @@ inline void move_unguarded_particles(State& state) {
     if (guard) return;
     x.set(i, mover(x[i], velocity));
     v.set(i, velocity);
+    far_by[i] -= length(x[i] - start[i]);
   });
   parallel_for("guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
   stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded, state.contact.guard_start,
@@ -201,13 +203,15 @@ inline void accept_paths(State& state, const Tested& tested) {
   parallel_for("path test: accept", tested.count, DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
 }
 
-/// Tests the paths of one substep, round by round, until all are free.
-inline void guard_substep(State& state, float dt) {
+/// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex has come from
+/// its place at the start of the step, m, before it was held.
+inline float guard_substep(State& state, float dt) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   PathTest test = path_test_of(state);
   Tested tested = tested_of(state, test.cloth_moved);
-  if (tested.count == 0) return;
+  const float moved = test.cloth_moved;
+  if (tested.count == 0) return moved;
   f.held.clear_bytes(0);
   f.stopped.clear_bytes(0xff);
   c.held.clear_bytes(0);
@@ -226,6 +230,7 @@ inline void guard_substep(State& state, float dt) {
     break;
   }
   accept_paths(state, tested);
+  return moved;
 }
 
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.
@@ -233,11 +238,13 @@ inline void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
   copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(), state.cloth.vertices);
   move_unguarded_particles(state);
+  float moved = 0.f;
   for (int s = 0; s < state.substeps; ++s) {
     cloth_verlet(state, cloth_buffers(state.cloth), dt);
-    guard_substep(state, dt);
+    moved = std::max(moved, guard_substep(state, dt));
     finish_substep(state.cloth);
   }
+  state.cloth.moved += moved;
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

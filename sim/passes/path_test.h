@@ -96,7 +96,8 @@ struct PathTest {
     Hit hit;
     const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
     const Vec3<float> high{maximum(from.x, to.x), maximum(from.y, to.y), maximum(from.z, to.z)};
-    polygons.for_each_near_box(low, high, cloth_moved + clearance, [&](int t) {
+    polygons.for_each_near_box(low, high, cloth_moved + clearance, [&](int k) {
+      const int t = polygons.order[k];
       const double time = crossing_time(moving(t), to_double(from), to_double(to));
       if (time >= 0 && time < hit.time) hit = {t, time};
     });

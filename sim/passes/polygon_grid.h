@@ -1,6 +1,7 @@
 #pragma once
 // The second grid of the seed: polygons by centroid (section 5.1).
 
+#include "sim/geometry.h"
 #include "sim/parallel.h"
 #include "sim/state.h"
 
@@ -25,6 +26,19 @@ struct Larger {
     return a > b ? a : b;
   }
 };
+
+/// A float of its own, or eight of them one after the other: how a pass over packs fills an array of structs.
+DRENCH_HD void put_triangle(PreparedTriangle<float>* out, int k, const PreparedTriangle<float>& t) { out[k] = t; }
+#if !defined(__CUDACC__)
+DRENCH_HD void put_triangle(PreparedTriangle<float>* out, Lanes k, const PreparedTriangle<Pack>& t) {
+  constexpr int fields = sizeof t / sizeof(Pack);
+  const float* lane = reinterpret_cast<const float*>(&t);
+  float* to = reinterpret_cast<float*>(out + k.base);
+  for (int i = 0; i < 8; ++i) {
+    for (int f = 0; f < fields; ++f) to[fields * i + f] = lane[8 * f + i];
+  }
+}
+#endif
 
 /// Bounds of points 0..n-1.
 inline Bounds bounds_of_points(const char* name, VecView points, int n) {
@@ -54,11 +68,15 @@ inline void build_polygon_grid(State& state, float room) {
   stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
   const int* order = c.order.data();
   const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
-  parallel_for("cloth: sorted boxes", c.triangles, DRENCH_LAMBDA(int k) {
-    const int t = order[k];
-    const Bounds ab = JoinBounds{}(bounds_of(x[corner[3 * t]]), bounds_of(x[corner[3 * t + 1]]));
-    const Bounds box = JoinBounds{}(ab, bounds_of(x[corner[3 * t + 2]]));
-    low.set(k, box.low), high.set(k, box.high);
+  PreparedTriangle<float>* sorted = c.sorted_triangle.data();
+  for_each_lane("cloth: sorted triangles", c.triangles, DRENCH_LAMBDA(auto k) {
+    const auto t = load(order, k);
+    const auto at = [&](int e) { return x.at(load(corner, t + t + t + e)); };
+    const auto a = at(0), b = at(1), d = at(2);
+    using Vec = decltype(at(0));
+    low.put(k, Vec{minimum(a.x, minimum(b.x, d.x)), minimum(a.y, minimum(b.y, d.y)), minimum(a.z, minimum(b.z, d.z))});
+    high.put(k, Vec{maximum(a.x, maximum(b.x, d.x)), maximum(a.y, maximum(b.y, d.y)), maximum(a.z, maximum(b.z, d.z))});
+    put_triangle(sorted, k, prepare_triangle(a, b, d));
   });
 }
 
@@ -69,6 +87,7 @@ struct PolygonView {
   VecView position, centroid;
   float largest_radius;
   VecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
+  const PreparedTriangle<float>* sorted;
 
   DRENCH_HD void corners(int t, Vec3<float>& a, Vec3<float>& b, Vec3<float>& c) const {
     a = position[corner[3 * t]], b = position[corner[3 * t + 1]], c = position[corner[3 * t + 2]];
@@ -86,12 +105,12 @@ struct PolygonView {
       }
     }
   }
-  /// Calls f(t) for each of those whose own box comes within `extra` of the box.
+  /// Calls f(place in order) for each of those whose own box comes within `extra` of the box.
   template <class F>
   DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra, const F& f) const {
     for_each_range(low, high, extra, [&](int begin, int end) {
       for (int k = begin; k < end; ++k) {
-        if (box_near(k, low, high, extra)) f(order[k]);
+        if (box_near(k, low, high, extra)) f(k);
       }
     });
   }
@@ -108,7 +127,8 @@ struct PolygonView {
 
 inline PolygonView polygons_of(const ClothState& c) {
   return {c.grid, c.cell_start.data(), c.order.data(), c.corner.data(), c.position.view(),
-          c.centroid.view(), c.largest_radius, c.sorted_low.view(), c.sorted_high.view()};
+          c.centroid.view(), c.largest_radius, c.sorted_low.view(), c.sorted_high.view(),
+          c.sorted_triangle.data()};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -30,10 +30,10 @@ struct SheetFilter {
     const Vec3<float> low{minimum(p.x, q.x), minimum(p.y, q.y), minimum(p.z, q.z)};
     const Vec3<float> high{maximum(p.x, q.x), maximum(p.y, q.y), maximum(p.z, q.z)};
     bool hidden = false;
-    polygons.for_each_near_box(low, high, 0.f, [&](int t) {
+    polygons.for_each_near_box(low, high, 0.f, [&](int k) {
       if (hidden) return;
       Vec3<float> a, b, c;
-      polygons.corners(t, a, b, c);
+      polygons.corners(polygons.order[k], a, b, c);
       hidden = segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));
     });
     return hidden;

@@ -66,13 +66,15 @@ DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, fl
 
 /// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
 DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc, float spacing) {
+  const int* neighbour = sheet.neighbour + 3 * t;
+  if (neighbour[0] >= 0 && neighbour[1] >= 0 && neighbour[2] >= 0) return 1.f;
   float inside = 1.f;
   const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
   Vec3<float> v[3];
   sheet.polygons.corners(t, v[0], v[1], v[2]);
   const float twice_area = length(sheet.area_normal(t));
   for (int e = 0; e < 3; ++e) {
-    if (sheet.neighbour[3 * t + e] >= 0) continue;
+    if (neighbour[e] >= 0) continue;
     const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
     inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
   }

@@ -52,6 +52,7 @@ inline void sort_particles(State& state) {
     permute(f.memory_triangle, state.swap_int, order, n);
     permute(f.memory_side, state.swap_int, order, n);
     permute(f.owed, state.swap_vector, order, n);
+    permute(f.far_by, state.swap_vector.x, order, n);
   }
   const bool open = !(p.wall[0] && p.wall[1] && p.wall[2]);
   if (open) f.count = value_at(f.cell_start, lost);
