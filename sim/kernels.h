@@ -40,9 +40,10 @@ DRENCH_HD float poly6_halfspace(float q) {
 }
 /// h times the integral of the spiky kernel over a plane at distance qh; by the divergence theorem
 /// also h times the gradient sum over the half-space beyond, along the normal.
-DRENCH_HD float spiky_plane(float q) {
-  const float u = max0(1.f - q), u4 = u * u * u * u;
-  return 7.5f * u4 - 6.f * u4 * u;
+template <class T>
+DRENCH_HD T spiky_plane(T q) {
+  const T u = max0(T(1.f) - q), u4 = u * u * u * u;
+  return T(7.5f) * u4 - T(6.f) * u4 * u;
 }
 /// Integral of the spiky kernel over everything beyond a plane at distance qh. 1/2 at q = 0.
 DRENCH_HD float spiky_halfspace(float q) {
@@ -50,9 +51,10 @@ DRENCH_HD float spiky_halfspace(float q) {
   return 1.5f * u5 - u5 * u;
 }
 /// -d spiky_plane / dq.
-DRENCH_HD float spiky_plane_slope(float q) {
-  const float u = max0(1.f - q);
-  return 30.f * u * u * u * (1.f - u);
+template <class T>
+DRENCH_HD T spiky_plane_slope(T q) {
+  const T u = max0(T(1.f) - q);
+  return T(30.f) * u * u * u * (T(1.f) - u);
 }
 /// h^3 times the integral of the viscosity Laplacian over a plane at distance qh.
 DRENCH_HD float viscosity_plane(float q) {
@@ -60,9 +62,10 @@ DRENCH_HD float viscosity_plane(float q) {
   return 15.f * u * u * (1.f + 2.f * q);
 }
 /// h^2 times the integral of the viscosity Laplacian over the half-space beyond.
-DRENCH_HD float viscosity_halfspace(float q) {
-  const float p = q < 1.f ? q : 1.f;
-  return max0(15.f * (0.5f - p + p * p * p - 0.5f * p * p * p * p));
+template <class T>
+DRENCH_HD T viscosity_halfspace(T q) {
+  const T p = minimum(q, T(1.f));
+  return max0(T(15.f) * (T(0.5f) - p + p * p * p - T(0.5f) * p * p * p * p));
 }
 
 /// Shapes (without factor) of the two kernels that density may be summed with, of the squared distance.

@@ -21,6 +21,8 @@ DRENCH_HD float square_root(float a) { return sqrtf(a); }
 DRENCH_HD float load(const float* p, int i) { return p[i]; }
 DRENCH_HD int load(const int* p, int i) { return p[i]; }
 DRENCH_HD void store(float* p, int i, float a) { p[i] = a; }
+DRENCH_HD bool is_index(int i) { return i >= 0; }
+DRENCH_HD int same_index(int i, int) { return i; }  // the second says of which kind
 
 #if !defined(__CUDACC__)
 
@@ -80,6 +82,7 @@ DRENCH_HD Pack load(const float* p, LaneIndex i) { return Pack(_mm256_i32gather_
 DRENCH_HD void store(float* p, Lanes i, Pack a) { a.store(p + i.base); }
 DRENCH_HD Lanes operator+(Lanes i, int offset) { return {i.base + offset}; }
 DRENCH_HD LaneIndex same_index(int i) { return {_mm256_set1_epi32(i)}; }
+DRENCH_HD LaneIndex same_index(int i, LaneIndex) { return same_index(i); }
 DRENCH_HD LaneIndex operator+(LaneIndex i, LaneIndex j) { return {_mm256_add_epi32(i.v, j.v)}; }
 DRENCH_HD LaneIndex operator+(LaneIndex i, int offset) { return i + same_index(offset); }
 DRENCH_HD LaneIndex select(Mask m, LaneIndex a, LaneIndex b) {

@@ -43,6 +43,7 @@ class BackendSolver : public Solver {
       upload(state_.fluid.owed, host.owed);
     }
     state_.fluid.far_by.clear_bytes(0);
+    state_.owes = true;
     if (allocated_ & column_cloth) {
       upload(state_.cloth.position, host.cloth_position);
       upload(state_.cloth.velocity, host.cloth_velocity);
@@ -149,7 +150,9 @@ class BackendSolver : public Solver {
     }
     if (allocated_ & column_contact) {
       for (VecColumn* c : {&f.impulse, &f.start}) c->resize(n);
-      state_.contact.rows.resize(n);
+      state_.contact.stride = int(n + 23) / 8 * 8;
+      state_.contact.index.resize(size_t(4) * state_.contact.stride);
+      state_.contact.field.resize(size_t(23) * state_.contact.stride);
       f.held.resize(n);
       f.moved.resize(n);
       f.stopped.resize(n);
@@ -187,7 +190,6 @@ class BackendSolver : public Solver {
     c.sorted_triangle.resize(c.triangles + 8);
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
-    state_.contact.weight.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);

@@ -87,30 +87,18 @@ struct ClothState {
   Column<long long> stop_sum;           // 4 a vertex: see PathTest
 };
 
-/// One contact of the exact coupling: everything its Jacobi update reads, side by side.
-struct ContactRow {
-  int particle, vertex[3];
-  float weight[3];                                       // barycentric
-  Vec3<float> normal, velocity;                          // unit; m/s of the particle
-  float inverse_row;                                     // kg, 1 / row sum; 0: no contact
-  float pressure_target, pressure_rate, pressure_scale;  // kg m/s, kg, 1
-  float least;                                           // m/s, slowest separation that is allowed
-  bool soft;                                             // one explicit impulse will do
-  float drag_rate, drag_scale;                           // kg, 1
-  float lambda;                                          // kg m/s, normal impulse
-  Vec3<float> drag, change;                              // kg m/s, tangential impulse; last change of both
-};
-
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
-  Column<ContactRow> rows;
-  VecColumn impulse;     // 3 a triangle: what its contacts give to its corners, kg m/s
-  Column<float> weight;  // 3 a triangle: sum of their weights
+  int near = 0;           // particles within the support radius of a sheet: the first of order
+  int close = 0;          // of these, those that the contact distance may concern in this step
+  Column<int> index;      // 4 fields a row of contact_exact.h: particle and vertices
+  Column<float> field;    // 23 fields a row
+  int stride = 0;         // from field to field
+  VecColumn impulse;      // 3 a triangle: what its contacts give to its corners, kg m/s
   Column<int> guarded, guard_start;  // places in order of the particles whose paths are tested
   int guard_count = 0;
-  float cloth_reach = 0;             // m, how far cloth may move in the step before all are tested
-  int near = 0;  // particles within the support radius of a sheet: the first of order
+  float cloth_reach = 0;  // m, how far cloth may move in the step before all are tested
 };
 
 struct State {
@@ -124,6 +112,7 @@ struct State {
   Column<int> swap_int;
   double dt = 0;            // s, of the step being made
   int substeps = 1;         // cloth steps in it
+  bool owes = true;         // FluidState::owed may hold something
   uint64_t guard_hits = 0;  // particles held back by the path test, since the start
   uint64_t guard_holds = 0; // substeps in which vertices had to be stopped
 };

@@ -69,7 +69,7 @@ void exact_nearest(State& state) { find_nearest_triangles(state, state.parameter
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.
 void paper_grid(State& state) { build_polygon_grid(state, 0.f); }
 void paper_reaction(State& state) {
-  sort_contacts(state);
+  sort_contacts(state, 1e30f);
   gather_paper_reaction(state);
 }
 void paper_move(State& state) {
@@ -96,7 +96,7 @@ const Pass all_passes[] = {
     {"pressure_viscosity", fluid, moving | column_density, column_acceleration, pressure_viscosity},
     {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
     {"integrate_velocity", fluid, column_acceleration, column_velocity, integrate_velocity},
-    {"sort_contacts", exact, column_sheet, column_contact, sort_contacts},
+    {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
     {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth, start_contacts},
     {"cloth_predict", exact, column_cloth, column_cloth, cloth_predict},
     {"contact_exact", exact, column_sheet | column_density | column_cloth,

@@ -14,8 +14,8 @@
 // exact where the sheet moves as a whole, a bound where springs hold a vertex back. Starting from the impulses of the step
 // before was tried and dropped: light taut cloth answers them late and flutters (vertex speeds 10 m/s in
 // place of 2 m/s under 0.12 m of water on 0.4 kg/m^2).
-// A contact so soft that one explicit impulse is within a few percent (the second layer of particles) is
-// left alone after the first iteration.
+// A contact too far off to be reached within the step (the second layer of particles) has a soft pressure
+// alone: it is solved once, implicitly, before the first iteration.
 
 #include "sim/kernels.h"
 #include "sim/parallel.h"
@@ -23,7 +23,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct ContactView {
+/// The near list and what it lies on.
+struct NearView {
   const int *triangle, *corner;
   const float *weight_b, *weight_c, *edge;
   const int *order, *start;          // contacts by triangle
@@ -38,17 +39,14 @@ struct ContactView {
     for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s) sum = sum + of_corner[fan_entry[s]];
     return sum;
   }
-  /// Calls f(place in order, corner) for every contact on a vertex, in a fixed order.
+  /// Calls f(triangle, its corner) for every triangle on a vertex, in a fixed order.
   template <class F>
-  DRENCH_HD void for_each_on_vertex(int vertex, const F& f) const {
-    for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s) {
-      const int t = fan_entry[s] / 3, k = fan_entry[s] % 3;
-      for (int c = start[t]; c < start[t + 1]; ++c) f(c, k);
-    }
+  DRENCH_HD void for_each_corner(int vertex, const F& f) const {
+    for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s) f(fan_entry[s] / 3, fan_entry[s] % 3);
   }
 };
 
-inline ContactView contacts_of(const State& state) {
+inline NearView near_list(const State& state) {
   const FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
   return {f.triangle.data(),   c.corner.data(),          f.weight_b.data(),         f.weight_c.data(),
@@ -56,72 +54,131 @@ inline ContactView contacts_of(const State& state) {
           c.fan_entry.data()};
 }
 
-/// Sorts the particles in reach of a sheet by triangle: the near list, all that coupling works on.
-inline void sort_contacts(State& state) {
+/// m, the gap to the sheet's surface that contact keeps.
+inline float contact_distance_of(const Parameters& p) { return 0.5f * p.spacing; }
+
+/// Sorts the particles in reach of a sheet by triangle: the near list, all that coupling works on. With
+/// `reach`, those farther than that from the contact distance stand behind the others, by triangle as well.
+inline void sort_contacts(State& state, float reach) {
   const int triangles = state.cloth.triangles;
   const int* triangle = state.fluid.triangle.data();
+  const float *distance = state.fluid.sheet_distance.data(), *half_thickness = state.cloth.half_thickness.data();
+  const float contact_distance = contact_distance_of(state.parameters);
   int* key = state.contact.key.data();
   parallel_for("contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
-    key[i] = triangle[i] >= 0 ? triangle[i] : triangles;
+    const int t = triangle[i];
+    if (t < 0) {
+      key[i] = 2 * triangles;
+      return;
+    }
+    key[i] = distance[i] - half_thickness[t] - contact_distance > reach ? triangles + t : t;
   });
-  stable_sort_keys(state.contact.key, state.fluid.count, triangles, state.contact.order,
+  stable_sort_keys(state.contact.key, state.fluid.count, 2 * triangles, state.contact.order,
                    state.contact.start, state.scratch);
-  state.contact.near = value_at(state.contact.start, triangles);
+  state.contact.near = value_at(state.contact.start, 2 * triangles);
+  state.contact.close = value_at(state.contact.start, triangles);
 }
 
-/// What the solve reads of the particles and the sheet to set a contact up.
+inline void sort_exact_contacts(State& state) {
+  // Faster than a quarter of the speed of sound nothing should come near.
+  sort_contacts(state, 0.25f * state.parameters.sound_speed * float(state.dt));
+}
+
+/// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the near list.
+struct ContactView {
+  int *particle, *vertex[3];
+  float* weight[3];
+  VecView normal, velocity, drag, change;
+  float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate, *drag_scale, *lambda;
+  int close, soft_begin, rows;  // rows 0..close-1 and soft_begin..rows-1 are contacts
+
+  DRENCH_HD int place_in_list(int row) const {  // -1: empty
+    return row < close ? row : row < soft_begin || row >= rows ? -1 : row - soft_begin + close;
+  }
+};
+
+inline ContactView contact_rows(State& state) {
+  ContactState& c = state.contact;
+  const auto ints = [&](int k) { return c.index.data() + k * c.stride; };
+  const auto floats = [&](int k) { return c.field.data() + size_t(k) * c.stride; };
+  const auto vectors = [&](int k) { return VecView{floats(k), floats(k + 1), floats(k + 2)}; };
+  const int soft_begin = (c.close + 7) / 8 * 8;
+  return {ints(0), {ints(1), ints(2), ints(3)}, {floats(0), floats(1), floats(2)},
+          vectors(3), vectors(6), vectors(9), vectors(12),
+          floats(15), floats(16), floats(17), floats(18), floats(19), floats(20), floats(21), floats(22),
+          c.close, soft_begin, soft_begin + c.near - c.close};
+}
+
+/// What the solve reads of the particles and the sheet to set contacts up.
 struct ContactSetup {
-  ContactView contacts;
+  NearView near;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass, *vertex_share;
   float beta, dt, mass, rest_density, sound_speed, support_radius, contact_distance, viscosity, push_speed, wall_scale;
 
-  DRENCH_HD void prepare(ContactRow& row) const {
-    const int i = row.particle, t = contacts.triangle[i];
-    float sum = 1.f / mass;
+  template <class Index>
+  DRENCH_HD void prepare(const ContactView& c, Index row) const {
+    const auto member = load(c.particle, row);
+    const auto valid = is_index(member);
+    const auto i = select(valid, member, same_index(0, member));
+    const auto t = load(near.triangle, i);
+    using T = decltype(load(distance, i));
+    T sum(1.f / mass);
     for (int k = 0; k < 3; ++k) {
-      sum += row.weight[k] * vertex_share[row.vertex[k]] * beta * inverse_mass[row.vertex[k]];
+      const auto vertex = load(c.vertex[k], row);
+      sum = sum + load(c.weight[k], row) * load(vertex_share, vertex) * T(beta) * load(inverse_mass, vertex);
     }
-    row.inverse_row = contacts.edge[i] > 0.f ? 1.f / sum : 0.f;  // no force at and beyond a free edge
-    row.normal = normal[i];
-    row.velocity = velocity[i];
-    row.lambda = 0.f;
-    row.drag = row.change = {0.f, 0.f, 0.f};
+    const T none(0.f), edge = select(valid, load(near.edge, i), none);
+    // No force at and beyond a free edge, where the edge's share is 0.
+    store(c.inverse_row, row, select(edge > none, T(1.f) / sum, none));
+    c.normal.put(row, normal.at(i));
+    c.velocity.put(row, velocity.at(i));
+    c.drag.put(row, Vec3<T>{none, none, none});
+    store(c.lambda, row, none);
+    const T away = load(distance, i) - load(half_thickness, select(valid, t, same_index(0, t)));
+    const T depth = T(contact_distance) - away;
+    store(c.least, row, select(depth > none, minimum(depth * T(0.2f / dt), T(push_speed)), depth * T(1.f / dt)));
 
-    const float inverse_h = 1.f / support_radius;
-    const float gap = max0(distance[i] - half_thickness[t]), q = minimum(gap * inverse_h, 1.f);
-    const float layer = contacts.edge[i] * rest_density, push_term = layer * pressure_term[i];
-    const float share = layer * inverse_density[i] * inverse_density[i];
-    const float push = push_term * spiky_plane(q) * inverse_h;
-    const float density_slope = pressure_term[i] > 0.f ? wall_scale * sound_speed * sound_speed * rest_density * spiky_plane(q) : 0.f;
-    const float kappa = inverse_h * inverse_h *
-                        (share * density_slope * spiky_plane(q) + push_term * spiky_plane_slope(q));
-    row.pressure_target = dt * mass * push;
-    row.pressure_rate = dt * dt * mass * kappa;
-    row.pressure_scale = 1.f / (1.f + row.pressure_rate * sum);
-    const float depth = contact_distance + half_thickness[t] - distance[i];
-    row.least = depth > 0.f ? minimum(0.2f * depth / dt, push_speed) : depth / dt;
-    row.drag_rate = dt * mass * viscosity * share * viscosity_halfspace(q) * inverse_h * inverse_h;
-    row.drag_scale = 1.f / (1.f + row.drag_rate * sum);
-    row.soft = row.least < -0.25f * sound_speed && maximum(row.pressure_rate, row.drag_rate) * sum < 0.1f;
+    const T inverse_h(1.f / support_radius), q = minimum(max0(away) * inverse_h, T(1.f));
+    const T pressure = load(pressure_term, i), inverse_rho = load(inverse_density, i), plane = spiky_plane(q);
+    const T layer = edge * T(rest_density), push_term = layer * pressure;
+    const T share = layer * inverse_rho * inverse_rho;
+    const T slope = select(pressure > none, T(wall_scale * sound_speed * sound_speed * rest_density) * plane, none);
+    const T kappa = inverse_h * inverse_h * (share * slope * plane + push_term * spiky_plane_slope(q));
+    const T rate = T(dt * dt * mass) * kappa;
+    store(c.pressure_target, row, T(dt * mass) * push_term * plane * inverse_h);
+    store(c.pressure_rate, row, rate);
+    store(c.pressure_scale, row, T(1.f) / (T(1.f) + rate * sum));
+    const T drag_rate = T(dt * mass * viscosity) * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+    store(c.drag_rate, row, drag_rate);
+    store(c.drag_scale, row, T(1.f) / (T(1.f) + drag_rate * sum));
   }
 };
 
 /// One Jacobi update of a contact against the predicted vertices; they take theirs afterwards.
-DRENCH_HD void update_contact(ContactRow& row, const VecView& predicted, float inverse_mass, float relaxation) {
-  const Vec3<float> sheet = predicted[row.vertex[0]] * row.weight[0] + predicted[row.vertex[1]] * row.weight[1] +
-                            predicted[row.vertex[2]] * row.weight[2];
-  const Vec3<float> relative = row.velocity - sheet;
-  const float approach = dot(row.normal, relative);
-  const Vec3<float> slip = relative - row.normal * approach;
-  const float by_pressure = (row.pressure_target - row.pressure_rate * approach - row.lambda) * row.pressure_scale;
-  const float by_contact = (row.least - approach) * row.inverse_row;
-  const float lambda = max0(row.lambda + relaxation * maximum(by_pressure, by_contact));
-  const Vec3<float> hold = (slip * -row.drag_rate - row.drag) * row.drag_scale;
-  row.change = row.normal * (lambda - row.lambda) + hold;
-  row.lambda = lambda;
-  row.drag = row.drag + hold;
-  row.velocity = row.velocity + row.change * inverse_mass;
+template <class Index>
+DRENCH_HD void update_contact(const ContactView& c, Index row, const VecView& predicted, float inverse_mass,
+                              float relaxation) {
+  using T = decltype(load(c.lambda, row));
+  const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);
+  const Vec3<T> sheet = predicted.at(load(c.vertex[0], row)) * load(c.weight[0], row) +
+                        predicted.at(load(c.vertex[1], row)) * load(c.weight[1], row) +
+                        predicted.at(load(c.vertex[2], row)) * load(c.weight[2], row);
+  const Vec3<T> relative = velocity - sheet;
+  const T approach = dot(normal, relative), old = load(c.lambda, row), none(0.f);
+  const Vec3<T> slip = relative - normal * approach;
+  const T by_pressure = (load(c.pressure_target, row) - load(c.pressure_rate, row) * approach - old) *
+                        load(c.pressure_scale, row);
+  const T inverse_row = load(c.inverse_row, row), by_contact = (load(c.least, row) - approach) * inverse_row;
+  const T lambda = max0(old + T(relaxation) * maximum(by_pressure, by_contact));
+  const Vec3<T> hold = (slip * -load(c.drag_rate, row) - drag) * load(c.drag_scale, row);
+  const Vec3<T> still{none, none, none};
+  const auto active = inverse_row > none;
+  const Vec3<T> change = select(active, normal * (lambda - old) + hold, still);
+  store(c.lambda, row, select(active, lambda, none));
+  c.drag.put(row, select(active, drag + hold, still));
+  c.change.put(row, change);
+  c.velocity.put(row, velocity + change * T(inverse_mass));
 }
 
 /// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly twice as
@@ -135,91 +192,99 @@ inline ContactSetup contact_setup(State& state) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {contacts_of(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure_term.data(),
+  return {near_list(state), f.velocity.view(), f.normal.view(), f.sheet_distance.data(), f.pressure_term.data(),
           f.inverse_density.data(), c.half_thickness.data(), c.inverse_mass.data(), c.share.data(), beta,
           float(state.dt), p.particle_mass, p.rest_density, p.sound_speed, p.support_radius,
-          0.5f * p.spacing, p.dynamic_viscosity, 0.01f * p.sound_speed, p.wall_scale};
+          contact_distance_of(p), p.dynamic_viscosity, 0.01f * p.sound_speed, p.wall_scale};
 }
 
-/// What the contacts of a triangle give to its corners, added up in their order.
-struct CornerSums {
-  Vec3<float> impulse[3] = {};  // kg m/s, on the particles
-  float weight[3] = {};
-
-  DRENCH_HD void add(const ContactRow& row) {
-    for (int k = 0; k < 3; ++k) {
-      impulse[k] = impulse[k] + row.change * row.weight[k];
-      weight[k] += row.weight[k];
+/// Adds up what the contacts of each triangle give to its corners, in their order.
+inline void sum_by_triangle(State& state, bool with_soft) {
+  const ContactView c = contact_rows(state);
+  const int triangles = state.cloth.triangles, *start = state.contact.start.data();
+  const VecView impulse = state.contact.impulse.view();
+  const int last = with_soft ? 1 : 0, gap = c.soft_begin - c.close;
+  parallel_for("contact: triangles", triangles, DRENCH_LAMBDA(int t) {
+    Vec3<float> sum[3] = {};
+    for (int soft = 0; soft <= last; ++soft) {
+      const int k = t + soft * triangles;
+      for (int row = start[k] + soft * gap; row < start[k + 1] + soft * gap; ++row) {
+        const Vec3<float> change = c.change[row];
+        for (int e = 0; e < 3; ++e) sum[e] = sum[e] + change * c.weight[e][row];
+      }
     }
-  }
-};
+    for (int e = 0; e < 3; ++e) impulse.set(3 * t + e, sum[e]);
+  });
+}
 
 /// Rows of the near list; the vertices receive what the path test took from particles.
 inline void start_contacts(State& state) {
-  ClothState& c = state.cloth;
-  const ContactView contacts = contacts_of(state);
-  ContactRow* rows = state.contact.rows.data();
-  const VecView owed = state.fluid.owed.view(), force = c.force.view(), impulse = state.contact.impulse.view();
-  float* weight = state.contact.weight.data();
-  parallel_for("contact: start", c.triangles, DRENCH_LAMBDA(int t) {
-    CornerSums sums;
-    for (int k = contacts.start[t]; k < contacts.start[t + 1]; ++k) {
-      ContactRow& row = rows[k];
-      row.particle = contacts.order[k];
-      for (int corner = 0; corner < 3; ++corner) {
-        row.vertex[corner] = contacts.corner[3 * t + corner];
-        row.weight[corner] = contacts.weight(row.particle, corner);
-      }
-      row.change = owed[row.particle];
-      owed.set(row.particle, {0.f, 0.f, 0.f});
-      sums.add(row);
+  ClothState& cloth = state.cloth;
+  const ContactView c = contact_rows(state);
+  const NearView near = near_list(state);
+  const VecView owed = state.fluid.owed.view(), force = cloth.force.view();
+  const bool owes = state.owes;
+  parallel_for("contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
+    const int place = c.place_in_list(row), i = place < 0 ? -1 : near.order[place];
+    c.particle[row] = i;
+    for (int k = 0; k < 3; ++k) {
+      c.vertex[k][row] = i < 0 ? 0 : near.corner[3 * near.triangle[i] + k];
+      c.weight[k][row] = i < 0 ? 0.f : near.weight(i, k);
     }
-    for (int k = 0; k < 3; ++k) impulse.set(3 * t + k, sums.impulse[k]), weight[3 * t + k] = sums.weight[k];
+    if (owes) c.change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : owed[i]);
   });
-  float* share = c.share.data();
+  const VecView impulse = state.contact.impulse.view();
+  if (owes) {
+    sum_by_triangle(state, true);
+    state.fluid.owed.clear();
+    state.owes = false;
+  }
+  float* share = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
-  parallel_for("contact: weights by vertex", c.vertices, DRENCH_LAMBDA(int v) {
+  const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
+  parallel_for("contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
     float weights = 0.f;
-    for (int s = contacts.fan_start[v]; s < contacts.fan_start[v + 1]; ++s) weights += weight[contacts.fan_entry[s]];
-    force.set(v, contacts.sum_on_vertex(impulse, v) * -inverse_dt);
+    near.for_each_corner(v, [&](int t, int e) {
+      for (int row = near.start[t]; row < near.start[t + 1]; ++row) weights += c.weight[e][row];
+      const int k = t + triangles;
+      for (int row = near.start[k] + gap; row < near.start[k + 1] + gap; ++row) weights += c.weight[e][row];
+    });
+    force.set(v, owes ? near.sum_on_vertex(impulse, v) * -inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
     share[v] = weights;
   });
 }
 
 inline void solve_contacts(State& state) {
   if (state.contact.near == 0) return;
-  ClothState& c = state.cloth;
+  ClothState& cloth = state.cloth;
   const ContactSetup setup = contact_setup(state);
-  const ContactView contacts = setup.contacts;
-  ContactRow* rows = state.contact.rows.data();
-  const VecView predicted = c.predicted.view(), force = c.force.view(), velocity = state.fluid.velocity.view(),
-                impulse = state.contact.impulse.view();
-  const float *inverse_mass = c.inverse_mass.data(), *share = c.share.data(), inverse_dt = 1.f / float(state.dt);
-  parallel_for("contact: prepare", state.contact.near, DRENCH_LAMBDA(int k) { setup.prepare(rows[k]); });
+  const ContactView c = contact_rows(state);
+  const NearView near = setup.near;
+  const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
+                velocity = state.fluid.velocity.view(), impulse = state.contact.impulse.view();
+  const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
+  const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
+  for_each_lane("contact: prepare", c.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
+  for_each_lane("contact: soft", c.rows - c.soft_begin, DRENCH_LAMBDA(auto row) {
+    update_contact(c, row + c.soft_begin, predicted, inverse_particle_mass, 1.f);
+  });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
-    parallel_for("contact: particles", c.triangles, DRENCH_LAMBDA(int t) {
-      const int begin = contacts.start[t], end = contacts.start[t + 1];
-      if (begin == end) return;
-      CornerSums sums;
-      for (int k = begin; k < end; ++k) {
-        ContactRow& row = rows[k];
-        if (row.inverse_row == 0.f || (row.soft && iteration > 0)) continue;
-        update_contact(row, predicted, 1.f / setup.mass, row.soft ? 1.f : relaxation);
-        sums.add(row);
-      }
-      for (int k = 0; k < 3; ++k) impulse.set(3 * t + k, sums.impulse[k]);
+    for_each_lane("contact: particles", c.close, DRENCH_LAMBDA(auto row) {
+      update_contact(c, row, predicted, inverse_particle_mass, relaxation);
     });
+    sum_by_triangle(state, iteration == 0);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
-    parallel_for("contact: vertices", c.vertices, DRENCH_LAMBDA(int v) {
+    parallel_for("contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
       if (share[v] == 0.f) return;
-      const Vec3<float> sum = contacts.sum_on_vertex(impulse, v);
+      const Vec3<float> sum = near.sum_on_vertex(impulse, v);
       predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
       force.set(v, force[v] - sum * inverse_dt);
     });
   }
-  parallel_for("contact: velocities", state.contact.near,
-               DRENCH_LAMBDA(int k) { velocity.set(rows[k].particle, rows[k].velocity); });
+  parallel_for("contact: velocities", c.rows, DRENCH_LAMBDA(int row) {
+    if (c.particle[row] >= 0) velocity.set(c.particle[row], c.velocity[row]);
+  });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

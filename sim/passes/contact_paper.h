@@ -94,14 +94,16 @@ inline void add_paper_forces(State& state) {
 // Reaction (eqs 10, 11): minus the sum of the colliding forces, equal thirds to the vertices.
 inline void gather_paper_reaction(State& state) {
   ClothState& c = state.cloth;
-  const ContactView contacts = contacts_of(state);
+  const NearView near = near_list(state);
   const VecView impulse = state.fluid.impulse.view(), force = c.force.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for("paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
     Vec3<float> sum{0.f, 0.f, 0.f};
-    contacts.for_each_on_vertex(v, [&](int k, int corner) {
-      const int i = contacts.order[k];
-      sum = sum + impulse[i] * contacts.weight(i, corner);
+    near.for_each_corner(v, [&](int t, int corner) {
+      for (int k = near.start[t]; k < near.start[t + 1]; ++k) {
+        const int i = near.order[k];
+        sum = sum + impulse[i] * near.weight(i, corner);
+      }
     });
     force.set(v, sum * -inverse_dt);
   });

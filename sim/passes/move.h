@@ -219,6 +219,7 @@ inline float guard_substep(State& state, float dt) {
   for (int round = 0;; ++round) {
     const GuardCount count = test_paths(state, test, tested, dt);
     state.guard_hits += count.hits;
+    state.owes |= count.hits > 0;
     if (count.unresolved == 0) break;
     ++state.guard_holds;
     const bool everywhere = round >= 24;
