@@ -7,7 +7,6 @@
 
 #include "sim/step_plan.h"
 
-
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
@@ -112,6 +111,10 @@ class BackendSolver : public Solver {
       for (const Pass& pass : plan_) pass.launch(state_);
     }
     return measure_limits(state_);
+  }
+  void observe_substeps(std::function<void(const HostState&)> observer) override {
+    state_.after_substep = nullptr;
+    if (observer) state_.after_substep = [this, observer] { observer(save()); };
   }
 
   void refresh() override {

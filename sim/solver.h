@@ -2,6 +2,7 @@
 // The boundary between host code, compiled once, and the two backends: plain host arrays in and out.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -67,6 +68,9 @@ class Solver {
   virtual void append(const HostVec& position, const HostVec& velocity, const std::vector<int>& id) = 0;
   /// One fluid step with `substeps` cloth steps in it.
   virtual Limits step(double dt, int substeps) = 0;
+  /// Calls `observer` with the state after each cloth step of the exact coupling, from the next step on;
+  /// without one (the default) nothing is done for it. Each call reads the whole state back to the host.
+  virtual void observe_substeps(std::function<void(const HostState&)> observer) = 0;
   /// Density and nearest triangles of the current positions, without a step. Sorts the particles, which
   /// the next step would do in the same way: its result is the same bits with or without this.
   virtual void refresh() = 0;

@@ -1,6 +1,7 @@
 #pragma once
 // The state of a simulation on one backend: columns of particles, vertices, springs and triangles.
 
+#include <functional>
 #include <vector>
 
 #include "sim/geometry.h"
@@ -113,6 +114,7 @@ struct State {
   double dt = 0;            // s, of the step being made
   int substeps = 1;         // cloth steps in it
   bool owes = true;         // FluidState::owed may hold something
+  std::function<void()> after_substep;  // of an observer: called when all of a coupled substep is in place
   uint64_t guard_hits = 0;  // particles held back by the path test, since the start
   uint64_t guard_holds = 0; // substeps in which vertices had to be stopped
 };

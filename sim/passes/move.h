@@ -244,6 +244,7 @@ inline void move_coupled(State& state) {
     cloth_verlet(state, cloth_buffers(state.cloth), dt);
     moved = std::max(moved, guard_substep(state, dt));
     finish_substep(state.cloth);
+    if (state.after_substep) state.after_substep();
   }
   state.cloth.moved += moved;
 }

@@ -9,65 +9,157 @@
 namespace drench::sim_tests {
 namespace {
 
-struct Count {
-  int crossings = 0;
-  uint64_t guard_hits = 0;
-  int near_steps = 0;  // steps with particles near the sheet
+/// Paths from one observed state to the next against the sheet, substep by substep.
+class PathCount {
+ public:
+  /// @param ghost  sheet in place of the simulated one: drawn where it starts, touched by nothing.
+  /// @param sink   m that the ghost sinks from state to state.
+  explicit PathCount(Stepper& run, const sim::Scene* ghost = nullptr, float sink = 0)
+      : run_(run), ghost_(ghost), sink_(sink), before_(shown(run.solver->save())) {
+    run.solver->observe_substeps([this](const sim::HostState& state) { add(state); });
+  }
+  ~PathCount() { run_.solver->observe_substeps({}); }
+  PathCount(const PathCount&) = delete;
+  PathCount& operator=(const PathCount&) = delete;
+
+  void step(double dt) {
+    substep_ = 0;
+    run_.step(dt);
+    fewest = std::min(fewest, substep_), most = std::max(most, substep_);
+    const std::vector<int> near = run_.solver->near_triangles();
+    near_steps += std::any_of(near.begin(), near.end(), [](int t) { return t >= 0; });
+  }
+  const sim::HostState& last() const { return before_; }
+
+  int crossings = 0, late_crossings = 0;  // late: not in the first substep of a step
+  int fewest = 1000, most = 0;            // substeps a step
+  int near_steps = 0;                     // steps with particles near the sheet
+
+ private:
+  sim::HostState shown(sim::HostState state) {
+    if (!ghost_) return state;
+    state.cloth_position = ghost_->start.cloth_position;
+    for (float& y : state.cloth_position.y) y -= sunk_;
+    sunk_ += sink_;
+    return state;
+  }
+  void add(const sim::HostState& state) {
+    sim::HostState after = shown(state);
+    const int count = count_crossings((ghost_ ? *ghost_ : run_.scene).cloth, before_, after);
+    crossings += count;
+    late_crossings += substep_ > 0 ? count : 0;
+    ++substep_;
+    before_ = std::move(after);
+  }
+
+  Stepper& run_;
+  const sim::Scene* ghost_;
+  float sink_, sunk_ = 0;
+  sim::HostState before_;
+  int substep_ = 0;
 };
 
-/// `velocity` of a block of 8^3 particles just over a pinned sheet of 0.3 m, steps short enough for
-/// one cloth substep each, every path counted.
-Count flown_at_sheet(V3d velocity, int steps) {
+/// A block of 8^3 particles of one velocity just over a pinned sheet of 0.3 m, of light cotton.
+Shot block_over_sheet(V3d velocity) {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -9.81, 0);
   const V3d aim = velocity.length() > 0 ? V3d(velocity.x, 0, velocity.z) * 0.02 : V3d(0);
   add_box(shot, V3d(-0.04, 0.015, -0.04) - aim, {8, 8, 8}, velocity);
   pin_edges(add_sheet(shot, 0.3, 0, 16));
+  return shot;
+}
+
+/// The same with a sheet so stiff that the first stable fluid step takes `substeps` cloth steps:
+/// their limit falls with the square root of the stiffness. For one, it stays cotton.
+Shot jet_at_sheet(V3d velocity, int substeps) {
+  Shot shot = block_over_sheet(velocity);
+  if (substeps == 1) return shot;
+  const Stepper run(shot);
+  const double wanted_limit = run.stable_dt() / (substeps - 0.4);
+  const double ratio = run.scene.parameters.cloth_dt_limit / wanted_limit;
+  shot.cloth[0].adjacent_stiffness *= ratio * ratio;
+  shot.cloth[0].diagonal_stiffness *= ratio * ratio;
+  return shot;
+}
+
+/// Stable steps of at most `substeps` cloth steps, every path counted: none may cross.
+/// @return particles that the path test held back.
+uint64_t expect_no_crossing(const Shot& shot, int steps, int substeps, int least_near_steps) {
   Stepper run(shot);
-  sim::HostState before = run.solver->save();
-  Count count;
+  PathCount count(run);
   for (int k = 0; k < steps; ++k) {
-    run.step(std::min(run.stable_dt(), double(run.scene.parameters.cloth_dt_limit)));
-    if (run.limits.bad_particle >= 0 || run.limits.bad_vertex >= 0) break;
-    const sim::HostState after = run.solver->save();
-    count.crossings += count_crossings(run.scene.cloth, before, after);
-    const std::vector<int> near = run.solver->near_triangles();
-    count.near_steps += std::any_of(near.begin(), near.end(), [](int t) { return t >= 0; });
-    before = after;
-    count.guard_hits = before.guard_hits;
+    count.step(std::min(run.stable_dt(), substeps * double(run.scene.parameters.cloth_dt_limit)));
+    if (run.limits.bad_particle < 0 && run.limits.bad_vertex < 0) continue;
+    ADD_FAILURE() << "blew up in step " << k;
+    break;
   }
-  return count;
-}
-
-TEST(Crossing, NoneWhereABlockOfWaterFallsOnLightCotton) {
-  const Count count = flown_at_sheet(V3d(0, -1, 0), 1500);
   EXPECT_EQ(count.crossings, 0);
-  EXPECT_GT(count.near_steps, 500);
+  EXPECT_GE(count.fewest, std::min(substeps, 2));
+  EXPECT_EQ(count.most, substeps);
+  EXPECT_GE(count.near_steps, least_near_steps);
+  return count.last().guard_hits;
 }
 
-TEST(Crossing, NoneByAJetAtTenMetresASecond) {
-  const Count count = flown_at_sheet(V3d(0, -10, 0), 600);
-  EXPECT_EQ(count.crossings, 0);
-  EXPECT_GT(count.guard_hits, 0u);
+class Crossing : public testing::TestWithParam<int> {};  // cloth substeps a step
+INSTANTIATE_TEST_SUITE_P(Substeps, Crossing, testing::Values(1, 2, 3, 4));
+
+TEST_P(Crossing, NoneWhereABlockOfWaterFallsOnLightCotton) {
+  expect_no_crossing(block_over_sheet(V3d(0, -1, 0)), 1500 / GetParam(), GetParam(), 300);
 }
 
-TEST(Crossing, NoneByAGrazingJet) {
-  const Count count = flown_at_sheet(V3d(9.8, -2, 0), 600);
-  EXPECT_EQ(count.crossings, 0);
-  EXPECT_GT(count.near_steps, 50);
+TEST_P(Crossing, NoneByAJetAtTenMetresASecond) {
+  const Shot shot = jet_at_sheet(V3d(0, -10, 0), GetParam());
+  EXPECT_GT(expect_no_crossing(shot, 600, GetParam(), 200), 0u);
 }
 
-// Several cloth substeps a step: their paths are not stored, but who is below the sheet is.
-TEST(Crossing, NothingIsBelowASheetThatIsSubstepped) {
-  Shot shot = empty_shot();
-  shot.gravity = V3d(0, -9.81, 0);
-  add_box(shot, V3d(-0.04, 0.015, -0.04), {8, 8, 8}, V3d(0, -1, 0));
-  pin_edges(add_sheet(shot, 0.3, 0, 16));
+TEST_P(Crossing, NoneByAGrazingJet) {
+  expect_no_crossing(jet_at_sheet(V3d(9.8, -2, 0), GetParam()), 600, GetParam(), 300);
+}
+
+// What is counted is what the solver went through: the last substep of a step is the state after
+// it, and being watched changes no bit.
+TEST(CrossingObserver, SeesTheStatesOfTheSolverAndLeavesThemAlone) {
+  const Shot shot = jet_at_sheet(V3d(0, -10, 0), 3);
+  Stepper watched(shot), alone(shot);
+  PathCount count(watched);
+  for (int k = 0; k < 60; ++k) count.step(watched.stable_dt()), alone.step();
+  EXPECT_GE(count.fewest, 2);
+  const sim::HostState a = watched.solver->save(), b = alone.solver->save();
+  for (const sim::HostState* other : {&b, &count.last()}) {
+    EXPECT_EQ(other->id, a.id);
+    EXPECT_EQ(other->position.y, a.position.y);
+    EXPECT_EQ(other->velocity.y, a.velocity.y);
+    EXPECT_EQ(other->cloth_position.y, a.cloth_position.y);
+  }
+}
+
+// A ghost 12 mm above the simulated sheet, within the support radius of 20 mm: the jet crosses it, and
+// whoever has done so an odd number of times is below.
+TEST(CrossingObserver, CountsThroughAGhost) {
+  Shot shot = jet_at_sheet(V3d(0.3, -10, 0.2), 3);
+  const sim::Scene ghost = sim::build_scene(shot);
+  shot.cloth.back().corner.y -= 0.012;
   Stepper run(shot);
-  ASSERT_GE(run.stable_dt(), 2 * run.scene.parameters.cloth_dt_limit);
-  run.advance(0.1);  // nothing has run over the edge of the sheet yet
-  const sim::HostState state = run.solver->save();
-  EXPECT_EQ(count_below(run.scene.cloth, state, run.scene.start.cloth_position, 1), 0);
+  PathCount count(run, &ghost);
+  for (int k = 0; k < 60; ++k) count.step(run.stable_dt());
+  EXPECT_GE(count.fewest, 2);
+  const int below = count_below(ghost.cloth, count.last(), ghost.start.cloth_position, 1);
+  EXPECT_GE(count.crossings, below);
+  EXPECT_GT(below, 0);
+  EXPECT_EQ((count.crossings - below) % 2, 0);
+}
+
+// A ghost that sinks into the falling block, 0.2 mm a substep, meets particles in every one of them.
+TEST(CrossingObserver, CountsSubstepBySubstep) {
+  Shot shot = jet_at_sheet(V3d(0, -1, 0), 3);
+  sim::Scene ghost = sim::build_scene(shot);
+  for (float& y : ghost.start.cloth_position.y) y += 0.05f;
+  Stepper run(shot);
+  PathCount count(run, &ghost, 2e-4f);
+  for (int k = 0; k < 60; ++k) count.step(run.stable_dt());
+  EXPECT_GE(count.fewest, 2);
+  EXPECT_GT(count.late_crossings, 100);
+  EXPECT_GT(count.crossings - count.late_crossings, 50);
 }
 
 // One particle goes straight down through the middle of a triangle, one beside the sheet, one along
