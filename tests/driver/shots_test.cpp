@@ -1,0 +1,87 @@
+// Every scene of shots/ is valid in every quality it names, and can be started.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <regex>
+#include <set>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/shot_file.h"
+#include "sim/scene.h"
+
+namespace drench {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> shot_files() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(DRENCH_SOURCE_DIR "/shots")) {
+    if (entry.path().extension() == ".toml") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Names of all [quality.NAME] and [quality.NAME.section] tables, and `final`.
+std::set<std::string> qualities_of(const std::string& text) {
+  static const std::regex header(R"re((?:^|\n)[ \t]*\[quality\.([A-Za-z0-9_-]+|"[^"\n]+"))re");
+  std::set<std::string> names{"final"};
+  for (std::sregex_iterator at(text.begin(), text.end(), header), end; at != end; ++at) {
+    names.insert((*at)[1]);
+  }
+  return names;
+}
+
+// Below, an empty folder would have nothing to fail on.
+TEST(Shots, AreThere) { EXPECT_FALSE(shot_files().empty()); }
+
+TEST(Shots, AreValidInEveryQualityLockToTheSameAndStart) {
+  for (const fs::path& file : shot_files()) {
+    for (const std::string& quality : qualities_of(read_text(file))) {
+      SCOPED_TRACE(file.filename().string() + ", " + quality);
+      try {
+        const Shot shot = read_shot(file, {.quality = quality, .set = {}});
+        EXPECT_EQ(shot.name, file.stem().string());
+        EXPECT_FALSE(shot.light.empty());
+        const std::string lock = shot_lock(shot);
+        const Shot again = parse_shot(lock, file.parent_path() / "shot.lock.toml");
+        EXPECT_EQ(shot_lock(again), lock);
+        for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::render}) {
+          EXPECT_EQ(stage_settings_digest(again, stage), stage_settings_digest(shot, stage));
+        }
+        const sim::Scene scene = sim::build_scene(shot);  // checks overlaps, meshes and sources
+        EXPECT_EQ(scene.sheet.size(), shot.cloth.size());
+        EXPECT_TRUE(!scene.start.id.empty() || !shot.fluid.emitter.empty() || !shot.cloth.empty());
+      } catch (const Error& error) {
+        ADD_FAILURE() << error.what();
+      }
+    }
+  }
+}
+
+// ./run makes the preview unless told otherwise: it must differ from the final.
+TEST(Shots, HaveACheaperPreview) {
+  for (const fs::path& file : shot_files()) {
+    SCOPED_TRACE(file.filename().string());
+    ASSERT_TRUE(qualities_of(read_text(file)).contains("preview"));
+    const RenderSettings whole = read_shot(file).render,
+                         preview = read_shot(file, {.quality = "preview", .set = {}}).render;
+    EXPECT_LT(int64_t(preview.width) * preview.height * preview.samples,
+              int64_t(whole.width) * whole.height * whole.samples);
+  }
+}
+
+// The first line says what a shot shows; the folder's page lists it.
+TEST(Shots, SayWhatTheyShow) {
+  const std::string page = read_text(DRENCH_SOURCE_DIR "/shots/README.md");
+  for (const fs::path& file : shot_files()) {
+    EXPECT_TRUE(read_text(file).starts_with("# ")) << file;
+    EXPECT_NE(page.find("`" + file.stem().string() + "`"), std::string::npos) << file;
+  }
+}
+
+}  // namespace
+}  // namespace drench
