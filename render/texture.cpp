@@ -72,7 +72,10 @@ bool decode_jpeg(const std::byte* data, size_t size, int* width, int* height, ui
     e->manager.format_message(info, e->message);
     std::longjmp(e->jump, 1);
   };
-  errors->manager.output_message = [](j_common_ptr) {};
+  // A warning means damaged data, which libjpeg would fill with grey.
+  errors->manager.emit_message = [](j_common_ptr info, int level) {
+    if (level < 0) info->err->error_exit(info);
+  };
   if (setjmp(errors->jump)) {
     jpeg_destroy_decompress(&jpeg);
     return false;
@@ -89,6 +92,7 @@ bool decode_jpeg(const std::byte* data, size_t size, int* width, int* height, ui
       uint8_t* row = rgb + size_t(3) * jpeg.output_scanline * jpeg.output_width;
       jpeg_read_scanlines(&jpeg, &row, 1);
     }
+    jpeg_finish_decompress(&jpeg);  // sees a missing end
   }
   jpeg_destroy_decompress(&jpeg);
   return true;
