@@ -21,7 +21,6 @@ drench_packages=(
   "libcli11-dev:/usr/include/CLI/CLI.hpp"
   "libtomlplusplus-dev:/usr/include/toml++/toml.h /usr/include/toml++/toml.hpp"
   "nlohmann-json3-dev:/usr/include/nlohmann/json.hpp"
-  "libspdlog-dev:/usr/include/spdlog/spdlog.h"
   "libfmt-dev:/usr/include/fmt/format.h"
   "libxxhash-dev:/usr/include/xxhash.h"
   "ffmpeg:/usr/bin/ffmpeg"
