@@ -9,7 +9,7 @@
 
 #include <fstream>
 
-#include "tests/contract/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/particles_file.h"
 #include "tests/contract/sphere_mesh.h"
-#include "tests/contract/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {

@@ -7,13 +7,15 @@
 #include <limits>
 
 #include "pipeline/contract/ply_file.h"
-#include "tests/contract/temporary_folder.h"
+#include "tests/same_bits.h"
+#include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {
 
 namespace fs = std::filesystem;
 using test::error_of;
+using test::expect_same_bits;
 using test::TemporaryFolder;
 
 /// A grid of 4 x 3 vertices with every column filled with values that no other place has.
@@ -36,20 +38,11 @@ TriangleMesh full_sheet() {
   return mesh;
 }
 
-void expect_same(const TriangleMesh& a, const TriangleMesh& b) {
-  EXPECT_EQ(a.position, b.position);
-  EXPECT_EQ(a.velocity, b.velocity);
-  EXPECT_EQ(a.normal, b.normal);
-  EXPECT_EQ(a.uv, b.uv);
-  EXPECT_EQ(a.rest_position, b.rest_position);
-  EXPECT_EQ(a.triangle, b.triangle);
-}
-
 TEST(MeshFile, ReturnsEveryColumnBitForBit) {
   const TemporaryFolder folder;
   const TriangleMesh mesh = full_sheet();
   write_mesh(folder / "sheet.ply", mesh);
-  expect_same(read_mesh(folder / "sheet.ply"), mesh);
+  expect_same_bits(read_mesh(folder / "sheet.ply"), mesh);
 }
 
 TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
@@ -59,13 +52,13 @@ TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
   mesh.uv.clear();
   mesh.rest_position.clear();
   write_mesh(folder / "sheet.ply", mesh);
-  expect_same(read_mesh(folder / "sheet.ply"), mesh);
+  expect_same_bits(read_mesh(folder / "sheet.ply"), mesh);
 }
 
 TEST(MeshFile, HoldsAnEmptyMesh) {
   const TemporaryFolder folder;
   write_mesh(folder / "empty.ply", {});
-  expect_same(read_mesh(folder / "empty.ply"), {});
+  expect_same_bits(read_mesh(folder / "empty.ply"), {});
 }
 
 TEST(MeshFile, GivesEqualBytesForEqualMeshes) {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "tests/contract/sphere_mesh.h"
-#include "tests/contract/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {

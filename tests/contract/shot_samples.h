@@ -4,7 +4,7 @@
 #include <string>
 
 #include "pipeline/contract/files.h"
-#include "tests/contract/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 

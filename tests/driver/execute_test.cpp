@@ -24,10 +24,16 @@ using test::TemporaryFolder;
 using test::ToySettings;
 using test::ToyStages;
 
+/// Makes everything that is missing in the folder, and keeps what happened.
+struct Made : ToyStages {
+  Made(const ToySettings& settings, const TemporaryFolder& folder) : ToyStages(settings) {
+    make_toy(settings, *this, folder.path());
+  }
+};
+
 std::map<std::string, std::string> undisturbed(const ToySettings& settings) {
   const TemporaryFolder folder;
-  ToyStages stages(settings);
-  make_toy(settings, stages, folder.path());
+  const Made made(settings, folder);
   return digests_in(folder.path());
 }
 
@@ -41,8 +47,7 @@ size_t position(const std::vector<Event>& events, Step step, int frame, bool beg
 TEST(Execute, MakesEveryFileOnceInTheOrderOfItsInputs) {
   const TemporaryFolder folder;
   const ToySettings settings;
-  ToyStages stages(settings);
-  make_toy(settings, stages, folder.path());
+  const Made stages(settings, folder);
   EXPECT_EQ(stages.count(Step::simulate), 24);  // the first frame is the initial state
   EXPECT_EQ(stages.count(Step::mesh), 25);
   EXPECT_EQ(stages.count(Step::render), 25);
@@ -98,10 +103,9 @@ TEST(Execute, NeverRunsMoreThanTwoQueuedFramesAhead) {
 TEST(Execute, DoesNothingTheSecondTime) {
   const TemporaryFolder folder;
   const ToySettings settings;
-  ToyStages first(settings), second(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   const std::string manifest = test::text_of(folder.path() / layout::manifest);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_TRUE(second.events().empty());
   EXPECT_EQ(test::text_of(folder.path() / layout::manifest), manifest);
 }
@@ -109,11 +113,9 @@ TEST(Execute, DoesNothingTheSecondTime) {
 TEST(Execute, RendersOnlyAfterACameraEdit) {
   const TemporaryFolder folder;
   ToySettings settings;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   settings.camera = "right";
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.count(Step::simulate), 0);
   EXPECT_EQ(second.count(Step::mesh), 0);
   EXPECT_EQ(second.count(Step::render), 25);
@@ -124,11 +126,9 @@ TEST(Execute, RendersOnlyAfterACameraEdit) {
 TEST(Execute, StopsAChangeAtTheFirstFileThatComesOutTheSame) {
   const TemporaryFolder folder;
   ToySettings settings;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   settings.program = "2";
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.count(Step::simulate), 24);
   EXPECT_EQ(second.count(Step::mesh), 0);
   EXPECT_EQ(second.count(Step::render), 0);
@@ -141,11 +141,9 @@ TEST(Execute, RendersOnlyFramesWhoseMeshChanged) {
   ToySettings settings;
   settings.mesh_digits = 1;
   settings.growth = 2;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   settings.mesh_digits = 2;
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.count(Step::mesh), 25);
   EXPECT_EQ(second.frames(Step::render), (std::vector<int>{1}));
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
@@ -154,10 +152,9 @@ TEST(Execute, RendersOnlyFramesWhoseMeshChanged) {
 TEST(Execute, MakesAMissingImageAlone) {
   const TemporaryFolder folder;
   const ToySettings settings;
-  ToyStages first(settings), second(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   std::filesystem::remove(folder.path() / layout::image("toy", 7));
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.frames(Step::render), (std::vector<int>{7}));
   EXPECT_EQ(second.count(Step::mesh) + second.count(Step::simulate), 0);
   EXPECT_EQ(second.count(Step::contact_sheet), 0);  // the image came out the same
@@ -168,10 +165,9 @@ TEST(Execute, MakesAMissingImageAlone) {
 TEST(Execute, MakesALostCacheAgainFromTheCheckpointBefore) {
   const TemporaryFolder folder;
   const ToySettings settings;
-  ToyStages first(settings), second(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   std::filesystem::remove(folder.path() / layout::particles(17));
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.frames(Step::simulate), (std::vector<int>{12, 13, 14, 15, 16, 17}));
   EXPECT_EQ(second.count(Step::mesh), 0);
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
@@ -181,12 +177,10 @@ TEST(Execute, MakesALostCacheAgainFromTheCheckpointBefore) {
 TEST(Execute, NeverReadsADamagedInputAndMakesItAgain) {
   const TemporaryFolder folder;
   ToySettings settings;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   flip_bit_quietly(folder.path() / layout::fluid_mesh(9));
   settings.camera = "right";
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.frames(Step::mesh), (std::vector<int>{9}));
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
 }
@@ -194,12 +188,10 @@ TEST(Execute, NeverReadsADamagedInputAndMakesItAgain) {
 TEST(Execute, GoesOnWithoutADamagedCheckpoint) {
   const TemporaryFolder folder;
   ToySettings settings;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   for (const int frame : {11, 21, 25}) flip_bit_quietly(folder.path() / layout::checkpoint(frame));
   settings.last = 30;
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.frames(Step::simulate).front(), 2);
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
 }
@@ -208,8 +200,7 @@ TEST(Execute, KeepsTheLastThreeCheckpoints) {
   const TemporaryFolder folder;
   ToySettings settings;
   settings.last = 55;
-  ToyStages stages(settings);
-  make_toy(settings, stages, folder.path());
+  const Made stages(settings, folder);
   std::vector<std::string> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path() / "sim/checkpoint")) {
     files.push_back(entry.path().filename().string());
@@ -222,11 +213,9 @@ TEST(Execute, KeepsTheLastThreeCheckpoints) {
 TEST(Execute, ContinuesALongerRangeWithoutSimulatingAgain) {
   const TemporaryFolder folder;
   ToySettings settings;
-  ToyStages first(settings);
-  make_toy(settings, first, folder.path());
+  const Made first(settings, folder);
   settings.last = 33;
-  ToyStages second(settings);
-  make_toy(settings, second, folder.path());
+  const Made second(settings, folder);
   EXPECT_EQ(second.frames(Step::simulate).front(), 26);
   EXPECT_EQ(digests_in(folder.path()).at(layout::image("toy", 33)),
             undisturbed(settings).at(layout::image("toy", 33)));
@@ -316,8 +305,7 @@ TEST(Execute, MakesPartOfTheFramesButSimulatesAllBeforeThem) {
   const TemporaryFolder folder;
   ToySettings settings;
   settings.frames = {4, 8};
-  ToyStages stages(settings);
-  make_toy(settings, stages, folder.path());
+  const Made stages(settings, folder);
   EXPECT_EQ(stages.frames(Step::simulate), (std::vector<int>{2, 3, 4, 5, 6, 7, 8}));
   EXPECT_EQ(stages.frames(Step::mesh), settings.frames);
   EXPECT_EQ(stages.frames(Step::render), settings.frames);
@@ -327,12 +315,10 @@ TEST(Execute, RunsAStageAloneOnWhatLiesThere) {
   const TemporaryFolder folder;
   ToySettings settings;
   settings.steps = {Step::simulate};
-  ToyStages simulating(settings);
-  make_toy(settings, simulating, folder.path());
+  const Made simulating(settings, folder);
   EXPECT_EQ(simulating.count(Step::mesh) + simulating.count(Step::render), 0);
   settings.steps = {Step::mesh};
-  ToyStages meshing(settings);
-  make_toy(settings, meshing, folder.path());
+  const Made meshing(settings, folder);
   EXPECT_EQ(meshing.count(Step::simulate), 0);
   EXPECT_EQ(meshing.count(Step::mesh), 25);
 }

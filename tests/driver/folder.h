@@ -1,39 +1,15 @@
 #pragma once
-// A temporary folder that goes away with the test.
+// Files of a test: their text, and damage to it.
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "tests/temporary_folder.h"
+
 namespace drench::test {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    // Memory where there is such a folder: thousands of fsyncs of small files otherwise take
-    // minutes.
-    const std::filesystem::path memory = "/dev/shm";
-    const bool usable = ::access(memory.c_str(), W_OK) == 0;
-    const std::filesystem::path parent = usable ? memory : std::filesystem::temp_directory_path();
-    std::string name = (parent / "drench-test-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline std::string text_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);

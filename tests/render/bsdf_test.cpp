@@ -1,15 +1,14 @@
 // Surfaces: Fresnel and Snell, the cloth's densities and energy, textures where they belong.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <random>
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_dielectric.h"
 #include "render/material.h"
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {
@@ -117,8 +116,8 @@ TEST(Cloth, IsTheSameSeenFromTheOtherEnd) {
 
 TEST(Texture, LiesOnTheClothByItsCoordinates) {
   // A 2 x 2 picture: red, green above; blue, white below. u runs along x, v along z (sheet_mesh).
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("drench_weave_" + std::to_string(::getpid()) + ".png");
+  const TemporaryFolder folder;
+  const auto path = folder / "weave.png";
   write_png(path, 2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255});
   Shot shot = plain_shot(16, 4);
   shot.light = {sky(1)};
@@ -135,7 +134,6 @@ TEST(Texture, LiesOnTheClothByItsCoordinates) {
   // v = 0 is the picture's bottom and z = -1. Flat cloth under a sky of 1 shows its reflectance.
   const V3f blue = seen(-0.5, -0.5), white = seen(0.5, -0.5), red = seen(-0.5, 0.5),
             green = seen(0.5, 0.5);
-  std::filesystem::remove(path);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 0.8, 0.01);
   EXPECT_NEAR(red.x, 0.8 * 0.613, 0.01);
   EXPECT_NEAR(green.y, 0.8 * 0.916, 0.01);

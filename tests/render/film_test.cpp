@@ -9,16 +9,14 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <random>
 
 #include "render/color.h"
 #include "render/texture.h"
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {
@@ -27,13 +25,8 @@ namespace fs = std::filesystem;
 
 class FilmFile : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("drench_film_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   fs::path at(const std::string& name) const { return folder_ / name; }
-  fs::path folder_;
+  const TemporaryFolder folder_;
 };
 
 Film random_film(int width, int height) {
@@ -43,15 +36,6 @@ Film random_film(int width, int height) {
   for (int k = 0; k < width * height; ++k)
     film.rgba.insert(film.rgba.end(), {value(random), value(random), value(random), 0.75f});
   return film;
-}
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 TEST_F(FilmFile, ExrReturnsEveryValueToHalfPrecision) {
@@ -121,13 +105,13 @@ TEST_F(FilmFile, ExrThatIsDamagedIsRefused) {
   const auto refused = [&](const std::vector<char>& content) {
     std::ofstream(at("b.exr"), std::ios::binary)
         .write(content.data(), std::streamsize(content.size()));
-    return message_of([&] { read_exr(at("b.exr")); });
+    return error_of([&] { read_exr(at("b.exr")); });
   };
   EXPECT_NE(refused({}).find("b.exr"), std::string::npos);
   EXPECT_NE(refused({bytes.begin(), bytes.begin() + 100}), "");
   EXPECT_NE(refused({bytes.begin(), bytes.begin() + std::ptrdiff_t(bytes.size() / 2)}), "");
   EXPECT_NE(refused(std::vector<char>(5000, 'x')), "");
-  EXPECT_NE(message_of([&] { read_exr(at("none.exr")); }).find("none.exr"), std::string::npos);
+  EXPECT_NE(error_of([&] { read_exr(at("none.exr")); }).find("none.exr"), std::string::npos);
   // A header that promises 2^40 pixels: the data window's maximum corner is 4 ints after its name.
   std::vector<char> huge = bytes;
   const std::string name = "dataWindow";
@@ -162,7 +146,7 @@ TEST_F(FilmFile, TextureThatIsNoPictureIsRefused) {
   std::ofstream(at("a.jpg"), std::ios::binary) << "\xff\xd8\xff\xe0 and nothing more";
   std::ofstream(at("a.txt"), std::ios::binary) << "hello";
   for (const char* name : {"a.png", "a.jpg", "a.txt", "missing.png"})
-    EXPECT_NE(message_of([&] { read_texture(at(name)); }).find(name), std::string::npos) << name;
+    EXPECT_NE(error_of([&] { read_texture(at(name)); }).find(name), std::string::npos) << name;
 }
 
 TEST(Color, PublishedMatrixFromSrgb) {

@@ -17,7 +17,7 @@
 
 #include "render/color.h"
 #include "render/texture.h"
-#include "tests/contract/temporary_folder.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {

@@ -2,11 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
-#include <filesystem>
-
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {
@@ -123,7 +120,7 @@ struct EveryLight {
 };
 
 /// A map with a bright patch in a dim gradient.
-std::filesystem::path write_map() {
+std::filesystem::path write_map(const TemporaryFolder& folder) {
   Film film{32, 16, {}};
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 32; ++x)
@@ -131,15 +128,14 @@ std::filesystem::path write_map() {
         const bool bright = x >= 8 && x < 12 && y >= 3 && y < 6;
         film.rgba.push_back(value * (bright ? 8.f : 0.2f + 0.02f * float(15 - y)));
       }
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("drench_map_" + std::to_string(::getpid()) + ".exr");
+  const auto path = folder / "map.exr";
   write_exr(path, film, {});
   return path;
 }
 
 TEST(Estimators, AgreeOnEveryKindOfLight) {
-  const auto map = write_map();
-  const EveryLight scene(map);
+  const TemporaryFolder folder;
+  const EveryLight scene(write_map(folder));
   const auto mean = [&](Estimator estimator) {
     RenderOptions options;
     options.estimator = estimator;
@@ -147,7 +143,6 @@ TEST(Estimators, AgreeOnEveryKindOfLight) {
   };
   const Mean mis = mean(Estimator::mis), light = mean(Estimator::light_only),
              bsdf = mean(Estimator::bsdf_only);
-  std::filesystem::remove(map);
   // The means' own standard errors must be small enough for the comparison to say something.
   EXPECT_LT(mis.error, 0.003 * mis.value);
   EXPECT_LT(light.error, 0.01 * mis.value);
@@ -164,8 +159,8 @@ TEST(EnvironmentMap, ShowsRotatedColumnsAndUpwardRows) {
       const V3f rgb = y == 0 ? V3f(1, 0, 0) : x < 4 ? V3f(0, 1, 0) : V3f(0, 0, 1);
       film.rgba.insert(film.rgba.end(), {rgb.x, rgb.y, rgb.z, 1});
     }
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("drench_axes_" + std::to_string(::getpid()) + ".exr");
+  const TemporaryFolder folder;
+  const auto path = folder / "axes.exr";
   write_exr(path, film, {});
   Shot shot = plain_shot(4, 4);
   shot.light = {sky(1)};
@@ -180,7 +175,6 @@ TEST(EnvironmentMap, ShowsRotatedColumnsAndUpwardRows) {
   EXPECT_LT((seen({1, -0.2, 0}) - V3f(0, 0, 1)).length(), 1e-3);
   shot.light[0].rotation_deg = 180;
   EXPECT_LT((seen({1, -0.2, 0}) - V3f(0, 1, 0)).length(), 1e-3);
-  std::filesystem::remove(path);
 }
 
 }  // namespace

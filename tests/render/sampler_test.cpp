@@ -2,9 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
-#include <filesystem>
 #include <functional>
 #include <numeric>
 #include <random>
@@ -16,6 +13,7 @@
 #include "render/sampler.h"
 #include "render/sampling.h"
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {
@@ -207,14 +205,13 @@ TEST(ChiSquare, EnvironmentGradientAndMap) {
     const float value = k == 37 || k == 90 ? 30.f : 0.3f + 0.1f * float(k % 5);
     film.rgba.insert(film.rgba.end(), {value, value, value, 1});
   }
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("drench_chi_" + std::to_string(::getpid()) + ".exr");
+  const TemporaryFolder folder;
+  const auto path = folder / "map.exr";
   write_exr(path, film, {});
   Light light = sky(1);
   light.map = path;
   light.rotation_deg = 77;
   const Environment map(light, Environment::Sampling::on);
-  std::filesystem::remove(path);
   const Environment even(sky(1), Environment::Sampling::on);
   for (const Environment* environment : {&map, &even})
     EXPECT_LT(

@@ -4,10 +4,10 @@
 
 #include <limits>
 
-#include "pipeline/contract/error.h"
 #include "surfacing/surface.h"
 #include "tests/surfacing/mesh_checks.h"
 #include "tests/surfacing/scenes.h"
+#include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {
@@ -17,17 +17,8 @@ using Imath::V3f;
 
 constexpr double spacing = 0.01;  // m
 
-std::string message_of(const ParticleFrame& frame, const SurfaceSettings& settings) {
-  try {
-    surface_frame(frame, settings);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 void expect_message(const ParticleFrame& frame, const SurfaceSettings& settings, const char* part) {
-  const std::string message = message_of(frame, settings);
+  const std::string message = test::error_of([&] { surface_frame(frame, settings); });
   EXPECT_NE(message.find(part), std::string::npos) << "message: " << message;
 }
 

@@ -4,9 +4,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <cstring>
-
 #include "surfacing/surface.h"
+#include "tests/same_bits.h"
 #include "tests/surfacing/scenes.h"
 
 namespace drench {
@@ -16,20 +15,13 @@ using namespace surfacing_scenes;
 using Imath::V3d;
 using Imath::V3f;
 using Imath::V3i;
+using test::same_bits;
 
 constexpr double spacing = 0.01;  // m
 
-template <class T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
-}
-
 void expect_same(const TriangleMesh& a, const TriangleMesh& b) {
   EXPECT_FALSE(a.triangle.empty());
-  EXPECT_TRUE(same_bits(a.position, b.position));
-  EXPECT_TRUE(same_bits(a.velocity, b.velocity));
-  EXPECT_TRUE(same_bits(a.normal, b.normal));
-  EXPECT_TRUE(same_bits(a.triangle, b.triangle));
+  test::expect_same_bits(a, b);
 }
 
 TEST(SurfaceBits, AreTheSameForAnyThreadCount) {

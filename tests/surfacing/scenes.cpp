@@ -107,6 +107,15 @@ ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed) {
   return frame;
 }
 
+ParticleFrame two_balls(size_t n, double spacing, int steps, double gap) {
+  ParticleFrame frame = relaxed_ball(n, spacing, steps, 1);
+  ParticleFrame other = relaxed_ball(n, spacing, steps, 2);
+  const double distance = 2 * ball_radius(n, spacing) + gap * spacing;
+  for (V3f& p : other.position) p.x += static_cast<float>(distance);
+  append(frame, other);
+  return frame;
+}
+
 ParticleFrame shaken_box(V3f corner, V3i cells, double spacing, double shake, uint32_t seed) {
   std::mt19937 random(seed);
   std::vector<V3d> points;

@@ -16,6 +16,9 @@ double ball_radius(size_t n, double spacing);
 /// turn of 1 rad/s about Y.
 ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed);
 
+/// Two balls of n particles each whose walls stand `gap` spacings apart along X.
+ParticleFrame two_balls(size_t n, double spacing, int steps, double gap);
+
 /// A lattice of cells.x * cells.y * cells.z particles, the lowest at half a spacing from `corner`,
 /// each shaken evenly by up to `shake` spacings along each axis.
 ParticleFrame shaken_box(Imath::V3f corner, Imath::V3i cells, double spacing, double shake,

@@ -126,12 +126,8 @@ TEST(SurfaceSplash, KeepsTheVolumeOfItsParticles) {
 
 TEST(SurfaceTouchingSpheres, AreOneBodyWhenTheyOverlapAndTwoWhenApart) {
   for (const double gap : {-1.0, 4.0}) {  // spacings
-    ParticleFrame frame = relaxed_ball(4000, spacing, 20, 1);
-    ParticleFrame other = relaxed_ball(4000, spacing, 20, 2);
-    for (V3f& p : other.position)
-      p.x += static_cast<float>(2 * ball_radius(4000, spacing) + gap * spacing);
-    append(frame, other);
-    EXPECT_EQ(topology_of(surface_frame(frame, {})).components, gap < 0 ? 1u : 2u) << gap;
+    const TriangleMesh mesh = surface_frame(two_balls(4000, spacing, 20, gap), {});
+    EXPECT_EQ(topology_of(mesh).components, gap < 0 ? 1u : 2u) << gap;
   }
 }
 
