@@ -1,6 +1,5 @@
 #include "pipeline/contract/shot_table.h"
 
-#include <algorithm>
 #include <type_traits>
 
 namespace drench::shot_table {
@@ -294,7 +293,7 @@ std::vector<Parameter> surface_and_camera_rows() {
   };
 }
 
-std::vector<Parameter> look_rows() {
+std::vector<Parameter> light_rows() {
   return {
       row<&Light::type>("light", "type", "", none, render, "kind of light")
           .one_of({"rectangle", "sphere", "sun", "environment"})
@@ -326,7 +325,11 @@ std::vector<Parameter> look_rows() {
                          "sky without a map: radiance below the horizon over that at the zenith")
           .as(Kind::spectrum)
           .only(environment),
+  };
+}
 
+std::vector<Parameter> material_rows() {
+  return {
       row<&Material::name>("material", "name", "", none, render, "built-in ones may be redefined")
           .needed()
           .identity(),
@@ -352,7 +355,11 @@ std::vector<Parameter> look_rows() {
       row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,
                                    "edge of one of its squares")
           .only(diffuse),
+  };
+}
 
+std::vector<Parameter> picture_rows() {
+  return {
       row<&Ground::present>("ground", "present", "", none, render,
                             "a horizontal plane that is drawn; true when [ground] is written"),
       row<&Ground::height>("ground", "height", "m", place, render, "its y"),
@@ -457,8 +464,8 @@ const std::vector<Section>& sections() {
 const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
-    for (const auto& part :
-         {shot_rows(), fluid_rows(), cloth_rows(), surface_and_camera_rows(), look_rows()}) {
+    for (const auto& part : {shot_rows(), fluid_rows(), cloth_rows(), surface_and_camera_rows(),
+                             light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

@@ -123,6 +123,12 @@ class ValueReader {
     return value->get();
   }
 
+  bool boolean(const toml::node& node) const {
+    const auto* value = node.as_boolean();
+    if (value == nullptr) wrong_type();
+    return value->get();
+  }
+
   const toml::array& array_of(const toml::node& node, size_t size) const {
     const auto* array = node.as_array();
     if (array == nullptr || array->size() != size) wrong_type();
@@ -188,6 +194,11 @@ class ValueReader {
       return value;
     }
     return V3f(vector(node));
+  }
+
+  V2i cells(const toml::node& node) const {
+    const toml::array& array = array_of(node, 2);
+    return {int(whole(array[0])), int(whole(array[1]))};
   }
 
   Timeline frames(const toml::node& node, Timeline timeline) const {
@@ -286,6 +297,13 @@ template <class T>
 const T& as(const void* field) {
   return *static_cast<const T*>(field);
 }
+template <class T>
+void put(void* field, T value) {
+  as<T>(field) = std::move(value);
+}
+void put_choice(void* field, int index) {  // an enum of int's size whose values count from 0
+  std::memcpy(field, &index, sizeof index);
+}
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -341,49 +359,31 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
   const auto one_vector = [&](const toml::node& node) { return reader.vector(node); };
   switch (parameter.kind) {
     case Kind::boolean:
-      if (!value.is_boolean()) reader.wrong_type();
-      as<bool>(field) = value.as_boolean()->get();
-      break;
+      return put<bool>(field, reader.boolean(value));
     case Kind::integer:
-      as<int>(field) = int(reader.whole(value));
-      break;
+      return put<int>(field, int(reader.whole(value)));
     case Kind::natural:
-      as<uint32_t>(field) = uint32_t(reader.whole(value));
-      break;
+      return put<uint32_t>(field, uint32_t(reader.whole(value)));
     case Kind::number:
-      as<double>(field) = reader.limited(value);
-      break;
+      return put<double>(field, reader.limited(value));
     case Kind::text:
-      as<std::string>(field) = reader.file_name(value);
-      break;
+      return put<std::string>(field, reader.file_name(value));
     case Kind::name:
-      as<std::string>(field) = reader.name(value);
-      break;
+      return put<std::string>(field, reader.name(value));
     case Kind::path:
-      as<fs::path>(field) = reader.path(value);
-      break;
-    case Kind::choice: {
-      const int index = reader.choice(value);
-      std::memcpy(field, &index, sizeof index);
-      break;
-    }
+      return put<fs::path>(field, reader.path(value));
+    case Kind::choice:
+      return put_choice(field, reader.choice(value));
     case Kind::vector:
-      as<V3d>(field) = reader.vector(value);
-      break;
+      return put<V3d>(field, reader.vector(value));
     case Kind::colour:
-      as<V3f>(field) = reader.colour(value);
-      break;
+      return put<V3f>(field, reader.colour(value));
     case Kind::spectrum:
-      as<V3f>(field) = V3f(reader.vector(value));
-      break;
-    case Kind::cells: {
-      const toml::array& pair = reader.array_of(value, 2);
-      as<V2i>(field) = {int(reader.whole(pair[0])), int(reader.whole(pair[1]))};
-      break;
-    }
+      return put<V3f>(field, V3f(reader.vector(value)));
+    case Kind::cells:
+      return put<V2i>(field, reader.cells(value));
     case Kind::frames:
-      as<Timeline>(field) = reader.frames(value, as<Timeline>(field));
-      break;
+      return put<Timeline>(field, reader.frames(value, as<Timeline>(field)));
     case Kind::number_track:
       reader.track(as<Animated<double>>(field), value.is_array(), one_number);
       if (as<Animated<double>>(field).keys.empty()) reader.wrong_type();
@@ -391,17 +391,13 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::vector_track:
       reader.track(as<Animated<V3d>>(field), reader.is_keyed(), one_vector);
       break;
-    case Kind::track_mode: {
-      // The row's field is the camera's first member, its position.
+    case Kind::track_mode:  // the row's field is the camera's first member, its position
       as<Animated<V3d>>(field).interpolation = Interpolation(reader.choice(value));
       break;
-    }
     case Kind::vertices:
-      as<std::vector<uint32_t>>(field) = reader.vertices(value);
-      break;
+      return put<std::vector<uint32_t>>(field, reader.vertices(value));
     case Kind::box:
-      as<std::optional<std::pair<V3d, V3d>>>(field) = reader.box(value);
-      break;
+      return put<std::optional<std::pair<V3d, V3d>>>(field, reader.box(value));
     case Kind::grid_pins:
       break;
   }
