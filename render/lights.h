@@ -90,7 +90,6 @@ class Lights {
   }
 
   bool has_environment() const { return environment_.has_value(); }
-  bool samples_map() const { return environment_ && environment_->is_map(); }
   bool can_sample() const { return !shapes_.empty() || !suns_.empty() || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }

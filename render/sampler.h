@@ -2,7 +2,6 @@
 // Owen-scrambled Sobol points: the first two Sobol dimensions, padded for every event of a path.
 // Hash-based Owen scrambling after Burley 2020, "Practical Hash-based Owen Scrambling".
 
-#include <bit>
 #include <cstdint>
 
 #include "render/vector.h"

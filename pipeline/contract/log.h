@@ -2,7 +2,6 @@
 // Log lines on stderr: seconds since the start, the part, then key=value pairs.
 // 12.204 sim frame=37 particles=4.10M substeps=6 density_error=0.0008 ms=318
 
-#include <string>
 #include <string_view>
 
 namespace drench {

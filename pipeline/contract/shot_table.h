@@ -2,7 +2,6 @@
 // The one list of sections and keys of a shot file. Reading, checking, the lock file, the digests
 // and the reference all walk it.
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>

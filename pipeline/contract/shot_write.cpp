@@ -1,7 +1,6 @@
 // What is written of a shot: the lock file, the digests of the stages, the reference, a first shot.
 #include <fmt/format.h>
 
-#include <algorithm>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot_file.h"

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/device.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/frame_range.h"

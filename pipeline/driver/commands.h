@@ -2,7 +2,6 @@
 // The subcommands: read the shot, call the library, report. They throw; main alone catches.
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -96,11 +96,11 @@ Manifest::Manifest(fs::path file) : file_(std::move(file)) {
       ++damaged_lines_;
       break;
     }
-    const std::optional<json> object = checked(std::string_view(text).substr(begin, end - begin));
-    const std::optional<Record> record = object ? record_of(*object) : std::nullopt;
-    if (record) {
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    if (const std::optional<Record> record = parse_manifest_line(line)) {
       records_[record->file] = *record;
-    } else if (object && object->contains("dropped") && object->at("file").is_string()) {
+    } else if (const std::optional<json> object = checked(line);
+               object && object->contains("dropped") && object->at("file").is_string()) {
       records_.erase(object->at("file").get<std::string>());
     } else {
       ++damaged_lines_;

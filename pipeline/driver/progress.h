@@ -1,7 +1,6 @@
 #pragma once
 // What the user sees while the driver works: a bar on a terminal, one line per event otherwise.
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <map>

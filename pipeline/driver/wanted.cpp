@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "build_id.h"
-#include "pipeline/contract/error.h"
+#include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 

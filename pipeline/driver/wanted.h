@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "pipeline/contract/shot.h"
-#include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/manifest.h"
 
 namespace drench {

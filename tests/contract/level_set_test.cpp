@@ -4,7 +4,6 @@
 #include <openvdb/tools/Interpolation.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "pipeline/contract/particles_file.h"
 #include "tests/contract/sphere_mesh.h"

@@ -2,7 +2,6 @@
 
 #include <tbb/global_control.h>
 
-#include <cmath>
 #include <limits>
 #include <random>
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/contract/shot_table.h"

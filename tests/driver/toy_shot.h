@@ -3,7 +3,6 @@
 // order them, fail them and make inputs come out the same. Only the executor's own rules are tested
 // with it; the program is tested with the real stages.
 
-#include <array>
 #include <filesystem>
 #include <functional>
 #include <map>
