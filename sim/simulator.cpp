@@ -65,10 +65,6 @@ struct Simulator::Implementation {
     solver->load(scene.start);
     limits = solver->measure();
     time = -shot.preroll;
-    if (shot.preroll > 0) {
-      StepReport report;
-      advance_to(0, report, {});
-    }
     solver->refresh();
   }
 
@@ -81,7 +77,7 @@ struct Simulator::Implementation {
       const FluidEmitter& source = shot.fluid.emitter[e];
       const V3d direction = source.direction.normalized();
       for (;; ++emitted[e]) {
-        const double leaves = source.start + double(emitted[e]) * a / source.speed;
+        const double leaves = source.start - shot.preroll + double(emitted[e]) * a / source.speed;
         if (leaves > until || leaves > source.stop) break;
         if (solver->particles() + layer[e].offset.size() > max_particles) {
           throw Error(fmt::format("{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
@@ -147,10 +143,11 @@ struct Simulator::Implementation {
                        &v = particle ? state.velocity : state.cloth_velocity;
     const double speed = std::sqrt(double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
     throw Error(fmt::format(
-        "{}: the simulation blew up after frame {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m has speed "
+        "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m has speed "
         "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a smaller shot.time_step, "
         "a softer cloth or a larger fluid.sound_speed",
-        shot.file.string(), frame, time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
+        shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll", time, steps,
+        particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]), scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string()));
   }
@@ -221,8 +218,20 @@ Simulator::Simulator(const Shot& shot, const SimulatorOptions& options)
 Simulator::~Simulator() = default;
 Simulator::Simulator(Simulator&&) noexcept = default;
 
+StepReport Simulator::preroll(const std::function<bool()>& keep_going) {
+  Implementation& s = *implementation_;
+  StepReport report;
+  if (s.time >= 0) return report;
+  log_info("sim", fmt::format("pre-roll of {} s", s.shot.preroll));
+  s.advance_to(0, report, keep_going);
+  s.solver->refresh();
+  s.describe(report);
+  return report;
+}
+
 StepReport Simulator::advance_frame(const std::function<bool()>& keep_going) {
   Implementation& s = *implementation_;
+  preroll(keep_going);
   StepReport report;
   s.advance_to(s.frame_time(s.frame + 1), report, keep_going);
   ++s.frame;

@@ -35,16 +35,19 @@ struct StepReport {
 
 class Simulator {
  public:
-  /// Builds the initial state. @throws Error if fluid overlaps cloth, a cloth mesh is degenerate or not
+  /// Builds the initial state, before any pre-roll. @throws Error if fluid overlaps cloth, a cloth mesh is degenerate or not
   /// manifold, nothing is to be simulated, or cuda is asked for and absent.
   Simulator(const Shot& shot, const SimulatorOptions& options);
   ~Simulator();
   Simulator(Simulator&&) noexcept;
 
-  /// Runs the pre-roll, if any (once, before the first frame).
-  /// Advances from frame to frame + 1; steps land exactly on frames.
+  /// Runs the pre-roll, if any is left: the state is the first frame's then. To be called before the
+  /// first frame is read, unless the state comes from a checkpoint.
   /// @param keep_going  asked before every step; false throws Stopped after the current state is whole.
   /// @throws Error on NaN or blow-up with frame, time, particle and the last good checkpoint.
+  StepReport preroll(const std::function<bool()>& keep_going = {});
+  /// Advances from frame to frame + 1; steps land exactly on frames. What is left of the pre-roll goes
+  /// first. @param keep_going, @throws as above.
   StepReport advance_frame(const std::function<bool()>& keep_going = {});
 
   int frame() const;  // film frame of the current state

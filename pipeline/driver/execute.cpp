@@ -197,7 +197,9 @@ void Executor::start_simulation() {
   checkpoints_.remove_stale();
   compute(simulate_arena_, [&] { simulation_ = stages_.start_simulation(); });
   const std::string& file = plan_.simulation.checkpoint;
-  if (file.empty()) return;
+  if (file.empty()) {
+    return compute(simulate_arena_, [&] { simulation_->preroll([this] { return !stopping(); }); });
+  }
   check_input(file);
   try {
     compute(simulate_arena_, [&] { simulation_->read_checkpoint(folder_ / file); });

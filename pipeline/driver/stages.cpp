@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/error.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/particles_file.h"
 #include "pipeline/driver/contact_sheet.h"
@@ -50,6 +49,7 @@ class ShotSimulation final : public Simulation {
       : simulator_(shot, options), fluid_(shot.fluid.present()) {}
 
   int frame() const override { return simulator_.frame(); }
+  void preroll(const std::function<bool()>& keep_going) override { simulator_.preroll(keep_going); }
   StageReport advance(const std::function<bool()>& keep_going) override {
     const StepReport step = simulator_.advance_frame(keep_going);
     return report_of(step, simulator_.device_name());

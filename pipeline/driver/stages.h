@@ -22,11 +22,13 @@ struct StageReport {
   std::vector<WrittenFile> files;
 };
 
-/// The state of one simulation; begins at the shot's first frame or before it.
+/// The state of one simulation; begins before the pre-roll of the shot's first frame.
 class Simulation {
  public:
   virtual ~Simulation() = default;
   virtual int frame() const = 0;
+  /// To the first frame, before it is written; nothing to do after read_checkpoint. @throws as advance.
+  virtual void preroll(const std::function<bool()>& keep_going) = 0;
   /// To the next frame. @throws Stopped when keep_going says so; Error on blow-up.
   virtual StageReport advance(const std::function<bool()>& keep_going) = 0;
   virtual std::vector<WrittenFile> write_frame(const std::filesystem::path& folder) const = 0;

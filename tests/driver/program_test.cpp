@@ -318,5 +318,33 @@ TEST(Program, StopsOnRequestWithinTenSecondsAndContinues) {
   }
 }
 
+// A pre-roll of 1000 s is stopped like any frame: nothing is written of the first one.
+TEST(Program, StopsInThePreroll) {
+  const TinyShot shot;
+  Child child(DRENCH_PROGRAM, shot.words("run", {"--set", "shot.preroll=1000"}), shot.folder());
+  while (child.running() && !has(child.err_so_far(), "pre-roll")) std::this_thread::sleep_for(1ms);
+  child.send(SIGINT);
+  const Ended ended = child.wait();
+  EXPECT_EQ(ended.code, stopped) << ended.err;
+  EXPECT_TRUE(has(ended.err, "pre-roll of 1000 s")) << ended.err;
+  EXPECT_FALSE(fs::exists(shot.out() / layout::particles(1001)));
+}
+
+// A run that continues from a checkpoint has the pre-roll behind it.
+TEST(Program, RunsThePrerollOnce) {
+  const std::vector<std::string> preroll{"--set", "shot.preroll=0.1"};
+  const TinyShot shot;
+  const Ended first = shot.run("run", preroll);
+  EXPECT_EQ(first.code, done) << first.err;
+  EXPECT_TRUE(has(first.err, "pre-roll of 0.1 s")) << first.err;
+  const auto expected = shot.digests();
+  EXPECT_NE(expected, undisturbed_digests());
+  fs::remove(shot.out() / layout::particles(1012));
+  const Ended second = shot.run("run", preroll);
+  EXPECT_EQ(second.code, done) << second.err;
+  EXPECT_FALSE(has(second.err, "pre-roll")) << second.err;
+  EXPECT_EQ(shot.digests(), expected);
+}
+
 }  // namespace
 }  // namespace drench

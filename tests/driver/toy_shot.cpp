@@ -27,6 +27,7 @@ class ToySimulation : public Simulation {
       : settings_(settings), stages_(stages), frame_(settings.first) {}
 
   int frame() const override { return frame_; }
+  void preroll(const std::function<bool()>&) override {}
   StageReport advance(const std::function<bool()>& keep_going) override {
     stages_.log(Step::simulate, frame_ + 1, true);
     if (stages_.hook) stages_.hook(Step::simulate, frame_ + 1);

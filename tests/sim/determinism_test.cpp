@@ -114,6 +114,30 @@ TEST_F(Resume, GivesTheSameBitsAsARunWithoutPause) {
   EXPECT_TRUE(bytes(folder_ / "whole") == bytes(folder_ / "resumed"));
 }
 
+// Asked to stop before every fifth step of the pre-roll; the state is whole each time.
+TEST_F(Resume, OfAPrerollThatWasStoppedGivesTheSameBits) {
+  Shot slow = shot();
+  slow.preroll = 0.05;
+  Simulator whole(slow, {}), stopped(slow, {});
+  const int steps = whole.preroll().steps;
+  EXPECT_EQ(whole.preroll().steps, 0) << "there is one pre-roll";
+  int stops = 0;
+  for (bool done = false; !done; ++stops) {
+    ASSERT_LE(stops, steps);
+    int asked = 0;
+    try {
+      stopped.preroll([&] { return ++asked <= 5; });
+      done = true;
+    } catch (const Stopped&) {
+    }
+  }
+  EXPECT_EQ(stops, steps / 5 + 1);
+  for (Simulator* simulator : {&whole, &stopped}) simulator->advance_frame();
+  whole.write_checkpoint(folder_ / "whole");
+  stopped.write_checkpoint(folder_ / "stopped");
+  EXPECT_TRUE(bytes(folder_ / "whole") == bytes(folder_ / "stopped"));
+}
+
 TEST_F(Resume, RefusesADamagedCheckpoint) {
   Simulator simulator(shot(), {});
   simulator.write_checkpoint(folder_ / "good");

@@ -86,6 +86,22 @@ TEST(Emitter, DeliversAreaTimesSpeedTimesTime) {
   EXPECT_NEAR(volume, expected, 0.02 * expected);
 }
 
+// Its start counts from the simulation's start: the pre-roll fills the shot's first frame.
+TEST(Emitter, DeliversDuringThePreroll) {
+  Shot shot = empty_shot();
+  shot.preroll = 0.4;
+  FluidEmitter emitter;
+  emitter.center = V3d(0), emitter.radius = 0.1, emitter.speed = 1, emitter.start = 0.2;
+  shot.fluid.emitter.push_back(emitter);
+  Simulator simulator(shot, {});
+  EXPECT_EQ(simulator.particles().position.size(), 0u);
+  const double volume = double(simulator.preroll().particles) * 1e-6,
+               expected = M_PI * 0.01 * 1 * 0.2;
+  EXPECT_EQ(simulator.frame(), 1001);
+  // 0.9 % as above and one layer of 20, since the first leaves at once.
+  EXPECT_NEAR(volume, expected, 0.06 * expected);
+}
+
 TEST(Emitter, IsSilentBeforeItsStartAndAfterItsStop) {
   Shot shot = empty_shot();
   shot.timeline = {1001, 1005, 20};
