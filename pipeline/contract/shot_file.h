@@ -31,8 +31,11 @@ enum class Stage { simulate, mesh, render };
 /// Hash of the settings this stage reads and no others (frames excluded; keys are per frame).
 Digest stage_settings_digest(const Shot& shot, Stage stage);
 
-/// The parameter table as Markdown (docs/shots.md) and a commented starting shot (`drench init`).
+/// The parameter table as Markdown (docs/shots.md), a commented starting shot (`drench init`), and
+/// a valid shot of every key with its form, limits and meaning (`drench init --reference`).
+/// @throws Error if no shot can have the name.
 std::string shot_reference_markdown();
 std::string starting_shot(const std::string& name);
+std::string reference_shot(const std::string& name);
 
 }  // namespace drench

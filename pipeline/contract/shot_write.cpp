@@ -1,7 +1,6 @@
 // What is written of a shot: the lock file, the digests of the stages, the reference, a first shot.
 #include <fmt/format.h>
 
-
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/contract/shot_table.h"
@@ -126,7 +125,9 @@ std::string shot_reference_markdown() {
       "names file, line, key, value and limits. SI units; a key that is not SI says so in its "
       "name. "
       "Paths are relative to the shot's folder. Right-handed axes, Y up.\n\n"
-      "`drench init NAME` writes a commented shot to start from. `--set section.key=value` changes "
+      "`drench init NAME` writes a commented shot to start from, with `--reference` one of every "
+      "key. "
+      "`--set section.key=value` changes "
       "one "
       "value from the command line, with the same checks; of things that may stand more than once "
       "it "
@@ -189,24 +190,93 @@ Shot first_shot(const std::string& name) {
   return shot;
 }
 
+/// One of everything that may stand more than once, and one of each type: what must be given is,
+/// the rest is left at its default.
+Shot one_of_everything(const std::string& name) {
+  Shot shot;
+  shot.name = name;
+  shot.fluid.box.push_back({.min = {-0.5, 0, -0.5}, .max = {0.5, 0.1, 0.5}});
+  shot.fluid.sphere.push_back({.center = {0, 0.5, 0}, .radius = 0.1});
+  shot.fluid.emitter.push_back({.center = {0.6, 0.6, 0}, .radius = 0.05, .speed = 1});
+  shot.fluid.drops.push_back(
+      {.min = {-0.5, 0.7, -0.5}, .max = {0.5, 0.9, 0.5}, .radius = 0.03, .count = 4});
+  Cloth sheet;
+  sheet.pin.resize(2);
+  sheet.pin[0].vertices = {0, 64};
+  sheet.pin[1].box = {V3d(-0.5, 0.9, 0.4), V3d(0.5, 1.1, 0.6)};
+  shot.cloth.push_back(sheet);
+  for (const LightType type :
+       {LightType::rectangle, LightType::sphere, LightType::sun, LightType::environment}) {
+    Light light;
+    light.type = type;
+    light.name += std::to_string(shot.light.size() + 1);
+    shot.light.push_back(light);
+  }
+  for (const MaterialType type :
+       {MaterialType::dielectric, MaterialType::cloth, MaterialType::diffuse}) {
+    Material material;
+    material.type = type;
+    material.name = "material" + std::to_string(shot.material.size() + 1);
+    shot.material.push_back(material);
+  }
+  return shot;
+}
+
+void check_name(const std::string& name) {
+  const char* const why = shot_table::file_name_problem(name);
+  if (why) throw Error(fmt::format("the name \"{}\" cannot be used: {}", name, why));
+}
+
+/// The field as TOML; empty if it has no value to show.
+std::string shown_value(const Parameter& parameter, void* object) {
+  if (parameter.kind == Kind::grid_pins) return "\"corners\"";
+  return shot_table::value_text(parameter, parameter.field(object));
+}
+
+constexpr const char* quality_text =
+    "\n# Overrides for --quality preview.\n"
+    "[quality.preview.fluid]\nspacing = 0.02\n\n"
+    "[quality.preview.render]\nwidth = 320\nheight = 180\nsamples = 8\n";
+
 }  // namespace
 
-std::string starting_shot(const std::string& name) {
-  if (const char* const why = shot_table::file_name_problem(name)) {
-    throw Error(fmt::format("the name \"{}\" cannot be used: {}", name, why));
-  }
-  Shot shot = first_shot(name);
+std::string reference_shot(const std::string& name) {
+  check_name(name);
+  Shot shot = one_of_everything(name);
   std::string text = fmt::format(
-      "# {}: a ball of water falls on a sheet held at its corners.\n"
-      "# Every key is here; those behind '#' show their defaults. docs/shots.md explains them "
-      "all.\n"
+      "# {}: every key that a shot may have, at its default where it has one.\n"
+      "# Delete what the shot does not need; [[...]] may stand any number of times or not at all.\n"
       "# Units are SI, Y is up, colours are linear ACEScg, \"srgb(r, g, b)\" or \"#rrggbb\".\n",
       name);
   shot_table::for_each_object(shot, [&](const Section& section, void* object, const std::string&) {
     text += fmt::format("\n# {}\n{}\n", section.description, header_of(section));
     for (const Parameter* p : shot_table::parameters_of(section.name)) {
       if (!shot_table::applies(*p, section, object)) continue;
-      std::string value = p->field ? shot_table::value_text(*p, p->field(object)) : "\"corners\"";
+      const std::string value = shown_value(*p, object);
+      const std::string line =
+          value.empty() ? fmt::format("# {} = ...", p->key) : fmt::format("{} = {}", p->key, value);
+      text += fmt::format("{}  # {}{}: {}\n", line, p->required ? "required; " : "",
+                          value_column(*p), p->description);
+    }
+  });
+  return text + quality_text;
+}
+
+std::string starting_shot(const std::string& name) {
+  check_name(name);
+  Shot shot = first_shot(name);
+  std::string text = fmt::format(
+      "# {}: a ball of water falls on a sheet held at its corners.\n"
+      "# Keys behind '#' show their defaults. `drench init NAME --reference` writes every key "
+      "there "
+      "is.\n"
+      "# Units are SI, Y is up, colours are linear ACEScg, \"srgb(r, g, b)\" or \"#rrggbb\".\n",
+      name);
+  shot_table::for_each_object(shot, [&](const Section& section, void* object, const std::string&) {
+    text += fmt::format("\n# {}\n{}\n", section.description, header_of(section));
+    for (const Parameter* p : shot_table::parameters_of(section.name)) {
+      if (!shot_table::applies(*p, section, object)) continue;
+      std::string value = shown_value(*p, object);
       const bool absent = value.empty();
       if (absent) value = "\"\"";
       const bool standard = absent || (p->field && value == default_text(*p));
@@ -215,11 +285,7 @@ std::string starting_shot(const std::string& name) {
                           p->description);
     }
   });
-  text +=
-      "\n# Overrides for --quality preview.\n"
-      "[quality.preview.fluid]\nspacing = 0.02\n\n"
-      "[quality.preview.render]\nwidth = 320\nheight = 180\nsamples = 8\n";
-  return text;
+  return text + quality_text;
 }
 
 }  // namespace drench

@@ -24,7 +24,7 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   std::filesystem::path folder, name;
-  bool verbose = false, json = false;
+  bool verbose = false, json = false, reference = false;
 };
 
 void add_common(CLI::App& command, Arguments& arguments) {
@@ -93,9 +93,13 @@ void add_commands(CLI::App& app, Arguments& arguments) {
 
   CLI::App* init = app.add_subcommand("init", "write a commented starting shot");
   init->add_option("NAME", arguments.name, "shot to write, with or without .toml")->required();
+  init->add_flag("--reference", arguments.reference, "every key there is, with form and limits");
   add_common(*init, arguments);
   init->footer("Example: drench init shots/rain");
-  init->callback([&arguments] { init_command(arguments.name); });
+  init->callback([&arguments] {
+    init_command(arguments.name,
+                 arguments.reference ? InitialShot::reference : InitialShot::commented);
+  });
 }
 
 void say(const char* kind, const char* text) { std::fprintf(stderr, "drench: %s%s\n", kind, text); }

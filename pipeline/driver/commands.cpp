@@ -257,7 +257,7 @@ void verify_command(const fs::path& folder, OutputFormat format) {
                   folder.string(), bad.size(), records.size(), bad.front()));
 }
 
-void init_command(const fs::path& name) {
+void init_command(const fs::path& name, InitialShot kind) {
   fs::path file = name;
   if (file.extension() != ".toml") file += ".toml";
   if (file.stem().empty()) throw Error(fmt::format("'{}': names no shot", name.string()));
@@ -265,7 +265,9 @@ void init_command(const fs::path& name) {
     throw Error(fmt::format("{}: exists already; it was left as it is. Choose another name",
                             file.string()));
   }
-  write_file_whole(file, starting_shot(file.stem().string()));
+  const std::string shot = file.stem().string();
+  write_file_whole(file,
+                   kind == InitialShot::reference ? reference_shot(shot) : starting_shot(shot));
   log_info("driver",
            fmt::format("wrote {}; `drench run {}` makes its frames", file.string(), file.string()));
 }

@@ -35,8 +35,9 @@ void plan_command(const ShotArguments& arguments);
 void clean_command(const ShotArguments& arguments);
 /// Hashes every file. @throws Error if one is missing or damaged; the next run makes those again.
 void verify_command(const std::filesystem::path& folder, OutputFormat format);
-/// Writes NAME.toml, a commented starting shot. @throws Error if it exists.
-void init_command(const std::filesystem::path& name);
+enum class InitialShot { commented, reference };
+/// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.
+void init_command(const std::filesystem::path& name, InitialShot kind);
 
 /// Every step, in order.
 std::vector<Step> all_steps();

@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <sstream>
+
 #include "pipeline/contract/colour.h"
+#include "pipeline/contract/shot_table.h"
+#include "pipeline/contract/shot_value.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {
@@ -145,6 +150,62 @@ TEST_F(ShotFile, StartsWithAShotThatIsValidInEveryQuality) {
   EXPECT_EQ(shot.cloth.at(0).pin.at(0).vertices.size(), 4u);
   EXPECT_LT(parse(text, {.quality = "preview", .set = {}}).render.width, shot.render.width);
   EXPECT_NE(test::error_of([] { starting_shot("../evil"); }).find("'/'"), std::string::npos);
+}
+
+/// One object of every section, as a shot has it before anything is read.
+std::map<std::string_view, void*> fresh_objects(Shot& shot) {
+  shot.fluid.box.resize(1), shot.fluid.sphere.resize(1), shot.fluid.emitter.resize(1);
+  shot.fluid.drops.resize(1), shot.cloth.resize(1), shot.cloth[0].pin.resize(1);
+  shot.light.resize(1), shot.material.resize(1);
+  std::map<std::string_view, void*> objects;
+  shot_table::for_each_object(shot, [&](const auto& section, void* object, const std::string&) {
+    objects[section.name] = object;
+  });
+  return objects;
+}
+
+// What need not be given stands at its default; names and pins say which thing they are of.
+TEST_F(ShotFile, ReferenceIsAValidShotAtItsDefaults) {
+  const std::string text = reference_shot("all");
+  Shot fresh, shot = parse(text);
+  const auto objects = fresh_objects(fresh);
+  size_t compared = 0;
+  shot_table::for_each_object(
+      shot, [&](const auto& section, void* object, const std::string& path) {
+        if (path.starts_with("material[") && path < "material[3]") return;  // the built-in ones
+        for (const shot_table::Parameter* p : shot_table::parameters_of(section.name)) {
+          const bool given = p->required || p->fixed || p->key == "name" || !p->field;
+          if (given || section.name == "cloth.pin") continue;
+          if (!shot_table::applies(*p, section, object)) continue;
+          EXPECT_EQ(shot_table::value_text(*p, p->field(object)),
+                    shot_table::value_text(*p, p->field(objects.at(section.name))))
+              << path << '.' << p->key;
+          ++compared;
+        }
+      });
+  EXPECT_GT(compared, 80u);
+  EXPECT_LT(parse(text, {.quality = "preview", .set = {}}).render.width, shot.render.width);
+  EXPECT_NE(test::error_of([] { reference_shot("../evil"); }).find("'/'"), std::string::npos);
+}
+
+TEST_F(ShotFile, ReferenceHoldsEveryKeyWithUnitAndMeaning) {
+  std::istringstream lines(reference_shot("all"));
+  std::map<std::string, std::string> comment;  // by "section.key"
+  std::string section;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('[')) section = line.substr(line.find_first_not_of('['));
+    section = section.substr(0, section.find(']'));
+    const size_t equals = line.find(" = "), note = line.find("  # ");
+    if (line.starts_with('[') || equals == std::string::npos || note == std::string::npos) continue;
+    const size_t key = line.starts_with("# ") ? 2 : 0;
+    comment[section + "." + line.substr(key, equals - key)] += line.substr(note);
+  }
+  for (const shot_table::Parameter& p : shot_table::parameters()) {
+    const std::string& text = comment[std::string(p.section) + "." + std::string(p.key)];
+    EXPECT_NE(text.find(p.description), std::string::npos) << p.section << '.' << p.key;
+    EXPECT_NE(text.find(p.unit), std::string::npos) << p.section << '.' << p.key;
+    EXPECT_EQ(text.find("required") != std::string::npos, p.required) << p.section << '.' << p.key;
+  }
 }
 
 TEST_F(ShotFile, IsDocumentedByThePageInDocs) {

@@ -280,9 +280,15 @@ TEST(Program, ReportsFramesBeyondAShortenedRangeAndCleansThem) {
 TEST(Program, WritesAStartingShotAndNeverOverOne) {
   const TemporaryFolder folder;
   const std::string name = (folder.path() / "rain").string();
-  EXPECT_EQ(run_program(DRENCH_PROGRAM, {"init", name}, folder.path()).code, done);
-  const Ended plan = run_program(DRENCH_PROGRAM, {"plan", name + ".toml"}, folder.path());
-  EXPECT_EQ(plan.code, done) << plan.err;
+  for (const std::vector<std::string>& options : {std::vector<std::string>{}, {"--reference"}}) {
+    fs::remove(name + ".toml");
+    std::vector<std::string> words{"init", name};
+    words.insert(words.end(), options.begin(), options.end());
+    EXPECT_EQ(run_program(DRENCH_PROGRAM, words, folder.path()).code, done);
+    const Ended plan = run_program(DRENCH_PROGRAM, {"plan", name + ".toml"}, folder.path());
+    EXPECT_EQ(plan.code, done) << plan.err;
+    EXPECT_EQ(has(text_of(name + ".toml"), "[[fluid.emitter]]"), !options.empty());
+  }
   put_text(name + ".toml", "mine");
   EXPECT_EQ(run_program(DRENCH_PROGRAM, {"init", name}, folder.path()).code, user_error);
   EXPECT_EQ(text_of(name + ".toml"), "mine");

@@ -1,5 +1,6 @@
 // Every scene of shots/ is valid in every quality it names, and can be started.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -62,6 +63,15 @@ TEST(Shots, AreValidInEveryQualityLockToTheSameAndStart) {
   }
 }
 
+// What init writes can be simulated, not only read.
+TEST(Shots, OfInitCanBeStarted) {
+  for (const std::string& text : {starting_shot("first"), reference_shot("all")}) {
+    const sim::Scene scene = sim::build_scene(parse_shot(text, "init.toml"));
+    EXPECT_EQ(scene.sheet.size(), 1u);
+    EXPECT_FALSE(scene.start.id.empty());
+  }
+}
+
 // ./run makes the preview unless told otherwise: it must differ from the final.
 TEST(Shots, HaveACheaperPreview) {
   for (const fs::path& file : shot_files()) {
@@ -79,7 +89,7 @@ TEST(Shots, SayWhatTheyShow) {
   const std::string page = read_text(DRENCH_SOURCE_DIR "/shots/README.md");
   for (const fs::path& file : shot_files()) {
     EXPECT_TRUE(read_text(file).starts_with("# ")) << file;
-    EXPECT_NE(page.find("`" + file.stem().string() + "`"), std::string::npos) << file;
+    EXPECT_NE(page.find(fmt::format("`{}`", file.stem().string())), std::string::npos) << file;
   }
 }
 
