@@ -10,6 +10,8 @@
 //           template <class T> struct Sum;            members of type T or Vec3<T>, zero to start with
 //           template <class T> void pair(i, j, sum) const;
 //           void finish(int i, const Sum<float>&) const;
+//           static constexpr bool costly;             a pair costs more than to see that all eight are out of reach
+//           float support_radius;
 // Filter:   hides neighbours behind a sheet (passes/sheet_filter.h); NoFilter hides none.
 
 #include <bit>
@@ -121,7 +123,10 @@ class Tile {
     if (data_.size() < size_t(stride_) * columns) data_.resize(size_t(stride_) * columns);
     for (int c = 0; c < columns; ++c) {
       float* to = data_.data() + size_t(c) * stride_;
-      for (int r = 0; r < rows; ++r) to = std::copy_n(in.column[c] + begin[r], count[r], to);
+      for (int r = 0; r < rows; to += count[r++]) {
+        // Whole packs, past the end of the row too: what comes next overwrites that.
+        for (int k = 0; k < count[r]; k += Pack::size) Pack::load(in.column[c] + begin[r] + k).store(to + k);
+      }
       // Far away in position; the last column may be the plane of a sheet, which must be far as well.
       std::fill_n(to, stride_ - size_, c < 3 || c == columns - 1 ? far_away : 0.f);
     }
@@ -155,6 +160,7 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& phys
   for (int c = 0; c < N + Filter::columns; ++c) column[c] = tile.column(c);
   for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][place]);
   const P i = self.as();
+  [[maybe_unused]] const Pack reach2(physics.support_radius * physics.support_radius);
   auto hidden_from = [&] {
     if constexpr (Filter::columns > 0) return filter.template self<N>(column, place);
     else return 0;
@@ -165,7 +171,11 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& phys
     if constexpr (Filter::columns > 0) {
       m.value[0] = filter.template move_hidden_away<N>(hidden_from, column, k, {m.value[0], m.value[1], m.value[2]});
     }
-    physics.pair(i, m.as(), sum);
+    const P j = m.as();
+    if constexpr (Physics::costly) {
+      if ((length2(i.position - j.position) < reach2).bits() == 0) continue;
+    }
+    physics.pair(i, j, sum);
   }
   if constexpr (Filter::columns > 0) filter.finish(particle, hidden_from.any);
   return sum;

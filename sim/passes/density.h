@@ -41,6 +41,7 @@ DRENCH_HD float wall_density_share(const Walls& walls, Vec3<float> p, float inve
 template <class Kernel>
 struct DensitySum {
   static constexpr int columns = 3;
+  static constexpr bool costly = false;
   VecView position;
   const float* cloth_share;  // share of density replaced by cloth, or null
   float *density, *pressure_term, *inverse_density;  // kg/m^3, p / rho^2 in m^5/(kg s^2), m^3/kg

@@ -11,6 +11,7 @@ namespace drench::sim::DRENCH_BACKEND {
 // A wall is a half-space of rest density; free slip but for mu.
 struct PressureViscosity {
   static constexpr int columns = 8;
+  static constexpr bool costly = true;
   VecView position, velocity;
   const float *pressure_term, *inverse_density;  // p / rho^2, 1 / rho
   VecView acceleration;
