@@ -19,7 +19,8 @@ struct Source {
 Source lattice_box(const FluidBox& box, double a) {
   Source source{{}, box.velocity};
   int n[3];
-  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int(std::lround((box.max[k] - box.min[k]) / a)));
+  // Whole cells only: a layer that reached out of the box could stand in a wall.
+  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int((box.max[k] - box.min[k]) / a + 1e-6));
   for (int z = 0; z < n[2]; ++z) {
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x) source.position.push_back(box.min + V3d(x + 0.5, y + 0.5, z + 0.5) * a);

@@ -55,6 +55,21 @@ TEST(Drops, AreAsManyAsAskedAndApart) {
 
 TEST(Drops, ThatCannotFitAreRefused) { EXPECT_THROW(sim::build_scene(rain(5000, 0, 1)), Error); }
 
+// 30, 30.6 and 30.4 cells of 10 mm: whole cells alone, none of which reaches out of the box.
+TEST(Box, HoldsTheWholeCellsThatFit) {
+  Shot shot = empty_shot();
+  const FluidBox box{V3d(-0.15), V3d(0.15, 0.156, 0.154), V3d(0)};
+  shot.fluid.box.push_back(box);
+  const sim::InitialFluid fluid = sim::initial_fluid(shot);
+  EXPECT_EQ(fluid.position.size(), size_t(30 * 30 * 30));
+  for (const V3d& p : fluid.position) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_GE(p[k] - box.min[k], 0.005 - 1e-9);
+      EXPECT_GE(box.max[k] - p[k], 0.005 - 1e-9);
+    }
+  }
+}
+
 // A ball of radius 0.1 m has 4/3 pi 10^3 = 4189 lattice cells; the surface is uncertain by a few of
 // its 1257 cells in random sign: 1 %.
 TEST(Sphere, HasTheVolumeOfItsRadius) {
