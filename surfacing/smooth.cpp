@@ -237,8 +237,9 @@ void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& 
     constexpr uint32_t drop = 1000;  // vertices; scaling suits a compact part of any shape
     if (parts.first[c + 1] - parts.first[c] > drop)
       return shift_part(mesh, rings, parts, c, wanted[c]);
-    const double now = volume_of(mesh, rings, parts, c);
-    if (now > 0.01 * wanted[c]) return scale_part(mesh, parts, c, wanted[c] / now);
+    // A cavity has a negative volume; a part that collapsed is not smoothed at all.
+    const double kept = volume_of(mesh, rings, parts, c) / wanted[c];
+    if (kept > 0.01) return scale_part(mesh, parts, c, 1 / kept);
     for_each_member(parts, c, [&](uint32_t v) { mesh.position[v] = raw[v]; });
   });
 }

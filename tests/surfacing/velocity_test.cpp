@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-
 #include "surfacing/surface.h"
 #include "tests/surfacing/scenes.h"
 
