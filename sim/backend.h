@@ -1,6 +1,7 @@
 #pragma once
-// Physics is written once and compiled twice: by g++ for TBB and by nvcc for CUDA. Everything that is
-// compiled twice lives in drench::sim::DRENCH_BACKEND, or the linker would merge the two silently.
+// Physics is written once and compiled twice: by g++ for TBB and by nvcc for CUDA. Everything that
+// is compiled twice lives in drench::sim::DRENCH_BACKEND, or the linker would merge the two
+// silently.
 
 #if defined(__CUDACC__)
 #define DRENCH_BACKEND cuda
@@ -11,4 +12,3 @@
 #define DRENCH_HD inline __attribute__((always_inline))
 #define DRENCH_LAMBDA [=]
 #endif
-

@@ -41,18 +41,23 @@ struct Reader {
   const std::byte* end;
   const std::filesystem::path& path;
   void take(void* to, uint64_t size) {
-    if (size > uint64_t(end - at)) throw Error(path.string() + ": the checkpoint is cut short. Delete it; the run starts from an earlier one");
+    if (size > uint64_t(end - at))
+      throw Error(path.string() +
+                  ": the checkpoint is cut short. Delete it; the run starts from an earlier one");
     if (size) std::memcpy(to, at, size);
     at += size;
   }
   template <class T>
-  void operator()(T& value) { take(&value, sizeof value); }
+  void operator()(T& value) {
+    take(&value, sizeof value);
+  }
   template <class T>
   void operator()(std::vector<T>& values) {
     uint64_t count = 0;
     (*this)(count);
     if (count > uint64_t(end - at) / sizeof(T)) {
-      throw Error(path.string() + ": the checkpoint is damaged. Delete it; the run starts from an earlier one");
+      throw Error(path.string() +
+                  ": the checkpoint is damaged. Delete it; the run starts from an earlier one");
     }
     values.resize(count);
     take(values.data(), count * sizeof(T));
@@ -80,12 +85,15 @@ Checkpoint read_checkpoint(const std::filesystem::path& path, const Digest& layo
   Digest content;
   reader.take(found, sizeof found);
   reader(checkpoint.layout), reader(content);
-  if (std::memcmp(found, magic, sizeof magic) != 0 || content != hash_bytes(reader.at, reader.end - reader.at)) {
-    throw Error(path.string() + ": not a whole checkpoint. Delete it; the run starts from an earlier one");
+  if (std::memcmp(found, magic, sizeof magic) != 0 ||
+      content != hash_bytes(reader.at, reader.end - reader.at)) {
+    throw Error(path.string() +
+                ": not a whole checkpoint. Delete it; the run starts from an earlier one");
   }
   if (checkpoint.layout != layout) {
-    throw Error(path.string() + ": the checkpoint belongs to other settings of the shot. Delete it, or run the "
-                                "shot into another folder");
+    throw Error(path.string() +
+                ": the checkpoint belongs to other settings of the shot. Delete it, or run the "
+                "shot into another folder");
   }
   transfer(reader, checkpoint);
   return checkpoint;

@@ -11,12 +11,12 @@ namespace drench::sim {
 
 struct Checkpoint {
   int frame = 0;
-  double time = 0;                   // s since the first frame
+  double time = 0;  // s since the first frame
   uint64_t steps = 0;
   int next_id = 0;
-  std::vector<uint64_t> emitted;     // layers that left each emitter
+  std::vector<uint64_t> emitted;  // layers that left each emitter
   HostState state;
-  Digest layout;                     // of the shot's settings and the file's layout
+  Digest layout;  // of the shot's settings and the file's layout
 };
 
 WrittenFile write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);

@@ -1,4 +1,5 @@
-// Sheets: grids and meshes with masses and springs (section 4 of the seed), and the checks they must pass.
+// Sheets: grids and meshes with masses and springs (section 4 of the seed), and the checks they
+// must pass.
 
 #include <algorithm>
 #include <cmath>
@@ -23,9 +24,10 @@ struct SpringMap {
   void add(uint32_t a, uint32_t b, double k) { stiffness[ordered(a, b)] += k; }
 };
 
-/// A grid of cells. Every cell gives its four sides half an adjacent spring each, stiffer across and
-/// softer along a stretched cell (k = modulus x width / length), both its diagonals, and a quarter of
-/// its mass to each corner: the lattice's moduli then hold up to the rim (tests/validation/README.md).
+/// A grid of cells. Every cell gives its four sides half an adjacent spring each, stiffer across
+/// and softer along a stretched cell (k = modulus x width / length), both its diagonals, and a
+/// quarter of its mass to each corner: the lattice's moduli then hold up to the rim
+/// (tests/validation/README.md).
 void build_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
   const int nu = cloth.cells.x, nv = cloth.cells.y;
   const double du = cloth.u.length() / nu, dv = cloth.v.length() / nv;
@@ -65,7 +67,8 @@ void build_from_file(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
   sheet.mass.assign(sheet.position.size(), 0.0);
   std::map<Edge, std::vector<uint32_t>> opposite;
   for (const auto& t : sheet.triangle) {
-    const V3d e = sheet.position[t.y] - sheet.position[t.x], f = sheet.position[t.z] - sheet.position[t.x];
+    const V3d e = sheet.position[t.y] - sheet.position[t.x],
+              f = sheet.position[t.z] - sheet.position[t.x];
     for (int k = 0; k < 3; ++k) {
       const uint32_t a = t[k], b = t[(k + 1) % 3];
       sheet.mass[a] += cloth.areal_density * e.cross(f).length() / 6;
@@ -80,7 +83,8 @@ void build_from_file(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
 
 std::string corner_text(const Sheet& sheet, const Imath::Vec3<uint32_t>& t) {
   const V3d p = sheet.position[t.x];
-  return fmt::format("vertices {}, {}, {} near ({:.4g}, {:.4g}, {:.4g}) m", t.x, t.y, t.z, p.x, p.y, p.z);
+  return fmt::format("vertices {}, {}, {} near ({:.4g}, {:.4g}, {:.4g}) m", t.x, t.y, t.z, p.x, p.y,
+                     p.z);
 }
 
 void check_triangles(const Sheet& sheet) {
@@ -88,28 +92,32 @@ void check_triangles(const Sheet& sheet) {
   std::vector<char> used(sheet.position.size(), 0);
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     const auto& t = sheet.triangle[k];
-    const V3d e = sheet.position[t.y] - sheet.position[t.x], f = sheet.position[t.z] - sheet.position[t.x];
+    const V3d e = sheet.position[t.y] - sheet.position[t.x],
+              f = sheet.position[t.z] - sheet.position[t.x];
     const double longest = std::max({e.length2(), f.length2(), (f - e).length2()});
     if (!(e.cross(f).length() > 1e-6 * longest)) {
-      throw Error(fmt::format("cloth \"{}\": triangle {} ({}) is degenerate: it has no area, so contact has no "
-                              "normal there. Remove it or merge its vertices",
-                              sheet.name, k, corner_text(sheet, t)));
+      throw Error(fmt::format(
+          "cloth \"{}\": triangle {} ({}) is degenerate: it has no area, so contact has no "
+          "normal there. Remove it or merge its vertices",
+          sheet.name, k, corner_text(sheet, t)));
     }
     for (int c = 0; c < 3; ++c) {
       used[t[c]] = 1;
       const auto [place, fresh] = directed.emplace(std::pair(t[c], t[(c + 1) % 3]), k);
       if (!fresh) {
-        throw Error(fmt::format("cloth \"{}\": triangle {} ({}) shares the edge {}-{} with triangle {} in the same "
-                                "direction: the mesh is not manifold, or is wound both ways. Split the sheet "
-                                "there or reverse the triangle",
-                                sheet.name, k, corner_text(sheet, t), t[c], t[(c + 1) % 3], place->second));
+        throw Error(fmt::format(
+            "cloth \"{}\": triangle {} ({}) shares the edge {}-{} with triangle {} in the same "
+            "direction: the mesh is not manifold, or is wound both ways. Split the sheet "
+            "there or reverse the triangle",
+            sheet.name, k, corner_text(sheet, t), t[c], t[(c + 1) % 3], place->second));
       }
     }
   }
   for (size_t v = 0; v < used.size(); ++v) {
     if (!used[v]) {
-      throw Error(fmt::format("cloth \"{}\": vertex {} belongs to no triangle and would have no mass. Remove it",
-                              sheet.name, v));
+      throw Error(fmt::format(
+          "cloth \"{}\": vertex {} belongs to no triangle and would have no mass. Remove it",
+          sheet.name, v));
     }
   }
 }
@@ -120,8 +128,9 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
     size_t held = 0;
     for (uint32_t v : cloth.pin[k].vertices) {
       if (v >= sheet.position.size()) {
-        throw Error(fmt::format("cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
-                                sheet.name, k + 1, v, sheet.position.size()));
+        throw Error(fmt::format(
+            "cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
+            sheet.name, k + 1, v, sheet.position.size()));
       }
       sheet.pinned[v] = true;
       ++held;
@@ -130,13 +139,16 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
       const auto& [low, high] = *cloth.pin[k].box;
       for (size_t v = 0; v < sheet.position.size(); ++v) {
         const V3d p = sheet.position[v];
-        if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y || p.z > high.z) continue;
+        if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y ||
+            p.z > high.z)
+          continue;
         sheet.pinned[v] = true;
         ++held;
       }
     }
     if (held == 0) {
-      throw Error(fmt::format("cloth \"{}\": pin {} holds no vertex. Enlarge its box or remove it", sheet.name, k + 1));
+      throw Error(fmt::format("cloth \"{}\": pin {} holds no vertex. Enlarge its box or remove it",
+                              sheet.name, k + 1));
     }
   }
 }
@@ -152,7 +164,8 @@ Sheet build_sheet(const Cloth& cloth) {
   } else {
     build_from_file(cloth, sheet, springs);
   }
-  if (sheet.triangle.empty()) throw Error("cloth \"" + sheet.name + "\": the mesh has no triangles");
+  if (sheet.triangle.empty())
+    throw Error("cloth \"" + sheet.name + "\": the mesh has no triangles");
   check_triangles(sheet);
   sheet.rest = sheet.position;
   for (const auto& [edge, k] : springs.stiffness) {

@@ -22,7 +22,10 @@ class Column {
  public:
   Column() = default;
   Column(Column&& other) noexcept { swap(other); }
-  Column& operator=(Column&& other) noexcept { swap(other); return *this; }
+  Column& operator=(Column&& other) noexcept {
+    swap(other);
+    return *this;
+  }
   ~Column() { cudaFree(data_); }
 
   void resize(size_t size) {  // contents are kept; grown by halves so that emitters rarely copy
@@ -32,7 +35,8 @@ class Column {
       check_cuda(cudaMalloc(&data, capacity * sizeof(T)), "allocating a column");
       check_cuda(cudaMemset(data, 0, capacity * sizeof(T)), "clearing a column");
       if (size_) {
-        check_cuda(cudaMemcpy(data, data_, size_ * sizeof(T), cudaMemcpyDeviceToDevice), "growing a column");
+        check_cuda(cudaMemcpy(data, data_, size_ * sizeof(T), cudaMemcpyDeviceToDevice),
+                   "growing a column");
       }
       cudaFree(data_);
       data_ = data, capacity_ = capacity;
@@ -41,7 +45,8 @@ class Column {
   }
   void upload(const T* source, size_t size, size_t at = 0) {
     if (size == 0) return;
-    check_cuda(cudaMemcpy(data_ + at, source, size * sizeof(T), cudaMemcpyHostToDevice), "uploading");
+    check_cuda(cudaMemcpy(data_ + at, source, size * sizeof(T), cudaMemcpyHostToDevice),
+               "uploading");
   }
   void download(T* target, size_t size) const {
     if (size == 0) return;
@@ -53,7 +58,8 @@ class Column {
   T* data() const { return data_; }
   size_t size() const { return size_; }
   void swap(Column& other) noexcept {
-    std::swap(data_, other.data_), std::swap(size_, other.size_), std::swap(capacity_, other.capacity_);
+    std::swap(data_, other.data_), std::swap(size_, other.size_),
+        std::swap(capacity_, other.capacity_);
   }
 
  private:
@@ -63,7 +69,8 @@ class Column {
 
 #else
 
-/// Eight elements of room stand behind the last one, so that a pack may be read where the column ends.
+/// Eight elements of room stand behind the last one, so that a pack may be read where the column
+/// ends.
 template <class T>
 class Column {
  public:
@@ -74,7 +81,9 @@ class Column {
   void download(T* target, size_t size) const {
     if (size) std::memcpy(target, data_.data(), size * sizeof(T));
   }
-  void clear_bytes(int byte) { if (!data_.empty()) std::memset(data_.data(), byte, data_.size() * sizeof(T)); }
+  void clear_bytes(int byte) {
+    if (!data_.empty()) std::memset(data_.data(), byte, data_.size() * sizeof(T));
+  }
   T* data() const { return const_cast<T*>(data_.data()); }
   size_t size() const { return size_; }
   void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
@@ -97,7 +106,8 @@ template <class T>
 T value_at(const Column<T>& column, size_t place) {
 #if defined(__CUDACC__)
   T value;
-  check_cuda(cudaMemcpy(&value, column.data() + place, sizeof(T), cudaMemcpyDeviceToHost), "reading back");
+  check_cuda(cudaMemcpy(&value, column.data() + place, sizeof(T), cudaMemcpyDeviceToHost),
+             "reading back");
   return value;
 #else
   return column.data()[place];

@@ -23,7 +23,8 @@ Source lattice_box(const FluidBox& box, double a) {
   for (int k = 0; k < 3; ++k) n[k] = std::max(1, int((box.max[k] - box.min[k]) / a + 1e-6));
   for (int z = 0; z < n[2]; ++z) {
     for (int y = 0; y < n[1]; ++y) {
-      for (int x = 0; x < n[0]; ++x) source.position.push_back(box.min + V3d(x + 0.5, y + 0.5, z + 0.5) * a);
+      for (int x = 0; x < n[0]; ++x)
+        source.position.push_back(box.min + V3d(x + 0.5, y + 0.5, z + 0.5) * a);
     }
   }
   return source;
@@ -59,13 +60,17 @@ Source lattice_ball(const FluidSphere& sphere, double a) {
 /// Centres drawn evenly in the box, each at least a drop's width from the others.
 std::vector<V3d> drop_centres(const FluidDrops& drops, double reach, double a, uint32_t seed) {
   std::mt19937 random(seed);
-  const auto unit = [&] { return double(random()) / 4294967296.0; };  // std distributions differ by library
+  const auto unit = [&] {
+    return double(random()) / 4294967296.0;
+  };  // std distributions differ by library
   const V3d low = drops.min + V3d(reach), high = drops.max - V3d(reach);
   std::vector<V3d> centres;
   for (int tries = 0; int(centres.size()) < drops.count; ++tries) {
     if (tries > 2000 * drops.count) {
-      throw Error("fluid.drops: only " + std::to_string(centres.size()) + " of " + std::to_string(drops.count) +
-                  " drops fit into the box without touching. Use fewer or smaller drops, or a larger box");
+      throw Error(
+          "fluid.drops: only " + std::to_string(centres.size()) + " of " +
+          std::to_string(drops.count) +
+          " drops fit into the box without touching. Use fewer or smaller drops, or a larger box");
     }
     V3d c;
     for (int k = 0; k < 3; ++k) c[k] = low[k] + unit() * std::max(0.0, high[k] - low[k]);
@@ -80,11 +85,12 @@ Source lattice_drops(const FluidDrops& drops, double a, uint32_t seed) {
   if (drops.count <= 0) return source;
   const std::vector<V3d> ball = ball_points(std::max(drops.radius, a), a);
   size_t each = std::max<size_t>(1, points_within(ball, drops.radius)), larger = 0;
-  if (drops.particles > 0) each = size_t(drops.particles / drops.count), larger = drops.particles % drops.count;
+  if (drops.particles > 0)
+    each = size_t(drops.particles / drops.count), larger = drops.particles % drops.count;
   if (each + (larger > 0) > ball.size() || each == 0) {
     throw Error("fluid.drops: " + std::to_string(drops.particles) + " particles in " +
-                std::to_string(drops.count) + " drops do not fit a radius of " + std::to_string(drops.radius) +
-                " m. Use a larger radius or other counts");
+                std::to_string(drops.count) + " drops do not fit a radius of " +
+                std::to_string(drops.radius) + " m. Use a larger radius or other counts");
   }
   const double reach = ball[each + (larger > 0) - 1].length() + 0.5 * a;
   for (const V3d& c : drop_centres(drops, reach, a, seed)) {
@@ -120,7 +126,8 @@ class Occupancy {
 
  private:
   std::array<int64_t, 3> cell(const V3d& p) const {
-    return {int64_t(std::floor(p.x / a_)), int64_t(std::floor(p.y / a_)), int64_t(std::floor(p.z / a_))};
+    return {int64_t(std::floor(p.x / a_)), int64_t(std::floor(p.y / a_)),
+            int64_t(std::floor(p.z / a_))};
   }
   static uint64_t key(int64_t x, int64_t y, int64_t z) {
     return (uint64_t(x & 0x1fffff) << 42) | (uint64_t(y & 0x1fffff) << 21) | uint64_t(z & 0x1fffff);
@@ -139,7 +146,8 @@ EmitterLayer emitter_layer(const FluidEmitter& emitter, double a) {
   const int reach = int(std::ceil(emitter.radius / a));
   for (int j = -reach; j <= reach; ++j) {
     for (int i = -reach; i <= reach; ++i) {
-      if ((i * i + j * j) * a * a <= emitter.radius * emitter.radius) layer.offset.push_back((u * i + v * j) * a);
+      if ((i * i + j * j) * a * a <= emitter.radius * emitter.radius)
+        layer.offset.push_back((u * i + v * j) * a);
     }
   }
   return layer;

@@ -8,17 +8,17 @@ namespace drench::sim::DRENCH_BACKEND {
 /// Closest point of triangle (a, b, c) to p: weights sum to 1 and are not negative.
 template <class T>
 struct ClosestPoint {
-  T wa, wb, wc;   // barycentric weights
-  T distance2;    // m^2
+  T wa, wb, wc;  // barycentric weights
+  T distance2;   // m^2
 };
 
 /// A triangle with what every point that asks for its closest point needs.
 template <class T>
 struct PreparedTriangle {
-  Vec3<T> a, ab, ac;                          // m
-  T d11, d12, d22;                            // m^2: ab.ab, ab.ac, ac.ac
-  T inverse_ab, inverse_ac, inverse_bc;       // 1/m^2, of the squared lengths
-  T inverse;                                  // 1/m^4, of the squared double area
+  Vec3<T> a, ab, ac;                     // m
+  T d11, d12, d22;                       // m^2: ab.ab, ab.ac, ac.ac
+  T inverse_ab, inverse_ac, inverse_bc;  // 1/m^2, of the squared lengths
+  T inverse;                             // 1/m^4, of the squared double area
 };
 
 template <class T>
@@ -26,15 +26,23 @@ DRENCH_HD PreparedTriangle<T> prepare_triangle(Vec3<T> a, Vec3<T> b, Vec3<T> c) 
   const T tiny(1e-30f), one(1.f);  // an edge of no length has its closest point at its start
   const Vec3<T> ab = b - a, ac = c - a, bc = c - b;
   const T d11 = dot(ab, ab), d12 = dot(ab, ac), d22 = dot(ac, ac);
-  return {a, ab, ac, d11, d12, d22, one / maximum(d11, tiny), one / maximum(d22, tiny),
-          one / maximum(dot(bc, bc), tiny), one / maximum(d11 * d22 - d12 * d12, tiny)};
+  return {a,
+          ab,
+          ac,
+          d11,
+          d12,
+          d22,
+          one / maximum(d11, tiny),
+          one / maximum(d22, tiny),
+          one / maximum(dot(bc, bc), tiny),
+          one / maximum(d11 * d22 - d12 * d12, tiny)};
 }
 
 /// The foot of p on the plane of the triangle: p = a + v ab + w ac + something normal.
 template <class T>
 struct PlaneFoot {
-  Vec3<T> ap;   // m, p - a
-  T p1, p2;     // m^2, ap.ab, ap.ac
+  Vec3<T> ap;  // m, p - a
+  T p1, p2;    // m^2, ap.ab, ap.ac
   T v, w;
 };
 
@@ -45,8 +53,9 @@ DRENCH_HD PlaneFoot<T> plane_foot(Vec3<T> p, const PreparedTriangle<T>& t) {
   return {ap, p1, p2, (t.d22 * p1 - t.d12 * p2) * t.inverse, (t.d11 * p2 - t.d12 * p1) * t.inverse};
 }
 
-/// A squared distance that the triangle is not nearer than: to its plane and, in the plane, past the edge line
-/// that the foot lies farthest beyond. Cheap, and exact but for corners; less what rounding may add.
+/// A squared distance that the triangle is not nearer than: to its plane and, in the plane, past
+/// the edge line that the foot lies farthest beyond. Cheap, and exact but for corners; less what
+/// rounding may add.
 template <class T>
 DRENCH_HD T distance2_bound(const PlaneFoot<T>& f, const PreparedTriangle<T>& t) {
   const T v = max0(-f.v), w = max0(-f.w), u = max0(f.v + f.w - T(1.f));
@@ -64,12 +73,14 @@ DRENCH_HD ClosestPoint<T> closest_point(const PlaneFoot<T>& f, const PreparedTri
   const Vec3<T> bc = t.ac - t.ab, bp = f.ap - t.ab;
   const T t_ab = clamped(f.p1 * t.inverse_ab), t_ac = clamped(f.p2 * t.inverse_ac),
           t_bc = clamped(dot(bp, bc) * t.inverse_bc);
-  const T d_ab = length2(f.ap - t.ab * t_ab), d_ac = length2(f.ap - t.ac * t_ac), d_bc = length2(bp - bc * t_bc);
+  const T d_ab = length2(f.ap - t.ab * t_ab), d_ac = length2(f.ap - t.ac * t_ac),
+          d_bc = length2(bp - bc * t_bc);
   T vb = t_ab, vc = T(0.f), best = d_ab;  // weights of b and c
   const auto use_ac = d_ac < best;
   vb = select(use_ac, T(0.f), vb), vc = select(use_ac, t_ac, vc), best = select(use_ac, d_ac, best);
   const auto use_bc = d_bc < best;
-  vb = select(use_bc, T(1.f) - t_bc, vb), vc = select(use_bc, t_bc, vc), best = select(use_bc, d_bc, best);
+  vb = select(use_bc, T(1.f) - t_bc, vb), vc = select(use_bc, t_bc, vc),
+  best = select(use_bc, d_bc, best);
   vb = select(inside, f.v, vb), vc = select(inside, f.w, vc);
   best = select(inside, length2(f.ap - t.ab * f.v - t.ac * f.w), best);
   return {T(1.f) - vb - vc, vb, vc, best};

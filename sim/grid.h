@@ -26,8 +26,9 @@ struct GridShape {
   DRENCH_HD int cell(Vec3<float> p) const { return index(cell_x(p.x), cell_y(p.y), cell_z(p.z)); }
 };
 
-/// A grid over the box [low, high] with cells of at least `edge`; coarser when the box would need more
-/// than 2^25 cells. The origin lies on the lattice of cells, so that whole-lattice moves change nothing.
+/// A grid over the box [low, high] with cells of at least `edge`; coarser when the box would need
+/// more than 2^25 cells. The origin lies on the lattice of cells, so that whole-lattice moves
+/// change nothing.
 inline GridShape make_grid_shape(Vec3<float> low, Vec3<float> high, float edge) {
   for (;; edge *= 1.5f) {
     const double e = edge;

@@ -1,8 +1,8 @@
 #pragma once
-// SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6, spiky, and the
-// viscosity kernel's Laplacian; and their integrals over a flat
-// layer and over the half-space beyond it, the wall functions of the seed's eqs (8) and (9).
-// q = distance / h throughout. Closed forms and their derivation: tests/validation/README.md, section 4.
+// SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6, spiky, and
+// the viscosity kernel's Laplacian; and their integrals over a flat layer and over the half-space
+// beyond it, the wall functions of the seed's eqs (8) and (9). q = distance / h throughout. Closed
+// forms and their derivation: tests/validation/README.md, section 4.
 
 #include "sim/pack.h"
 
@@ -68,7 +68,8 @@ DRENCH_HD T viscosity_halfspace(T q) {
   return max0(T(15.f) * (T(0.5f) - p + p * p * p - T(0.5f) * p * p * p * p));
 }
 
-/// Shapes (without factor) of the two kernels that density may be summed with, of the squared distance.
+/// Shapes (without factor) of the two kernels that density may be summed with, of the squared
+/// distance.
 struct Spiky {
   template <class T>
   static DRENCH_HD T shape(T r2, T h) {

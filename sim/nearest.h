@@ -1,8 +1,8 @@
 #pragma once
-// Nearest triangle of every particle within reach (eq 5 of the seed with the exact distance in place of
-// the centroid's). The triangle that was nearest a step ago bounds the search, and a particle that was found
-// far off is left out until it or the cloth has moved as far. On a CPU core eight neighbours walk the polygon
-// grid together, on the GPU every thread its own.
+// Nearest triangle of every particle within reach (eq 5 of the seed with the exact distance in
+// place of the centroid's). The triangle that was nearest a step ago bounds the search, and a
+// particle that was found far off is left out until it or the cloth has moved as far. On a CPU core
+// eight neighbours walk the polygon grid together, on the GPU every thread its own.
 
 #include "sim/geometry.h"
 #include "sim/passes/polygon_grid.h"
@@ -19,8 +19,8 @@ struct NearestOutput {
 
 inline NearestOutput nearest_output(State& state, float reach) {
   FluidState& f = state.fluid;
-  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(),
-          reach, 1.5f * reach, state.cloth.moved};
+  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(), reach,
+          1.5f * reach,      state.cloth.moved};
 }
 
 #if defined(__CUDACC__)
@@ -31,30 +31,32 @@ inline void find_nearest_triangles(State& state, float reach) {
   const VecView position = f.position.view();
   const NearestOutput out = nearest_output(state, reach);
   const int* before = f.memory_triangle.data();
-  parallel_for("nearest triangle", f.count, DRENCH_LAMBDA(int i) {
-    out.triangle[i] = -1;
-    out.far_by[i] -= out.cloth_moved;
-    if (out.far_by[i] > 0.f) return;
-    const Vec3<float> p = position[i];
-    float best = out.search * out.search;
-    int nearest = -1;
-    const auto test = [&](const PreparedTriangle<float>& triangle, int t) {
-      const ClosestPoint<float> foot = closest_point(plane_foot(p, triangle), triangle);
-      if (foot.distance2 < best) {
-        best = foot.distance2, nearest = t;
-        out.weight_b[i] = foot.wb, out.weight_c[i] = foot.wc;
-      }
-    };
-    if (before[i] >= 0) {
-      Vec3<float> a, b, c;
-      polygons.corners(before[i], a, b, c);
-      test(prepare_triangle(a, b, c), before[i]);
-    }
-    polygons.for_each_near_box(p, p, sqrtf(best), [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
-    const bool found = best < out.reach * out.reach;
-    if (found) out.triangle[i] = nearest;
-    out.far_by[i] = found ? 0.f : sqrtf(best) - out.reach;
-  });
+  parallel_for(
+      "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
+        out.triangle[i] = -1;
+        out.far_by[i] -= out.cloth_moved;
+        if (out.far_by[i] > 0.f) return;
+        const Vec3<float> p = position[i];
+        float best = out.search * out.search;
+        int nearest = -1;
+        const auto test = [&](const PreparedTriangle<float>& triangle, int t) {
+          const ClosestPoint<float> foot = closest_point(plane_foot(p, triangle), triangle);
+          if (foot.distance2 < best) {
+            best = foot.distance2, nearest = t;
+            out.weight_b[i] = foot.wb, out.weight_c[i] = foot.wc;
+          }
+        };
+        if (before[i] >= 0) {
+          Vec3<float> a, b, c;
+          polygons.corners(before[i], a, b, c);
+          test(prepare_triangle(a, b, c), before[i]);
+        }
+        polygons.for_each_near_box(p, p, sqrtf(best),
+                                   [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
+        const bool found = best < out.reach * out.reach;
+        if (found) out.triangle[i] = nearest;
+        out.far_by[i] = found ? 0.f : sqrtf(best) - out.reach;
+      });
   state.cloth.moved = 0.f;
 }
 
@@ -70,8 +72,9 @@ struct NearestOfPack {
   DRENCH_HD void test(const PolygonView& polygons, int k) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
-    const PreparedTriangle<Pack> t{all(one.a), all(one.ab), all(one.ac), one.d11, one.d12, one.d22,
-                                   one.inverse_ab, one.inverse_ac, one.inverse_bc, one.inverse};
+    const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
+                                   one.d12,        one.d22,     one.inverse_ab, one.inverse_ac,
+                                   one.inverse_bc, one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
     const Mask may = (distance2_bound(plane, t) < best) & !same(which, triangle);
@@ -104,7 +107,8 @@ struct NearestOfPack {
 /// Up to eight particles that lie close together. Those of a row of cells are handed in one by one.
 class PackOfNeighbours {
  public:
-  PackOfNeighbours(const PolygonView& polygons, const VecView& position, const int* before, const NearestOutput& out)
+  PackOfNeighbours(const PolygonView& polygons, const VecView& position, const int* before,
+                   const NearestOutput& out)
       : polygons_(polygons), position_(position), before_(before), out_(out) {}
   ~PackOfNeighbours() { flush(); }
 
@@ -114,8 +118,8 @@ class PackOfNeighbours {
   }
 
  private:
-  /// First the triangles that were nearest a step ago, then all whose box comes within the distance that is
-  /// left. A tie keeps the older triangle.
+  /// First the triangles that were nearest a step ago, then all whose box comes within the distance
+  /// that is left. A tie keeps the older triangle.
   void flush() {
     if (count_ == 0) return;
     for (int k = count_; k < 8; ++k) member_[k] = member_[0];
@@ -124,7 +128,8 @@ class PackOfNeighbours {
     const LaneIndex old = load(before_, member);
     if (is_index(old).bits()) pack.test_each(polygons_, old);
     const float extra = std::sqrt(largest_lane(pack.best));
-    const Vec3<float> low{smallest_lane(pack.p.x), smallest_lane(pack.p.y), smallest_lane(pack.p.z)};
+    const Vec3<float> low{smallest_lane(pack.p.x), smallest_lane(pack.p.y),
+                          smallest_lane(pack.p.z)};
     const Vec3<float> high{largest_lane(pack.p.x), largest_lane(pack.p.y), largest_lane(pack.p.z)};
     polygons_.for_each_range(low, high, extra, [&](int from, int to) {
       for (int k = from; k < to; k += 8) {
@@ -170,12 +175,15 @@ inline void find_nearest_triangles(State& state, float reach) {
   const GridShape g = f.grid;
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
     for (int row = range.begin(); row < range.end(); ++row) {
-      PackOfNeighbours near(polygons, position, before, out), unknown(polygons, position, before, out);
+      PackOfNeighbours near(polygons, position, before, out),
+          unknown(polygons, position, before, out);
       for (int i = cell_start[row * g.nx]; i < cell_start[(row + 1) * g.nx]; ++i) {
         out.triangle[i] = -1;
         out.far_by[i] -= out.cloth_moved;
-        if (before[i] >= 0) near.add(i, 2.f * reach);
-        else if (out.far_by[i] <= 0.f) unknown.add(i, 2.f * reach);
+        if (before[i] >= 0)
+          near.add(i, 2.f * reach);
+        else if (out.far_by[i] <= 0.f)
+          unknown.add(i, 2.f * reach);
       }
     }
   });

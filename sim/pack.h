@@ -1,6 +1,6 @@
 #pragma once
-// Eight floats in one AVX2 register, with the operations that pass functors use on plain floats too.
-// GCC vector operators; square root by intrinsic, which a lane loop would cost 10-40 % more.
+// Eight floats in one AVX2 register, with the operations that pass functors use on plain floats
+// too. GCC vector operators; square root by intrinsic, which a lane loop would cost 10-40 % more.
 
 #include <cmath>
 
@@ -65,8 +65,8 @@ DRENCH_HD Pack maximum(Pack a, Pack b) { return Pack(_mm256_max_ps(a.v, b.v)); }
 DRENCH_HD Pack square_root(Pack a) { return Pack(_mm256_sqrt_ps(a.v)); }
 DRENCH_HD Pack select(Mask m, Pack a, Pack b) { return Pack(m.v ? a.v : b.v); }
 
-/// Eight consecutive indices starting at base, and eight arbitrary ones: what an index is on a CPU core
-/// in passes that run over packs (for_each_lane). On the GPU both are an int.
+/// Eight consecutive indices starting at base, and eight arbitrary ones: what an index is on a CPU
+/// core in passes that run over packs (for_each_lane). On the GPU both are an int.
 struct Lanes {
   int base;
 };

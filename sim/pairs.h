@@ -1,17 +1,16 @@
 #pragma once
-// for_each_pair: one physics functor over all neighbours of every particle. The functor names columns
-// and says what one pair does; the traversal owns cells, layout and hardware. On a CPU core the
-// neighbours of a cell are copied side by side once and read eight at a time; on the GPU every thread
-// walks the 27 cells of its particle. A particle is its own neighbour too (distance 0).
+// for_each_pair: one physics functor over all neighbours of every particle. The functor names
+// columns and says what one pair does; the traversal owns cells, layout and hardware. On a CPU core
+// the neighbours of a cell are copied side by side once and read eight at a time; on the GPU every
+// thread walks the 27 cells of its particle. A particle is its own neighbour too (distance 0).
 //
 // Physics:  static constexpr int columns;             number of float columns read
-//           Inputs<columns> inputs() const;           their pointers, in the order of Particle's members
-//           template <class T> struct Particle;       position first; only members of type T or Vec3<T>
-//           template <class T> struct Sum;            members of type T or Vec3<T>, zero to start with
-//           template <class T> void pair(i, j, sum) const;
-//           void finish(int i, const Sum<float>&) const;
-//           static constexpr bool costly;             a pair costs more than to see that all eight are out of reach
-//           float support_radius;
+//           Inputs<columns> inputs() const;           their pointers, in the order of Particle's
+//           members template <class T> struct Particle;       position first; only members of type
+//           T or Vec3<T> template <class T> struct Sum;            members of type T or Vec3<T>,
+//           zero to start with template <class T> void pair(i, j, sum) const; void finish(int i,
+//           const Sum<float>&) const; static constexpr bool costly;             a pair costs more
+//           than to see that all eight are out of reach float support_radius;
 // Filter:   hides neighbours behind a sheet (passes/sheet_filter.h); NoFilter hides none.
 
 #include <bit>
@@ -66,7 +65,8 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
   [[maybe_unused]] bool tested = false;
   if constexpr (Filter::columns > 0) tested = filter.tests(i);
   const GridShape& g = grid.shape;
-  const int cx = g.cell_x(self.position.x), cy = g.cell_y(self.position.y), cz = g.cell_z(self.position.z);
+  const int cx = g.cell_x(self.position.x), cy = g.cell_y(self.position.y),
+            cz = g.cell_z(self.position.z);
   for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
     for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
       const int begin = grid.cell_start[g.index(max(cx - 1, 0), y, z)];
@@ -125,9 +125,11 @@ class Tile {
       float* to = data_.data() + size_t(c) * stride_;
       for (int r = 0; r < rows; to += count[r++]) {
         // Whole packs, past the end of the row too: what comes next overwrites that.
-        for (int k = 0; k < count[r]; k += Pack::size) Pack::load(in.column[c] + begin[r] + k).store(to + k);
+        for (int k = 0; k < count[r]; k += Pack::size)
+          Pack::load(in.column[c] + begin[r] + k).store(to + k);
       }
-      // Far away in position; the last column may be the plane of a sheet, which must be far as well.
+      // Far away in position; the last column may be the plane of a sheet, which must be far as
+      // well.
       std::fill_n(to, stride_ - size_, c < 3 || c == columns - 1 ? far_away : 0.f);
     }
   }
@@ -150,7 +152,8 @@ Inputs<N + M> join(const Inputs<N>& a, const float* const (&b)[M]) {
 
 /// All neighbours of particle i, eight at a time.
 template <class Physics, class Filter>
-DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& physics, const Filter& filter) {
+DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& physics,
+                             const Filter& filter) {
   const int place = tile.place_of(particle);
   constexpr int N = Physics::columns;
   using P = typename Physics::template Particle<Pack>;
@@ -162,14 +165,17 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& phys
   const P i = self.as();
   [[maybe_unused]] const Pack reach2(physics.support_radius * physics.support_radius);
   auto hidden_from = [&] {
-    if constexpr (Filter::columns > 0) return filter.template self<N>(column, place);
-    else return 0;
+    if constexpr (Filter::columns > 0)
+      return filter.template self<N>(column, place);
+    else
+      return 0;
   }();
   for (int k = 0; k < tile.size(); k += Pack::size) {
     Members<P, Pack, N> m;
     for (int c = 0; c < N; ++c) m.value[c] = Pack::load(column[c] + k);
     if constexpr (Filter::columns > 0) {
-      m.value[0] = filter.template move_hidden_away<N>(hidden_from, column, k, {m.value[0], m.value[1], m.value[2]});
+      m.value[0] = filter.template move_hidden_away<N>(hidden_from, column, k,
+                                                       {m.value[0], m.value[1], m.value[2]});
     }
     const P j = m.as();
     if constexpr (Physics::costly) {

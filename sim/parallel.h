@@ -60,7 +60,8 @@ __global__ void launch_reduce(int n, T start, F f, Combine combine, T* out) {
 
 /// combine over f(0..n-1) by a fixed tree; waits for the device.
 template <class T, class F, class Combine>
-T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f, const Combine& combine) {
+T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
+                  const Combine& combine) {
   if (n <= 0) return start;
   static Column<T> partial;  // one simulator a process uses the device at a time
   partial.resize(reduce_blocks);
@@ -86,7 +87,8 @@ void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   });
 }
 
-/// A launch whose index is eight consecutive ones at once; columns are padded to a multiple of eight.
+/// A launch whose index is eight consecutive ones at once; columns are padded to a multiple of
+/// eight.
 template <class F>
 void for_each_lane(const char* name, int n, const F& f) {
   parallel_for(name, (n + 7) / 8, [&](int block) { f(Lanes{8 * block}); });
@@ -94,7 +96,8 @@ void for_each_lane(const char* name, int n, const F& f) {
 
 /// combine over f(0..n-1), chunk by chunk of fixed size, chunks in order.
 template <class T, class F, class Combine>
-T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f, const Combine& combine) {
+T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
+                  const Combine& combine) {
   constexpr int chunk = 4096;
   const int chunks = (n + chunk - 1) / chunk;
   std::vector<T> partial(chunks, start);

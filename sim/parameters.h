@@ -1,5 +1,6 @@
 #pragma once
-// What a step reads besides the state: numbers derived once from the shot. Host and device, both builds.
+// What a step reads besides the state: numbers derived once from the shot. Host and device, both
+// builds.
 
 #include <cstdint>
 
@@ -7,36 +8,37 @@ namespace drench::sim {
 
 struct Parameters {
   // fluid
-  float spacing = 0, support_radius = 0;       // m, a and h
-  float particle_mass = 0, rest_density = 0;   // kg, kg/m^3
-  float lattice_sum = 1;                       // of the density kernel over a cubic lattice, times a^3
-  float wall_scale = 1;                        // of the half-space integral: a lattice at a wall is whole
-  float sound_speed = 0;                       // m/s
-  float dynamic_viscosity = 0;                 // Pa s, fluid on fluid and on cloth
-  float wall_viscosity = 0;                    // Pa s, fluid on domain walls: the physical one
-  float gravity[3] = {0, 0, 0};                // m/s^2
+  float spacing = 0, support_radius = 0;      // m, a and h
+  float particle_mass = 0, rest_density = 0;  // kg, kg/m^3
+  float lattice_sum = 1;         // of the density kernel over a cubic lattice, times a^3
+  float wall_scale = 1;          // of the half-space integral: a lattice at a wall is whole
+  float sound_speed = 0;         // m/s
+  float dynamic_viscosity = 0;   // Pa s, fluid on fluid and on cloth
+  float wall_viscosity = 0;      // Pa s, fluid on domain walls: the physical one
+  float gravity[3] = {0, 0, 0};  // m/s^2
   // domain, in the local frame
-  double origin[3] = {0, 0, 0};                // m, local = world - origin
-  float low[3], high[3];                       // m, local
+  double origin[3] = {0, 0, 0};  // m, local = world - origin
+  float low[3], high[3];         // m, local
   bool wall[3] = {true, true, true};
   // cloth
-  bool fluid = true;                           // any source of particles
-  float cloth_dt_limit = 1e30f;                // s, of the stiffest vertex
-  bool paper = false;                          // coupling scheme
+  bool fluid = true;             // any source of particles
+  float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
+  bool paper = false;            // coupling scheme
   // time
-  double fixed_dt = 0;                         // s, 0 is adaptive
+  double fixed_dt = 0;  // s, 0 is adaptive
 };
 
 /// Bounds that rule the next step, from the state at the end of a step.
 struct Limits {
-  float max_speed = 0;          // m/s, fluid and cloth
-  float max_acceleration = 0;   // m/s^2, fluid
-  int bad_particle = -1;        // index of the first particle that is not finite or absurdly fast
+  float max_speed = 0;         // m/s, fluid and cloth
+  float max_acceleration = 0;  // m/s^2, fluid
+  int bad_particle = -1;       // index of the first particle that is not finite or absurdly fast
   int bad_vertex = -1;
 };
 
 /// The largest stable fluid step and the name of the limit that rules it.
-/// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan 1992).
+/// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
+/// 1992).
 struct StepLimit {
   double dt;
   const char* name;

@@ -29,14 +29,16 @@ LocalFrame local_frame(const Shot& shot) {
   return frame;
 }
 
-/// Sum of a^3 W over the part of a cubic lattice of spacing a with z >= low, for the density kernel.
+/// Sum of a^3 W over the part of a cubic lattice of spacing a with z >= low, for the density
+/// kernel.
 template <class Kernel>
 double lattice_sum(double a, double h, int low) {
   const int reach = int(std::ceil(h / a));
   double sum = 0;
   for (int z = std::max(low, -reach); z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) sum += Kernel::shape((x * x + y * y + z * z) * float(a * a), float(h));
+      for (int x = -reach; x <= reach; ++x)
+        sum += Kernel::shape((x * x + y * y + z * z) * float(a * a), float(h));
     }
   }
   return sum * a * a * a * Kernel::factor(float(h));
@@ -50,8 +52,8 @@ void calibrate(double a, double h, Parameters& p) {
   p.wall_scale = float((whole - cut) / whole) / cpu::spiky_halfspace(float(0.5 * a / h));
 }
 
-/// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at start
-/// count as the height v^2/2g they would have fallen.
+/// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
+/// start count as the height v^2/2g they would have fallen.
 double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
   const double g = shot.gravity.length();
   double speed2 = 0, top = -1e300, bottom = 1e300;
@@ -60,7 +62,8 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
     speed2 = std::max(speed2, speed * speed);
     top = std::max(top, -p.dot(down)), bottom = std::min(bottom, -p.dot(down));
   };
-  for (size_t i = 0; i < fluid.position.size(); ++i) see(fluid.position[i], fluid.velocity[i].length());
+  for (size_t i = 0; i < fluid.position.size(); ++i)
+    see(fluid.position[i], fluid.velocity[i].length());
   for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
     if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] == Axis::open) continue;
@@ -79,11 +82,13 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.particle_mass = float(shot.fluid.rest_density * a * a * a);
   const bool poly6 = shot.coupling.scheme == CouplingScheme::paper && !shot.cloth.empty();
   poly6 ? calibrate<cpu::Poly6>(a, h, p) : calibrate<cpu::Spiky>(a, h, p);
-  p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
+  p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed
+                                                   : automatic_sound_speed(shot, fluid));
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
   const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;
-  p.dynamic_viscosity = float(shot.fluid.rest_density * std::max(shot.fluid.kinematic_viscosity, numerical));
+  p.dynamic_viscosity =
+      float(shot.fluid.rest_density * std::max(shot.fluid.kinematic_viscosity, numerical));
   p.wall_viscosity = float(shot.fluid.rest_density * shot.fluid.kinematic_viscosity);
   for (int k = 0; k < 3; ++k) {
     p.gravity[k] = float(shot.gravity[k]);
@@ -116,7 +121,8 @@ double damping_of(const Sheet& sheet, const Sheet::Spring& s, const Cloth& cloth
   return cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced);
 }
 
-/// Largest over the free vertices of the eigenvalue of sum_j 2 k e e^T over m, for stiffness or damping k.
+/// Largest over the free vertices of the eigenvalue of sum_j 2 k e e^T over m, for stiffness or
+/// damping k.
 template <class Coefficient>
 double largest_rate(const Sheet& sheet, const Coefficient& coefficient) {
   std::vector<std::array<double, 6>> block(sheet.position.size(), {0, 0, 0, 0, 0, 0});
@@ -136,19 +142,23 @@ double largest_rate(const Sheet& sheet, const Coefficient& coefficient) {
   return largest;
 }
 
-/// (2 / omega) (sqrt(1 + xi^2) - xi), the limit of damped symplectic Euler, with omega^2 and 2 xi omega
-/// bounded by largest_rate: exact, 4 (k_adj + k_diag) / m, on a square lattice. 0.7 leaves room for rotated
-/// and stretched springs.
+/// (2 / omega) (sqrt(1 + xi^2) - xi), the limit of damped symplectic Euler, with omega^2 and 2 xi
+/// omega bounded by largest_rate: exact, 4 (k_adj + k_diag) / m, on a square lattice. 0.7 leaves
+/// room for rotated and stretched springs.
 double cloth_dt_limit(const Sheet& sheet, const Cloth& cloth) {
-  const double omega = std::sqrt(largest_rate(sheet, [](const Sheet::Spring& s) { return s.stiffness; }));
+  const double omega =
+      std::sqrt(largest_rate(sheet, [](const Sheet::Spring& s) { return s.stiffness; }));
   if (omega == 0) return 1e30;
-  const double xi = largest_rate(sheet, [&](const Sheet::Spring& s) { return damping_of(sheet, s, cloth); }) / (2 * omega);
+  const double xi =
+      largest_rate(sheet, [&](const Sheet::Spring& s) { return damping_of(sheet, s, cloth); }) /
+      (2 * omega);
   return 0.7 * 2 / omega * (std::sqrt(1 + xi * xi) - xi);
 }
 
 /// Compressed rows: entries of row r stand at [start[r], start[r + 1]).
 template <class T>
-void to_rows(const std::vector<std::vector<T>>& rows, std::vector<int>& start, std::vector<T>& flat) {
+void to_rows(const std::vector<std::vector<T>>& rows, std::vector<int>& start,
+             std::vector<T>& flat) {
   start.assign(1, 0);
   for (const std::vector<T>& row : rows) {
     flat.insert(flat.end(), row.begin(), row.end());
@@ -178,12 +188,14 @@ void append_springs(const Sheet& sheet, const Cloth& cloth, ClothTopology& t, in
   }
 }
 
-/// Triangles across the edges ab, bc, ca of each triangle; -1 at free edges, whose vertices are rim.
+/// Triangles across the edges ab, bc, ca of each triangle; -1 at free edges, whose vertices are
+/// rim.
 void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) {
   std::unordered_map<uint64_t, int> of_edge;
   const auto key = [](uint32_t a, uint32_t b) { return uint64_t(a) << 32 | b; };
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
-    for (int c = 0; c < 3; ++c) of_edge[key(sheet.triangle[k][c], sheet.triangle[k][(c + 1) % 3])] = int(k);
+    for (int c = 0; c < 3; ++c)
+      of_edge[key(sheet.triangle[k][c], sheet.triangle[k][(c + 1) % 3])] = int(k);
   }
   const size_t first = t.rim.size();
   t.rim.resize(first + sheet.position.size(), 0);
@@ -197,7 +209,8 @@ void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) 
   }
 }
 
-void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame, Scene& scene) {
+void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame,
+                  Scene& scene) {
   ClothTopology& t = scene.cloth;
   const int base = t.vertices(), base_triangle = t.triangles();
   append_springs(sheet, cloth, t, base);
@@ -227,7 +240,8 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     t.inverse_mass.push_back(sheet.pinned[v] ? 0.f : float(1 / sheet.mass[v]));
     t.damping_rate.push_back(float(cloth.damping));
     const V3d p = sheet.position[v], u = sheet.pinned[v] ? V3d(0) : cloth.velocity;
-    scene.start.cloth_position.push(frame.to_local(0, p.x), frame.to_local(1, p.y), frame.to_local(2, p.z));
+    scene.start.cloth_position.push(frame.to_local(0, p.x), frame.to_local(1, p.y),
+                                    frame.to_local(2, p.z));
     scene.start.cloth_velocity.push(float(u.x), float(u.y), float(u.z));
   }
 }
@@ -248,8 +262,10 @@ void check_overlap(const Shot& shot, const Scene& scene) {
     for (int k = 0; k < 3; ++k) {
       const int c = scene.cloth.corner[3 * t + k];
       corner[k] = {v.x[c], v.y[c], v.z[c]};
-      low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y), std::min(low.z, corner[k].z)};
-      high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y), std::max(high.z, corner[k].z)};
+      low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y),
+             std::min(low.z, corner[k].z)};
+      high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y),
+              std::max(high.z, corner[k].z)};
     }
     const float reach = 0.25f * a + scene.cloth.half_thickness[t];
     for (float z = low.z - reach; z < high.z + reach + a; z += a) {
@@ -260,12 +276,15 @@ void check_overlap(const Shot& shot, const Scene& scene) {
             const P p{x.x[it->second], x.y[it->second], x.z[it->second]};
             const float d2 = cpu::closest_point(p, corner[0], corner[1], corner[2]).distance2;
             if (d2 >= reach * reach) continue;
-            throw Error(fmt::format(
-                "{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, {:.4g}, {:.4g}) m is {:.2g} m from it, "
-                "nearer than {:.2g} m (a quarter spacing and half the thickness), so it has no side. Move the fluid "
-                "or the cloth at least half a spacing ({:.3g} m) apart",
-                shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name, scene.frame.to_world(0, p.x),
-                scene.frame.to_world(1, p.y), scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
+            throw Error(
+                fmt::format("{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, "
+                            "{:.4g}, {:.4g}) m is {:.2g} m from it, "
+                            "nearer than {:.2g} m (a quarter spacing and half the thickness), so "
+                            "it has no side. Move the fluid "
+                            "or the cloth at least half a spacing ({:.3g} m) apart",
+                            shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name,
+                            scene.frame.to_world(0, p.x), scene.frame.to_world(1, p.y),
+                            scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
           }
         }
       }
@@ -277,7 +296,8 @@ void check_overlap(const Shot& shot, const Scene& scene) {
 
 Scene build_scene(const Shot& shot) {
   if (!shot.fluid.present() && shot.cloth.empty()) {
-    throw Error(shot.file.string() + ": there is nothing to simulate. Add a [[fluid.box]] or a [[cloth]]");
+    throw Error(shot.file.string() +
+                ": there is nothing to simulate. Add a [[fluid.box]] or a [[cloth]]");
   }
   Scene scene;
   scene.frame = local_frame(shot);
@@ -286,7 +306,8 @@ Scene build_scene(const Shot& shot) {
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];
-    start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y), scene.frame.to_local(2, p.z));
+    start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
+                        scene.frame.to_local(2, p.z));
     start.velocity.push(float(u.x), float(u.y), float(u.z));
     start.id.push_back(int(i));
   }

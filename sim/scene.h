@@ -27,7 +27,7 @@ struct Sheet {
   std::vector<V3d> position, rest;
   std::vector<Imath::V2f> uv;
   std::vector<Imath::Vec3<uint32_t>> triangle;
-  std::vector<double> mass;       // kg
+  std::vector<double> mass;  // kg
   std::vector<bool> pinned;
   struct Spring {
     int a, b;
@@ -46,8 +46,8 @@ struct EmitterLayer {
 };
 EmitterLayer emitter_layer(const FluidEmitter& emitter, double spacing);
 
-/// Particles of the sources that are there at the start; later sources lose those closer than half a
-/// spacing to earlier ones.
+/// Particles of the sources that are there at the start; later sources lose those closer than half
+/// a spacing to earlier ones.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
 };

@@ -16,19 +16,23 @@ namespace drench {
 
 namespace {
 
-std::unique_ptr<sim::Solver> make_solver(const sim::Scene& scene, Device device, std::string& name) {
+std::unique_ptr<sim::Solver> make_solver(const sim::Scene& scene, Device device,
+                                         std::string& name) {
 #if defined(DRENCH_HAS_CUDA)
   if (device != Device::cpu && sim::cuda::device_available(name)) {
     return sim::cuda::make_solver(scene.parameters, scene.cloth);
   }
-  if (device == Device::automatic) log_info("sim", "no usable GPU (" + name + "); running on the CPU");
+  if (device == Device::automatic)
+    log_info("sim", "no usable GPU (" + name + "); running on the CPU");
   if (device == Device::cuda) {
-    throw Error("--device cuda: no usable GPU (" + name + "). Install a driver or use --device cpu");
+    throw Error("--device cuda: no usable GPU (" + name +
+                "). Install a driver or use --device cpu");
   }
 #else
   if (device == Device::cuda) {
-    throw Error("--device cuda: this build has no CUDA. Install the CUDA Toolkit and build again, or use "
-                "--device cpu");
+    throw Error(
+        "--device cuda: this build has no CUDA. Install the CUDA Toolkit and build again, or use "
+        "--device cpu");
   }
 #endif
   name = "CPU";
@@ -55,8 +59,12 @@ struct Simulator::Implementation {
   std::filesystem::path last_checkpoint;
 
   Implementation(const Shot& shot_, const SimulatorOptions& options_)
-      : shot(shot_), options(options_), scene(sim::build_scene(shot)), solver(make_solver(scene, options.device, device)) {
-    for (const FluidEmitter& e : shot.fluid.emitter) layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
+      : shot(shot_),
+        options(options_),
+        scene(sim::build_scene(shot)),
+        solver(make_solver(scene, options.device, device)) {
+    for (const FluidEmitter& e : shot.fluid.emitter)
+      layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
     Hasher hasher;
     layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 1").finish();
@@ -80,10 +88,13 @@ struct Simulator::Implementation {
         const double leaves = source.start - shot.preroll + double(emitted[e]) * a / source.speed;
         if (leaves > until || leaves > source.stop) break;
         if (solver->particles() + layer[e].offset.size() > max_particles) {
-          throw Error(fmt::format("{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
-                                  "stop the emitter earlier", shot.file.string(), e + 1, max_particles, until));
+          throw Error(fmt::format(
+              "{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
+              "stop the emitter earlier",
+              shot.file.string(), e + 1, max_particles, until));
         }
-        add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)), direction * source.speed);
+        add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)),
+                  direction * source.speed);
       }
     }
   }
@@ -93,7 +104,8 @@ struct Simulator::Implementation {
     std::vector<int> id;
     for (const V3d& offset : disc.offset) {
       const V3d p = centre + offset;
-      position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y), scene.frame.to_local(2, p.z));
+      position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
+                    scene.frame.to_local(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
       id.push_back(next_id++);
     }
@@ -110,7 +122,10 @@ struct Simulator::Implementation {
       const double rest = end - time;
       const double parts = std::ceil(rest / limit.dt - 1e-9);
       const double dt = parts <= 1 ? rest : rest / parts;
-      const int substeps = shot.cloth.empty() ? 1 : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
+      const int substeps =
+          shot.cloth.empty()
+              ? 1
+              : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
       emit(time);
       limits = solver->step(dt, substeps);
       time = parts <= 1 ? end : time + dt;
@@ -126,9 +141,10 @@ struct Simulator::Implementation {
 
   sim::StepLimit fixed_step(const sim::StepLimit& stable) const {
     if (shot.time_step > stable.dt) {
-      throw Error(fmt::format("{}: shot.time_step is {:.3g} s but steps above {:.3g} s are unstable now (frame {}, "
-                              "limit: {}). Use a smaller step, or 0 for an adaptive one",
-                              shot.file.string(), shot.time_step, stable.dt, frame, stable.name));
+      throw Error(fmt::format(
+          "{}: shot.time_step is {:.3g} s but steps above {:.3g} s are unstable now (frame {}, "
+          "limit: {}). Use a smaller step, or 0 for an adaptive one",
+          shot.file.string(), shot.time_step, stable.dt, frame, stable.name));
     }
     return {shot.time_step, "fixed"};
   }
@@ -141,14 +157,18 @@ struct Simulator::Implementation {
     const int i = particle ? limits.bad_particle : limits.bad_vertex;
     const sim::HostVec &x = particle ? state.position : state.cloth_position,
                        &v = particle ? state.velocity : state.cloth_velocity;
-    const double speed = std::sqrt(double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
+    const double speed =
+        std::sqrt(double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
     throw Error(fmt::format(
-        "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m has speed "
-        "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a smaller shot.time_step, "
+        "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m "
+        "has speed "
+        "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a "
+        "smaller shot.time_step, "
         "a softer cloth or a larger fluid.sound_speed",
-        shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll", time, steps,
-        particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
-        scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]), scene.frame.to_world(2, x.z[i]), speed,
+        shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll",
+        time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
+        scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
+        scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string()));
   }
 
@@ -168,8 +188,10 @@ struct Simulator::Implementation {
     const auto kinetic = [](const sim::HostVec& v, size_t i) {
       return 0.5 * (double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
     };
-    for (size_t i = 0; i < state.velocity.size(); ++i) energy += scene.parameters.particle_mass * kinetic(state.velocity, i);
-    for (size_t i = 0; i < state.cloth_velocity.size(); ++i) energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
+    for (size_t i = 0; i < state.velocity.size(); ++i)
+      energy += scene.parameters.particle_mass * kinetic(state.velocity, i);
+    for (size_t i = 0; i < state.cloth_velocity.size(); ++i)
+      energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
   }
@@ -200,7 +222,8 @@ struct Simulator::Implementation {
       ClothFrame out{sheet.name, {}};
       for (int v = scene.first_vertex[s]; v < scene.first_vertex[s + 1]; ++v) {
         out.mesh.position.push_back(world(state.cloth_position, v));
-        out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v], state.cloth_velocity.z[v]);
+        out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v],
+                                       state.cloth_velocity.z[v]);
         out.mesh.rest_position.push_back(V3f(sheet.rest[v - scene.first_vertex[s]]));
       }
       out.mesh.uv = sheet.uv;
@@ -247,7 +270,8 @@ std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame, s.time, s.steps, s.next_id, s.emitted, s.solver->save(), s.layout};
+  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps, s.next_id,
+                             s.emitted, s.solver->save(), s.layout};
   checkpoint.state.limits = s.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);
   s.last_checkpoint = path;

@@ -17,37 +17,39 @@ namespace drench {
 enum class Device { automatic, cpu, cuda };
 
 struct SimulatorOptions {
-  Device device = Device::automatic;  // automatic: CUDA when there is a device, else CPU
+  Device device = Device::automatic;     // automatic: CUDA when there is a device, else CPU
   std::filesystem::path checkpoint_dir;  // named in the message of a blow-up; may be empty
 };
 
 /// What the last call to advance did, for logs and stats.jsonl.
 struct StepReport {
-  int steps = 0, cloth_substeps = 0;      // fluid steps; cloth steps in all
+  int steps = 0, cloth_substeps = 0;                 // fluid steps; cloth steps in all
   double time = 0, smallest_dt = 0, largest_dt = 0;  // s
-  std::string limit;                      // which limit ruled most steps: "sound speed", "force", ...
-  size_t particles = 0, near = 0;         // near: within the support radius of cloth at the end
-  double max_speed = 0;                   // m/s
+  std::string limit;               // which limit ruled most steps: "sound speed", "force", ...
+  size_t particles = 0, near = 0;  // near: within the support radius of cloth at the end
+  double max_speed = 0;            // m/s
   double mean_compression = 0, max_compression = 0;  // max(rho/rho0 - 1, 0)
-  double kinetic_energy = 0;              // J, fluid and cloth
-  uint64_t guard_hits = 0;                // particles that the path test held back
+  double kinetic_energy = 0;                         // J, fluid and cloth
+  uint64_t guard_hits = 0;                           // particles that the path test held back
 };
 
 class Simulator {
  public:
-  /// Builds the initial state, before any pre-roll. @throws Error if fluid overlaps cloth, a cloth mesh is degenerate or not
-  /// manifold, nothing is to be simulated, or cuda is asked for and absent.
+  /// Builds the initial state, before any pre-roll. @throws Error if fluid overlaps cloth, a cloth
+  /// mesh is degenerate or not manifold, nothing is to be simulated, or cuda is asked for and
+  /// absent.
   Simulator(const Shot& shot, const SimulatorOptions& options);
   ~Simulator();
   Simulator(Simulator&&) noexcept;
 
-  /// Runs the pre-roll, if any is left: the state is the first frame's then. To be called before the
-  /// first frame is read, unless the state comes from a checkpoint.
-  /// @param keep_going  asked before every step; false throws Stopped after the current state is whole.
+  /// Runs the pre-roll, if any is left: the state is the first frame's then. To be called before
+  /// the first frame is read, unless the state comes from a checkpoint.
+  /// @param keep_going  asked before every step; false throws Stopped after the current state is
+  /// whole.
   /// @throws Error on NaN or blow-up with frame, time, particle and the last good checkpoint.
   StepReport preroll(const std::function<bool()>& keep_going = {});
-  /// Advances from frame to frame + 1; steps land exactly on frames. What is left of the pre-roll goes
-  /// first. @param keep_going, @throws as above.
+  /// Advances from frame to frame + 1; steps land exactly on frames. What is left of the pre-roll
+  /// goes first. @param keep_going, @throws as above.
   StepReport advance_frame(const std::function<bool()>& keep_going = {});
 
   int frame() const;  // film frame of the current state

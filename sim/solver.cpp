@@ -74,13 +74,16 @@ class BackendSolver : public Solver {
     return host;
   }
 
-  std::vector<float> density() const override { return to_host(state_.fluid.density, state_.fluid.count); }
+  std::vector<float> density() const override {
+    return to_host(state_.fluid.density, state_.fluid.count);
+  }
   std::vector<int> near_triangles() const override {
     if (!(allocated_ & column_sheet)) return std::vector<int>(state_.fluid.count, -1);
     return to_host(state_.fluid.triangle, state_.fluid.count);
   }
 
-  void append(const HostVec& position, const HostVec& velocity, const std::vector<int>& id) override {
+  void append(const HostVec& position, const HostVec& velocity,
+              const std::vector<int>& id) override {
     FluidState& f = state_.fluid;
     const size_t at = f.count, more = id.size();
     resize_particles(at + more);
@@ -145,7 +148,8 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.density, &f.pressure_term, &f.inverse_density}) c->resize(n);
     }
     if (allocated_ & column_sheet) {
-      for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane, &f.edge, &f.cloth_share}) {
+      for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,
+                               &f.edge, &f.cloth_share}) {
         c->resize(n);
       }
       f.triangle.resize(n), f.shaded.resize(n);
@@ -182,8 +186,10 @@ class BackendSolver : public Solver {
     from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
     from_host(c.half_thickness, t.half_thickness);
     upload(c.rest_centroid, t.rest_centroid);
-    from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry), from_host(c.rim, t.rim);
-    for (VecColumn* v : {&c.position, &c.velocity, &c.next, &c.next_velocity, &c.start, &c.predicted, &c.force}) {
+    from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry),
+        from_host(c.rim, t.rim);
+    for (VecColumn* v :
+         {&c.position, &c.velocity, &c.next, &c.next_velocity, &c.start, &c.predicted, &c.force}) {
       v->resize(c.padded);
     }
     c.force.clear();
@@ -198,21 +204,24 @@ class BackendSolver : public Solver {
     c.stop_sum.resize(size_t(4) * c.vertices);
   }
 
-  /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices as
-  /// long as there are eight offsets or fewer at most vertices, as on grids; the rest fill up what is free.
+  /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices
+  /// as long as there are eight offsets or fewer at most vertices, as on grids; the rest fill up
+  /// what is free.
   void load_springs(const ClothTopology& t) {
     ClothState& c = state_.cloth;
     int busiest = 0;
     std::map<int, int> count_of_offset;
     for (int v = 0; v < c.vertices; ++v) {
       busiest = std::max(busiest, t.spring_start[v + 1] - t.spring_start[v]);
-      for (int k = t.spring_start[v]; k < t.spring_start[v + 1]; ++k) ++count_of_offset[t.spring_end[k] - v];
+      for (int k = t.spring_start[v]; k < t.spring_start[v + 1]; ++k)
+        ++count_of_offset[t.spring_end[k] - v];
     }
     std::vector<int> offset;
     for (const auto& [o, count] : count_of_offset) {
       if (count > c.vertices / 4) offset.push_back(o);
     }
-    if (int(count_of_offset.size()) > int(offset.size()) || int(offset.size()) > busiest) offset.clear();
+    if (int(count_of_offset.size()) > int(offset.size()) || int(offset.size()) > busiest)
+      offset.clear();
     c.spring_slots = busiest;
     offset.resize(busiest, 0);
     const size_t size = size_t(busiest) * c.padded;
@@ -222,12 +231,14 @@ class BackendSolver : public Solver {
     for (int v = 0; v < c.vertices; ++v) {
       for (int k = t.spring_start[v], free = 0; k < t.spring_start[v + 1]; ++k, ++free) {
         const auto slot = std::find(offset.begin(), offset.end(), t.spring_end[k] - v);
-        const size_t to = size_t(slot == offset.end() ? free : slot - offset.begin()) * c.padded + v;
+        const size_t to =
+            size_t(slot == offset.end() ? free : slot - offset.begin()) * c.padded + v;
         end[to] = t.spring_end[k], length[to] = t.rest_length[k];
         stiffness[to] = t.stiffness[k], damping[to] = t.spring_damping[k];
       }
     }
-    from_host(c.slot_offset, offset), from_host(c.spring_end, end), from_host(c.rest_length, length);
+    from_host(c.slot_offset, offset), from_host(c.spring_end, end),
+        from_host(c.rest_length, length);
     from_host(c.stiffness, stiffness), from_host(c.spring_damping, damping);
   }
 

@@ -1,5 +1,6 @@
 #pragma once
-// The boundary between host code, compiled once, and the two backends: plain host arrays in and out.
+// The boundary between host code, compiled once, and the two backends: plain host arrays in and
+// out.
 
 #include <cstdint>
 #include <functional>
@@ -23,9 +24,9 @@ struct HostVec {
 struct HostState {
   HostVec position, velocity;  // m local, m/s
   std::vector<int> id, memory_triangle, memory_side;
-  HostVec owed;                // kg m/s
+  HostVec owed;  // kg m/s
   HostVec cloth_position, cloth_velocity;
-  Limits limits;               // of the step before
+  Limits limits;  // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
 };
 
@@ -34,7 +35,7 @@ struct ClothTopology {
   std::vector<float> mass, inverse_mass, damping_rate;  // kg; 0 where pinned; 1/s
   std::vector<int> spring_start, spring_end;            // rows by vertex
   std::vector<float> rest_length, stiffness, spring_damping;
-  std::vector<int> corner, neighbour, sheet;            // 3, 3, 1 a triangle
+  std::vector<int> corner, neighbour, sheet;  // 3, 3, 1 a triangle
   std::vector<float> half_thickness;
   HostVec rest_centroid;
   std::vector<int> fan_start, fan_entry, rim;
@@ -44,7 +45,10 @@ struct ClothTopology {
 
 /// Columns a pass may name; only those that the plan names are allocated.
 enum ColumnGroup : unsigned {
-  column_position = 1, column_velocity = 2, column_acceleration = 4, column_density = 8,
+  column_position = 1,
+  column_velocity = 2,
+  column_acceleration = 4,
+  column_density = 8,
   column_sheet = 16,    // nearest triangle, weights, normal, distance, edge, share
   column_memory = 32,   // remembered side
   column_contact = 64,  // impulses
@@ -61,18 +65,22 @@ class Solver {
   virtual ~Solver() = default;
   virtual void load(const HostState& state) = 0;
   virtual HostState save() const = 0;
-  /// Fluid density of every particle, kg/m^3, and nearest triangles (-1 none), as of refresh() or step().
+  /// Fluid density of every particle, kg/m^3, and nearest triangles (-1 none), as of refresh() or
+  /// step().
   virtual std::vector<float> density() const = 0;
   virtual std::vector<int> near_triangles() const = 0;
   /// Adds particles with ids at the end of the columns.
-  virtual void append(const HostVec& position, const HostVec& velocity, const std::vector<int>& id) = 0;
+  virtual void append(const HostVec& position, const HostVec& velocity,
+                      const std::vector<int>& id) = 0;
   /// One fluid step with `substeps` cloth steps in it.
   virtual Limits step(double dt, int substeps) = 0;
-  /// Calls `observer` with the state after each cloth step of the exact coupling, from the next step on;
-  /// without one (the default) nothing is done for it. Each call reads the whole state back to the host.
+  /// Calls `observer` with the state after each cloth step of the exact coupling, from the next
+  /// step on; without one (the default) nothing is done for it. Each call reads the whole state
+  /// back to the host.
   virtual void observe_substeps(std::function<void(const HostState&)> observer) = 0;
-  /// Density and nearest triangles of the current positions, without a step. Sorts the particles, which
-  /// the next step would do in the same way: its result is the same bits with or without this.
+  /// Density and nearest triangles of the current positions, without a step. Sorts the particles,
+  /// which the next step would do in the same way: its result is the same bits with or without
+  /// this.
   virtual void refresh() = 0;
   /// Limits of a state that no step has made yet.
   virtual Limits measure() = 0;

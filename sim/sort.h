@@ -1,5 +1,6 @@
 #pragma once
-// Stable sort of small integer keys. Stable sorting has one result, so it does not depend on threads.
+// Stable sort of small integer keys. Stable sorting has one result, so it does not depend on
+// threads.
 
 #include "sim/column.h"
 
@@ -11,9 +12,9 @@ struct SortScratch {
   Column<char> bytes;
 };
 
-/// Fills order[0..n) with the indices of keys[0..n) in ascending, stable order and start[0..keys] with
-/// where each key begins (start[key_count] is the number of keys below key_count). Keys equal to
-/// key_count mean "leave out": they stand at the end of order.
+/// Fills order[0..n) with the indices of keys[0..n) in ascending, stable order and start[0..keys]
+/// with where each key begins (start[key_count] is the number of keys below key_count). Keys equal
+/// to key_count mean "leave out": they stand at the end of order.
 void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>& order,
                       Column<int>& start, SortScratch& scratch);
 

@@ -18,13 +18,14 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
   int bits = 1;
   while ((int64_t(1) << bits) <= key_count) ++bits;
   size_t bytes = 0;
-  check_cuda(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys.data(), scratch.key_out.data(), iota,
-                                             order.data(), n, 0, bits),
+  check_cuda(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys.data(), scratch.key_out.data(),
+                                             iota, order.data(), n, 0, bits),
              "sizing a sort");
   if (scratch.bytes.size() < bytes) scratch.bytes.resize(bytes);
-  check_cuda(cub::DeviceRadixSort::SortPairs(scratch.bytes.data(), bytes, keys.data(),
-                                             scratch.key_out.data(), iota, order.data(), n, 0, bits),
-             "sorting");
+  check_cuda(
+      cub::DeviceRadixSort::SortPairs(scratch.bytes.data(), bytes, keys.data(),
+                                      scratch.key_out.data(), iota, order.data(), n, 0, bits),
+      "sorting");
   // Where key k begins is the first sorted place whose key is not below k.
   const int* sorted = scratch.key_out.data();
   int* first = start.data();
@@ -32,7 +33,10 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
     int low = 0, high = n;
     while (low < high) {
       const int middle = (low + high) / 2;
-      if (sorted[middle] < k) low = middle + 1; else high = middle;
+      if (sorted[middle] < k)
+        low = middle + 1;
+      else
+        high = middle;
     }
     first[k] = low;
   });

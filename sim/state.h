@@ -24,31 +24,33 @@ struct VecColumn {
 struct FluidState {
   int count = 0;
   // kept from step to step
-  VecColumn position, velocity;       // m local, m/s
+  VecColumn position, velocity;  // m local, m/s
   Column<int> id;
-  Column<int> memory_triangle;        // triangle whose side is remembered, -1 none   (exact coupling)
-  Column<int> memory_side;            // +1 or -1
-  VecColumn owed;                     // kg m/s that the path test took and cloth has not received yet
+  Column<int> memory_triangle;  // triangle whose side is remembered, -1 none   (exact coupling)
+  Column<int> memory_side;      // +1 or -1
+  VecColumn owed;               // kg m/s that the path test took and cloth has not received yet
   // rebuilt every step
-  VecColumn acceleration;             // m/s^2
+  VecColumn acceleration;                                 // m/s^2
   Column<float> density, pressure_term, inverse_density;  // kg/m^3, p / rho^2, m^3/kg
   Column<int> cell, order;
   Column<int> cell_start;
   GridShape grid{};
   // coupling
-  Column<int> triangle;               // nearest triangle within the support radius, -1 none
-  Column<float> far_by;               // m, how much nearer a sheet must come to be within the support; a lower bound
-  Column<float> weight_b, weight_c;   // barycentric weights of its foot point
-  VecColumn normal;                   // unit, from the sheet to the particle's side; 0 where none
-  Column<float> sheet_distance;       // m along normal; 1e30 where there is no sheet
-  Column<float> plane;                // m, sheet_distance - normal . position: > -normal . x in front
-  Column<float> edge;                 // 0 beyond a free edge .. 1 half a spacing inside it
-  Column<int> shaded;                 // 1 where a sheet may hide neighbours; after the density pass: where one does
-  Column<float> cloth_share;          // share of density that the sheet replaces
-  VecColumn impulse;                  // paper coupling: kg m/s; path test: m, where particles end
-  VecColumn start;                    // m, position at the start of the step
-  Column<int> moved;                  // 1: out of reach of any sheet, has made its whole step
-  Column<int> held, stopped;          // by the path test for this substep; triangle it stopped, -1 none
+  Column<int> triangle;  // nearest triangle within the support radius, -1 none
+  Column<float>
+      far_by;  // m, how much nearer a sheet must come to be within the support; a lower bound
+  Column<float> weight_b, weight_c;  // barycentric weights of its foot point
+  VecColumn normal;                  // unit, from the sheet to the particle's side; 0 where none
+  Column<float> sheet_distance;      // m along normal; 1e30 where there is no sheet
+  Column<float> plane;  // m, sheet_distance - normal . position: > -normal . x in front
+  Column<float> edge;   // 0 beyond a free edge .. 1 half a spacing inside it
+  Column<int>
+      shaded;  // 1 where a sheet may hide neighbours; after the density pass: where one does
+  Column<float> cloth_share;  // share of density that the sheet replaces
+  VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end
+  VecColumn start;            // m, position at the start of the step
+  Column<int> moved;          // 1: out of reach of any sheet, has made its whole step
+  Column<int> held, stopped;  // by the path test for this substep; triangle it stopped, -1 none
 };
 
 /// All sheets in one: vertices, springs by vertex, triangles.
@@ -57,46 +59,46 @@ struct ClothState {
   // kept from step to step
   VecColumn position, velocity;
   // fixed
-  Column<float> mass, inverse_mass;     // kg; inverse 0 where pinned
-  Column<float> damping_rate;           // 1/s
-  int padded = 0, spring_slots = 0;     // vertices up to a multiple of 8; springs of the busiest one
-  Column<int> spring_end;               // other vertex, slot s of vertex i at s padded + i
-  Column<int> slot_offset;              // other vertex - vertex, where it is the same all over a slot; else 0
+  Column<float> mass, inverse_mass;  // kg; inverse 0 where pinned
+  Column<float> damping_rate;        // 1/s
+  int padded = 0, spring_slots = 0;  // vertices up to a multiple of 8; springs of the busiest one
+  Column<int> spring_end;            // other vertex, slot s of vertex i at s padded + i
+  Column<int> slot_offset;  // other vertex - vertex, where it is the same all over a slot; else 0
   Column<float> rest_length, stiffness, spring_damping;  // m, N/m, N s/m
-  Column<int> corner;                   // 3 a triangle
-  Column<int> neighbour;                // 3 a triangle: across edges ab, bc, ca; -1 is a free edge
-  Column<int> sheet;                    // of a triangle
-  Column<float> half_thickness;         // m, of a triangle
-  VecColumn rest_centroid;              // m
-  Column<int> fan_start, fan_entry;     // CSR by vertex: 3 triangle + corner
-  Column<int> rim;                      // 1 where a vertex lies on a free edge
+  Column<int> corner;                                    // 3 a triangle
+  Column<int> neighbour;             // 3 a triangle: across edges ab, bc, ca; -1 is a free edge
+  Column<int> sheet;                 // of a triangle
+  Column<float> half_thickness;      // m, of a triangle
+  VecColumn rest_centroid;           // m
+  Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
+  Column<int> rim;                   // 1 where a vertex lies on a free edge
   // rebuilt
-  VecColumn next, next_velocity;        // the substep being made
-  VecColumn start;                      // at the start of the step
+  VecColumn next, next_velocity;  // the substep being made
+  VecColumn start;                // at the start of the step
   VecColumn centroid;
-  Column<int> cell, order, cell_start;  // polygons by centroid
-  VecColumn sorted_low, sorted_high;    // m, bounding boxes in that order, padded by 8
+  Column<int> cell, order, cell_start;              // polygons by centroid
+  VecColumn sorted_low, sorted_high;                // m, bounding boxes in that order, padded by 8
   Column<PreparedTriangle<float>> sorted_triangle;  // in that order as well, a cache line each
   GridShape grid{};
-  float largest_radius = 0;             // m
-  float moved = 0;                      // m, what any vertex has moved at most since far_by was set
-  Vec3<float> low{}, high{};            // m, bounds of all vertices
-  VecColumn predicted;                  // m/s, mean over the step
-  Column<float> share;                  // sum of contact weights
-  VecColumn force;                      // N from the fluid, constant over the step
-  Column<int> held;                     // by the path test for this substep
-  Column<long long> stop_sum;           // 4 a vertex: see PathTest
+  float largest_radius = 0;    // m
+  float moved = 0;             // m, what any vertex has moved at most since far_by was set
+  Vec3<float> low{}, high{};   // m, bounds of all vertices
+  VecColumn predicted;         // m/s, mean over the step
+  Column<float> share;         // sum of contact weights
+  VecColumn force;             // N from the fluid, constant over the step
+  Column<int> held;            // by the path test for this substep
+  Column<long long> stop_sum;  // 4 a vertex: see PathTest
 };
 
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
-  int near = 0;           // particles within the support radius of a sheet: the first of order
-  int close = 0;          // of these, those that the contact distance may concern in this step
-  Column<int> index;      // 4 fields a row of contact_exact.h: particle and vertices
-  Column<float> field;    // 23 fields a row
-  int stride = 0;         // from field to field
-  VecColumn impulse;      // 3 a triangle: what its contacts give to its corners, kg m/s
+  int near = 0;         // particles within the support radius of a sheet: the first of order
+  int close = 0;        // of these, those that the contact distance may concern in this step
+  Column<int> index;    // 4 fields a row of contact_exact.h: particle and vertices
+  Column<float> field;  // 23 fields a row
+  int stride = 0;       // from field to field
+  VecColumn impulse;    // 3 a triangle: what its contacts give to its corners, kg m/s
   Column<int> guarded, guard_start;  // places in order of the particles whose paths are tested
   int guard_count = 0;
   float cloth_reach = 0;  // m, how far cloth may move in the step before all are tested
@@ -111,12 +113,13 @@ struct State {
   SortScratch scratch;
   VecColumn swap_vector;
   Column<int> swap_int;
-  double dt = 0;            // s, of the step being made
-  int substeps = 1;         // cloth steps in it
-  bool owes = true;         // FluidState::owed may hold something
-  std::function<void()> after_substep;  // of an observer: called when all of a coupled substep is in place
-  uint64_t guard_hits = 0;  // particles held back by the path test, since the start
-  uint64_t guard_holds = 0; // substeps in which vertices had to be stopped
+  double dt = 0;     // s, of the step being made
+  int substeps = 1;  // cloth steps in it
+  bool owes = true;  // FluidState::owed may hold something
+  std::function<void()>
+      after_substep;         // of an observer: called when all of a coupled substep is in place
+  uint64_t guard_hits = 0;   // particles held back by the path test, since the start
+  uint64_t guard_holds = 0;  // substeps in which vertices had to be stopped
 };
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -16,7 +16,8 @@ namespace {
 Walls walls_of(const Parameters& p) {
   Walls walls{};
   walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k) walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
+  for (int k = 0; k < 3; ++k)
+    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
   return walls;
 }
 
@@ -26,10 +27,16 @@ template <class Kernel>
 DensitySum<Kernel> density_pass(const State& state) {
   const Parameters& p = state.parameters;
   const FluidState& f = state.fluid;
-  return {f.position.view(), f.cloth_share.size() ? f.cloth_share.data() : nullptr, f.density.data(),
-          f.pressure_term.data(), f.inverse_density.data(), p.support_radius,
-          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum, p.rest_density,
-          p.sound_speed * p.sound_speed, walls_of(p)};
+  return {f.position.view(),
+          f.cloth_share.size() ? f.cloth_share.data() : nullptr,
+          f.density.data(),
+          f.pressure_term.data(),
+          f.inverse_density.data(),
+          p.support_radius,
+          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
+          p.rest_density,
+          p.sound_speed * p.sound_speed,
+          walls_of(p)};
 }
 
 void sum_density(State& state) {
@@ -38,18 +45,26 @@ void sum_density(State& state) {
   } else if (state.parameters.paper) {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state), sheet_filter(state));
+    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
+                  sheet_filter(state));
   }
 }
 
 void pressure_viscosity(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
-  const PressureViscosity pass{f.position.view(), f.velocity.view(), f.pressure_term.data(),
-                               f.inverse_density.data(), f.acceleration.view(), p.support_radius,
+  const PressureViscosity pass{f.position.view(),
+                               f.velocity.view(),
+                               f.pressure_term.data(),
+                               f.inverse_density.data(),
+                               f.acceleration.view(),
+                               p.support_radius,
                                p.particle_mass * spiky_gradient_factor(p.support_radius),
-                               p.dynamic_viscosity, p.wall_viscosity, p.rest_density,
-                               {p.gravity[0], p.gravity[1], p.gravity[2]}, walls_of(p)};
+                               p.dynamic_viscosity,
+                               p.wall_viscosity,
+                               p.rest_density,
+                               {p.gravity[0], p.gravity[1], p.gravity[2]},
+                               walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass, sheet_filter(state));
   } else {
@@ -61,7 +76,8 @@ void integrate_velocity(State& state) {
   FluidState& f = state.fluid;
   const VecView v = f.velocity.view(), a = f.acceleration.view();
   const float dt = float(state.dt);
-  parallel_for("integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
+  parallel_for(
+      "integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
 }
 
 void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
@@ -89,22 +105,26 @@ const Pass all_passes[] = {
     {"sort_particles", fluid, column_position, moving, sort_particles},
     {"polygon_grid", exact, column_cloth, column_cloth, exact_grid},
     {"nearest_triangle", exact, column_position | column_cloth, column_sheet, exact_nearest},
-    {"sheet_side", exact, column_position | column_cloth, column_sheet | column_memory, find_sheet_sides},
+    {"sheet_side", exact, column_position | column_cloth, column_sheet | column_memory,
+     find_sheet_sides},
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
-    {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet, find_nearest_centroids},
+    {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
+     find_nearest_centroids},
     {"density", fluid, column_position, column_density, sum_density},
     {"pressure_viscosity", fluid, moving | column_density, column_acceleration, pressure_viscosity},
     {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
     {"integrate_velocity", fluid, column_acceleration, column_velocity, integrate_velocity},
     {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
-    {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth, start_contacts},
+    {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth,
+     start_contacts},
     {"cloth_predict", exact, column_cloth, column_cloth, cloth_predict},
     {"contact_exact", exact, column_sheet | column_density | column_cloth,
      column_velocity | column_contact | column_cloth, solve_contacts},
     {"paper_reaction", paper, column_contact, column_cloth, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
     {"move_cloth", cloth_alone, column_cloth, column_cloth, move_cloth},
-    {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact, move_coupled},
+    {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact,
+     move_coupled},
     {"paper_move", paper, moving | column_cloth, moving | column_cloth, paper_move},
 };
 
@@ -112,7 +132,8 @@ struct JoinLimits {
   DRENCH_HD Limits operator()(const Limits& a, const Limits& b) const {
     Limits joined = a;
     joined.max_speed = a.max_speed > b.max_speed ? a.max_speed : b.max_speed;
-    joined.max_acceleration = a.max_acceleration > b.max_acceleration ? a.max_acceleration : b.max_acceleration;
+    joined.max_acceleration =
+        a.max_acceleration > b.max_acceleration ? a.max_acceleration : b.max_acceleration;
     joined.bad_particle = first(a.bad_particle, b.bad_particle);
     joined.bad_vertex = first(a.bad_vertex, b.bad_vertex);
     return joined;
@@ -144,18 +165,24 @@ Limits measure_limits(State& state) {
   const VecView v = f.velocity.view(), a = f.acceleration.view(), cv = state.cloth.velocity.view();
   Limits limits;
   if (f.count > 0) {
-    limits = parallel_reduce("limits: fluid", f.count, Limits{}, DRENCH_LAMBDA(int i) {
-      const float speed = length(v[i]), push = length(a[i]);
-      const bool bad = !(speed < absurd) || !(push < 1e30f);
-      return Limits{bad ? 0.f : speed, bad ? 0.f : push, bad ? i : -1, -1};
-    }, JoinLimits{});
+    limits = parallel_reduce(
+        "limits: fluid", f.count, Limits{},
+        DRENCH_LAMBDA(int i) {
+          const float speed = length(v[i]), push = length(a[i]);
+          const bool bad = !(speed < absurd) || !(push < 1e30f);
+          return Limits{bad ? 0.f : speed, bad ? 0.f : push, bad ? i : -1, -1};
+        },
+        JoinLimits{});
   }
   if (state.cloth.vertices > 0) {
-    const Limits cloth = parallel_reduce("limits: cloth", state.cloth.vertices, Limits{}, DRENCH_LAMBDA(int i) {
-      const float speed = length(cv[i]);
-      const bool bad = !(speed < absurd);
-      return Limits{bad ? 0.f : speed, 0.f, -1, bad ? i : -1};
-    }, JoinLimits{});
+    const Limits cloth = parallel_reduce(
+        "limits: cloth", state.cloth.vertices, Limits{},
+        DRENCH_LAMBDA(int i) {
+          const float speed = length(cv[i]);
+          const bool bad = !(speed < absurd);
+          return Limits{bad ? 0.f : speed, 0.f, -1, bad ? i : -1};
+        },
+        JoinLimits{});
     limits = JoinLimits{}(limits, cloth);
   }
   return limits;

@@ -35,9 +35,7 @@ DRENCH_HD Vec3<T> select(M mask, Vec3<T> a, Vec3<T> b) {
   return {select(mask, a.x, b.x), select(mask, a.y, b.y), select(mask, a.z, b.z)};
 }
 DRENCH_HD Vec3<double> to_double(Vec3<float> a) { return {a.x, a.y, a.z}; }
-DRENCH_HD Vec3<float> to_float(Vec3<double> a) {
-  return {float(a.x), float(a.y), float(a.z)};
-}
+DRENCH_HD Vec3<float> to_float(Vec3<double> a) { return {float(a.x), float(a.y), float(a.z)}; }
 
 /// exp(-x) for x >= 0 by squaring a short series three times: within 1e-6 for x up to 1.
 template <class T>

@@ -80,8 +80,9 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
       const float* const row = column.data + i * width;
       if (!std::all_of(row, row + width, [](float value) { return std::isfinite(value); })) {
         throw Error(
-            fmt::format("{}: {} of vertex {} is not finite; the file was not written. The "
-                        "simulation has blown up: use a smaller time step",
+            fmt::format("{}: {} of vertex {} is not finite; the file was not written. If "
+                        "`drench verify` finds the particles sound, this is a fault of the mesher: "
+                        "change surface.voxel a little and report the shot",
                         path.string(), column.names[0], i));
       }
       append(bytes, row, width * sizeof(float));

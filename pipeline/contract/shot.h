@@ -74,12 +74,12 @@ struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kep
 };
 
 struct Fluid {
-  double spacing = 0.01;               // m, a
-  double support_ratio = 2;            // support radius / spacing
-  double rest_density = 1000;          // kg/m^3
-  double kinematic_viscosity = 1e-6;   // m^2/s
+  double spacing = 0.01;              // m, a
+  double support_ratio = 2;           // support radius / spacing
+  double rest_density = 1000;         // kg/m^3
+  double kinematic_viscosity = 1e-6;  // m^2/s
   double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none
-  double sound_speed = 0;              // m/s; 0: ten times the largest speed expected
+  double sound_speed = 0;             // m/s; 0: ten times the largest speed expected
   std::string material = "water";
   std::vector<FluidBox> box;
   std::vector<FluidSphere> sphere;

@@ -27,7 +27,8 @@ class Simulation {
  public:
   virtual ~Simulation() = default;
   virtual int frame() const = 0;
-  /// To the first frame, before it is written; nothing to do after read_checkpoint. @throws as advance.
+  /// To the first frame, before it is written; nothing to do after read_checkpoint. @throws as
+  /// advance.
   virtual void preroll(const std::function<bool()>& keep_going) = 0;
   /// To the next frame. @throws Stopped when keep_going says so; Error on blow-up.
   virtual StageReport advance(const std::function<bool()>& keep_going) = 0;

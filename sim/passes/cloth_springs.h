@@ -14,9 +14,12 @@ struct ClothSprings {
   int slots, stride;
 
   /// A vector at the other ends of slot s.
-  DRENCH_HD Vec3<float> at_end(const VecView& view, int i, int s) const { return view[end[s * stride + i]]; }
+  DRENCH_HD Vec3<float> at_end(const VecView& view, int i, int s) const {
+    return view[end[s * stride + i]];
+  }
 #if !defined(__CUDACC__)
-  /// Grids have the same offset all over a slot: then the ends are eight consecutive vertices as well.
+  /// Grids have the same offset all over a slot: then the ends are eight consecutive vertices as
+  /// well.
   DRENCH_HD Vec3<Pack> at_end(const VecView& view, Lanes i, int s) const {
     const int other = i.base + slot_offset[s];
     if (slot_offset[s] != 0 && other >= 0 && other + 8 <= stride) return view.at(Lanes{other});
@@ -46,57 +49,69 @@ struct ClothBuffers {
   VecView position, velocity, next, next_velocity;
 };
 
-// One damped Verlet step, eq (3) of the seed with v = (x_t - x_{t-dt}) / dt, which makes a change of
-// dt and the first step right: v' = d v + dt F/m, x' = x + dt v', d = exp(-rate dt).
+// One damped Verlet step, eq (3) of the seed with v = (x_t - x_{t-dt}) / dt, which makes a change
+// of dt and the first step right: v' = d v + dt F/m, x' = x + dt v', d = exp(-rate dt).
 inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  const ClothSprings springs{b.position, b.velocity, c.spring_end.data(), c.slot_offset.data(), c.rest_length.data(),
-                             c.stiffness.data(), c.spring_damping.data(), c.spring_slots, c.padded};
+  const ClothSprings springs{b.position,
+                             b.velocity,
+                             c.spring_end.data(),
+                             c.slot_offset.data(),
+                             c.rest_length.data(),
+                             c.stiffness.data(),
+                             c.spring_damping.data(),
+                             c.spring_slots,
+                             c.padded};
   const VecView fluid_force = c.force.view();
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const float margin = 0.25f * p.spacing;  // room for a particle (move.h) between cloth and wall
   const float open = 1e30f;
-  const Vec3<float> low{p.wall[0] ? p.low[0] + margin : -open, p.wall[1] ? p.low[1] + margin : -open,
+  const Vec3<float> low{p.wall[0] ? p.low[0] + margin : -open,
+                        p.wall[1] ? p.low[1] + margin : -open,
                         p.wall[2] ? p.low[2] + margin : -open};
-  const Vec3<float> high{p.wall[0] ? p.high[0] - margin : open, p.wall[1] ? p.high[1] - margin : open,
+  const Vec3<float> high{p.wall[0] ? p.high[0] - margin : open,
+                         p.wall[1] ? p.high[1] - margin : open,
                          p.wall[2] ? p.high[2] - margin : open};
-  for_each_lane("cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
-    using T = decltype(load(inverse_mass, i));
-    const T w = load(inverse_mass, i);
-    const auto free = w > T(0.f);
-    const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
-    const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
-    Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
-    Vec3<T> x = b.position.at(i) + v * T(dt);
-    // A wall stops cloth and holds half of its sliding back.
-    const Vec3<T> inside{minimum(maximum(x.x, T(low.x)), T(high.x)), minimum(maximum(x.y, T(low.y)), T(high.y)),
-                         minimum(maximum(x.z, T(low.z)), T(high.z))};
-    const Vec3<T> out = x - inside;
-    const auto touches = length2(out) > T(0.f);
-    const Vec3<T> stopped{select((out.x * out.x) > T(0.f), T(0.f), v.x * T(0.5f)),
-                          select((out.y * out.y) > T(0.f), T(0.f), v.y * T(0.5f)),
-                          select((out.z * out.z) > T(0.f), T(0.f), v.z * T(0.5f))};
-    v = select(touches, stopped, v);
-    const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-    b.next.put(i, select(free, inside, b.position.at(i)));
-    b.next_velocity.put(i, select(free, v, none));
-  });
+  for_each_lane(
+      "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
+        using T = decltype(load(inverse_mass, i));
+        const T w = load(inverse_mass, i);
+        const auto free = w > T(0.f);
+        const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
+        const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
+        Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
+        Vec3<T> x = b.position.at(i) + v * T(dt);
+        // A wall stops cloth and holds half of its sliding back.
+        const Vec3<T> inside{minimum(maximum(x.x, T(low.x)), T(high.x)),
+                             minimum(maximum(x.y, T(low.y)), T(high.y)),
+                             minimum(maximum(x.z, T(low.z)), T(high.z))};
+        const Vec3<T> out = x - inside;
+        const auto touches = length2(out) > T(0.f);
+        const Vec3<T> stopped{select((out.x * out.x) > T(0.f), T(0.f), v.x * T(0.5f)),
+                              select((out.y * out.y) > T(0.f), T(0.f), v.y * T(0.5f)),
+                              select((out.z * out.z) > T(0.f), T(0.f), v.z * T(0.5f))};
+        v = select(touches, stopped, v);
+        const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
+        b.next.put(i, select(free, inside, b.position.at(i)));
+        b.next_velocity.put(i, select(free, v, none));
+      });
 }
 
 inline ClothBuffers cloth_buffers(ClothState& c) {
   return {c.position.view(), c.velocity.view(), c.next.view(), c.next_velocity.view()};
 }
 
-// The mean velocity each vertex would have over the step without contact: the substeps themselves, made
-// into spare columns. Whatever the springs do within a step is then in it.
+// The mean velocity each vertex would have over the step without contact: the substeps themselves,
+// made into spare columns. Whatever the springs do within a step is then in it.
 inline void cloth_predict(State& state) {
   if (state.contact.near == 0) return;
   ClothState& c = state.cloth;
   const float dt = float(state.dt / state.substeps);
   ClothBuffers b = cloth_buffers(c);
-  const VecView spare[2][2] = {{c.next.view(), c.next_velocity.view()}, {c.start.view(), c.predicted.view()}};
+  const VecView spare[2][2] = {{c.next.view(), c.next_velocity.view()},
+                               {c.start.view(), c.predicted.view()}};
   for (int s = 0; s < state.substeps; ++s) {
     b.next = spare[s % 2][0], b.next_velocity = spare[s % 2][1];
     cloth_verlet(state, b, dt);
@@ -104,9 +119,9 @@ inline void cloth_predict(State& state) {
   }
   const VecView from = c.position.view(), to = b.position, predicted = c.predicted.view();
   const float inverse_dt = 1.f / float(state.dt);
-  parallel_for("cloth: mean velocity", c.vertices, DRENCH_LAMBDA(int i) {
-    predicted.set(i, (to[i] - from[i]) * inverse_dt);
-  });
+  parallel_for(
+      "cloth: mean velocity", c.vertices,
+      DRENCH_LAMBDA(int i) { predicted.set(i, (to[i] - from[i]) * inverse_dt); });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -6,8 +6,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Symplectic Euler inside the walls: velocity first, then position. A particle that still reaches the
-/// last tenth of a spacing before a wall stops there (the wall's pressure has failed it).
+/// Symplectic Euler inside the walls: velocity first, then position. A particle that still reaches
+/// the last tenth of a spacing before a wall stops there (the wall's pressure has failed it).
 struct Mover {
   float low[3], high[3];
   bool wall[3];
@@ -37,11 +37,12 @@ inline void move_particles(State& state) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view();
   const Mover mover = mover_of(state.parameters, float(state.dt));
-  parallel_for("move particles", f.count, DRENCH_LAMBDA(int i) {
-    Vec3<float> velocity = v[i];
-    x.set(i, mover(x[i], velocity));
-    v.set(i, velocity);
-  });
+  parallel_for(
+      "move particles", f.count, DRENCH_LAMBDA(int i) {
+        Vec3<float> velocity = v[i];
+        x.set(i, mover(x[i], velocity));
+        v.set(i, velocity);
+      });
 }
 
 inline void finish_substep(ClothState& c) {
@@ -58,7 +59,8 @@ inline void move_cloth(State& state) {
 }
 
 inline void copy_vectors(const char* name, VecView to, VecView from, int n) {
-  parallel_for(name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
+  parallel_for(
+      name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
 }
 
 struct GuardCount {
@@ -74,19 +76,35 @@ inline PathTest path_test_of(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const VecView next = c.next.view(), start = c.start.view();
-  const float moved2 = parallel_reduce("path test: cloth motion", c.vertices, 0.f,
-                                       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); },
-                                       Larger{});
+  const float moved2 = parallel_reduce(
+      "path test: cloth motion", c.vertices, 0.f,
+      DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
-  return {polygons_of(c), c.position.view(), next, c.next_velocity.view(), f.velocity.view(),
-          f.normal.view(), f.start.view(), f.position.view(), f.owed.view(), f.triangle.data(),
-          c.held.data(), c.stop_sum.data(), f.stopped.data(), f.sheet_distance.data(), c.mass.data(),
-          c.inverse_mass.data(), c.share.data(),
-          p.particle_mass, path_clearance * p.spacing, std::sqrt(moved2), 4};
+  return {polygons_of(c),
+          c.position.view(),
+          next,
+          c.next_velocity.view(),
+          f.velocity.view(),
+          f.normal.view(),
+          f.start.view(),
+          f.position.view(),
+          f.owed.view(),
+          f.triangle.data(),
+          c.held.data(),
+          c.stop_sum.data(),
+          f.stopped.data(),
+          f.sheet_distance.data(),
+          c.mass.data(),
+          c.inverse_mass.data(),
+          c.share.data(),
+          p.particle_mass,
+          path_clearance * p.spacing,
+          std::sqrt(moved2),
+          4};
 }
 
-/// The particles that are tested: the guarded ones, or all once cloth has come farther than they were
-/// chosen for.
+/// The particles that are tested: the guarded ones, or all once cloth has come farther than they
+/// were chosen for.
 struct Tested {
   const int *order, *guarded;  // the near list, places in it
   int count;
@@ -107,28 +125,33 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
   const Mover mover = mover_of(state.parameters, dt);
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
-  return parallel_reduce("path test", tested.count, GuardCount{}, DRENCH_LAMBDA(int k) {
-    const int i = tested[k];
-    const bool still = held[i] || moved[i];
-    Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-    Vec3<float> to = mover(x[i], velocity);
-    if (!still) v.set(i, velocity);
-    GuardCount result;
-    if (triangle[i] < 0 || test.in_reach(i, to)) {
-      const Vec3<float> wanted = to;
-      if (!test.resolve(i, x[i], to)) {
-        result.unresolved = 1;
-        held[i] = held[i] || test.stopped[i] < 0;  // nothing left to stop but itself
-      }
-      result.hits = result.unresolved || to.x != wanted.x || to.y != wanted.y || to.z != wanted.z;
-    }
-    end.set(i, to);
-    return result;
-  }, AddGuardCounts{});
+  return parallel_reduce(
+      "path test", tested.count, GuardCount{},
+      DRENCH_LAMBDA(int k) {
+        const int i = tested[k];
+        const bool still = held[i] || moved[i];
+        Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
+        Vec3<float> to = mover(x[i], velocity);
+        if (!still) v.set(i, velocity);
+        GuardCount result;
+        if (triangle[i] < 0 || test.in_reach(i, to)) {
+          const Vec3<float> wanted = to;
+          if (!test.resolve(i, x[i], to)) {
+            result.unresolved = 1;
+            held[i] = held[i] || test.stopped[i] < 0;  // nothing left to stop but itself
+          }
+          result.hits =
+              result.unresolved || to.x != wanted.x || to.y != wanted.y || to.z != wanted.z;
+        }
+        end.set(i, to);
+        return result;
+      },
+      AddGuardCounts{});
 }
 
-/// Takes back the substep of the vertices that particles stopped in this round, or of all. A stopped vertex
-/// takes on the mean velocity of those particles; what that changes of its momentum they share.
+/// Takes back the substep of the vertices that particles stopped in this round, or of all. A
+/// stopped vertex takes on the mean velocity of those particles; what that changes of its momentum
+/// they share.
 inline void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
@@ -138,73 +161,85 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
   int* hold = c.held.data();
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
-  parallel_for("path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
-    const int i = tested[k], t = test.stopped[i];
-    if (t < 0) return;
-    Vec3<float> gain{0.f, 0.f, 0.f};
-    for (int e = 0; e < 3; ++e) {
-      const int v = corner[3 * t + e];
-      if (hold[v] || test.inverse_mass[v] == 0.f) continue;
-      gain = gain + (next_v[v] - test.stop_velocity(v)) * (mass[v] / float(test.stop_count(v)));
-    }
-    velocity.set(i, velocity[i] + gain * inverse_mass);
-  });
-  parallel_for("path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
-    const bool stopped = test.stop_count(v) > 0;
-    if (!everywhere && !stopped) return;
-    if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v));
-    for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
-    hold[v] = 1;
-    next.set(v, x[v]);
-  });
+  parallel_for(
+      "path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
+        const int i = tested[k], t = test.stopped[i];
+        if (t < 0) return;
+        Vec3<float> gain{0.f, 0.f, 0.f};
+        for (int e = 0; e < 3; ++e) {
+          const int v = corner[3 * t + e];
+          if (hold[v] || test.inverse_mass[v] == 0.f) continue;
+          gain = gain + (next_v[v] - test.stop_velocity(v)) * (mass[v] / float(test.stop_count(v)));
+        }
+        velocity.set(i, velocity[i] + gain * inverse_mass);
+      });
+  parallel_for(
+      "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
+        const bool stopped = test.stop_count(v) > 0;
+        if (!everywhere && !stopped) return;
+        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v));
+        for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
+        hold[v] = 1;
+        next.set(v, x[v]);
+      });
 }
 
-/// Chooses the near particles that could meet a sheet within the step, with room for cloth to move twice as far
-/// as the contact solve predicts. All others make their whole step now: nothing to test.
+/// Chooses the near particles that could meet a sheet within the step, with room for cloth to move
+/// twice as far as the contact solve predicts. All others make their whole step now: nothing to
+/// test.
 inline void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const float dt = float(state.dt), spacing = state.parameters.spacing;
   const VecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
   const bool solved = state.contact.near > 0;  // else nothing was predicted
-  const float speed2 = parallel_reduce("guard: cloth speed", c.vertices, 0.f, DRENCH_LAMBDA(int v) {
-    return maximum(length2(cloth_velocity[v]), solved ? length2(predicted[v]) : 0.f);
-  }, Larger{});
+  const float speed2 = parallel_reduce(
+      "guard: cloth speed", c.vertices, 0.f,
+      DRENCH_LAMBDA(int v) {
+        return maximum(length2(cloth_velocity[v]), solved ? length2(predicted[v]) : 0.f);
+      },
+      Larger{});
   const float reach = 2.f * dt * std::sqrt(speed2) + 0.05f * spacing;
   state.contact.cloth_reach = reach;
-  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(), normal = f.normal.view();
+  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
+                normal = f.normal.view();
   const float* distance = f.sheet_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
   float* far_by = f.far_by.data();
   const Mover mover = mover_of(state.parameters, dt);
   const float room = reach + 2.f * path_clearance * spacing;
-  parallel_for("guard: move", f.count, DRENCH_LAMBDA(int i) {
-    Vec3<float> velocity = v[i];
-    start.set(i, x[i]);
-    const float d = distance[i] < 0.f ? -distance[i] : distance[i];
-    // Beyond a free edge the distance is not kept.
-    const bool guard = triangle[i] >= 0 && (length2(normal[i]) == 0.f || d <= dt * length(velocity) + room);
-    moved[i] = !guard;
-    if (guard) return;
-    x.set(i, mover(x[i], velocity));
-    v.set(i, velocity);
-    far_by[i] -= length(x[i] - start[i]);
-  });
-  parallel_for("guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
-  stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded, state.contact.guard_start,
-                   state.scratch);
+  parallel_for(
+      "guard: move", f.count, DRENCH_LAMBDA(int i) {
+        Vec3<float> velocity = v[i];
+        start.set(i, x[i]);
+        const float d = distance[i] < 0.f ? -distance[i] : distance[i];
+        // Beyond a free edge the distance is not kept.
+        const bool guard =
+            triangle[i] >= 0 && (length2(normal[i]) == 0.f || d <= dt * length(velocity) + room);
+        moved[i] = !guard;
+        if (guard) return;
+        x.set(i, mover(x[i], velocity));
+        v.set(i, velocity);
+        far_by[i] -= length(x[i] - start[i]);
+      });
+  parallel_for(
+      "guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
+  stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded,
+                   state.contact.guard_start, state.scratch);
   state.contact.guard_count = value_at(state.contact.guard_start, 1);
 }
 
 /// Others have made their step already; should cloth come as far as them they stand still for it.
 inline void accept_paths(State& state, const Tested& tested) {
   const VecView x = state.fluid.position.view(), end = state.fluid.impulse.view();
-  parallel_for("path test: accept", tested.count, DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
+  parallel_for(
+      "path test: accept", tested.count,
+      DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
 }
 
-/// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex has come from
-/// its place at the start of the step, m, before it was held.
+/// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex
+/// has come from its place at the start of the step, m, before it was held.
 inline float guard_substep(State& state, float dt) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
@@ -237,7 +272,8 @@ inline float guard_substep(State& state, float dt) {
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.
 inline void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
-  copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(), state.cloth.vertices);
+  copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(),
+               state.cloth.vertices);
   move_unguarded_particles(state);
   float moved = 0.f;
   for (int s = 0; s < state.substeps; ++s) {

@@ -1,11 +1,11 @@
 #pragma once
-// The last guard of the exact coupling: the straight path of a particle over a cloth substep against
-// the triangles that move meanwhile. In double on the stored floats, so that whoever counts crossings
-// from the stored states finds none. Where they would cross, the lighter one yields: a triangle lighter
-// than the particle is held for the substep and takes on the velocity of the particles that stopped it; a
-// lighter particle is put back on its side of the triangle, a small clearance off the place where they
-// met, by an impulse shared with the vertices. What finds no free place is held; if all is held nothing
-// moves, which is free of crossings whatever the tangle.
+// The last guard of the exact coupling: the straight path of a particle over a cloth substep
+// against the triangles that move meanwhile. In double on the stored floats, so that whoever counts
+// crossings from the stored states finds none. Where they would cross, the lighter one yields: a
+// triangle lighter than the particle is held for the substep and takes on the velocity of the
+// particles that stopped it; a lighter particle is put back on its side of the triangle, a small
+// clearance off the place where they met, by an impulse shared with the vertices. What finds no
+// free place is held; if all is held nothing moves, which is free of crossings whatever the tangle.
 
 #include "sim/geometry.h"
 #include "sim/passes/polygon_grid.h"
@@ -19,9 +19,11 @@ struct MovingTriangle {
 
 DRENCH_HD Vec3<double> lerp(Vec3<double> p, Vec3<double> q, double t) { return p + (q - p) * t; }
 
-/// The side of the plane of the triangle that the moving point is on at time t (six times a volume).
+/// The side of the plane of the triangle that the moving point is on at time t (six times a
+/// volume).
 DRENCH_HD double side_at(const MovingTriangle& m, Vec3<double> p0, Vec3<double> p1, double t) {
-  return signed_volume(lerp(m.a0, m.a1, t), lerp(m.b0, m.b1, t), lerp(m.c0, m.c1, t), lerp(p0, p1, t));
+  return signed_volume(lerp(m.a0, m.a1, t), lerp(m.b0, m.b1, t), lerp(m.c0, m.c1, t),
+                       lerp(p0, p1, t));
 }
 
 /// Is the point inside the triangle's outline at time t, seen along its normal? Edges belong to it.
@@ -34,8 +36,9 @@ DRENCH_HD bool inside_at(const MovingTriangle& m, Vec3<double> p0, Vec3<double> 
          dot(cross(a - c, p - c), n) >= slack;
 }
 
-/// First time in [0, 1] at which the point passes through the triangle, or -1. The side is a cubic in
-/// t: its turning points split [0, 1] into monotone parts, each with at most one root, found by bisection.
+/// First time in [0, 1] at which the point passes through the triangle, or -1. The side is a cubic
+/// in t: its turning points split [0, 1] into monotone parts, each with at most one root, found by
+/// bisection.
 DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<double> p1) {
   // Power form from four samples.
   const double f0 = side_at(m, p0, p1, 0), f1 = side_at(m, p0, p1, 1.0 / 3),
@@ -69,17 +72,18 @@ DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<do
 constexpr float path_clearance = 1e-3f;  // spacings off the triangle where a path that met it ends
 
 struct PathTest {
-  PolygonView polygons;           // cells from the start of the step
-  VecView cloth, cloth_next;      // this substep
+  PolygonView polygons;       // cells from the start of the step
+  VecView cloth, cloth_next;  // this substep
   VecView cloth_velocity, velocity, normal, start, position, owed;
   const int* triangle;
-  const int* hold;                // by vertex: 1 once stopped
-  long long* stop_sum;            // by vertex, 4: how many particles stop it in this round, sum of their
-                                  // velocities in units of velocity_unit
-  int* stopped;                   // by particle: triangle it stopped in this round, -1 none
+  const int* hold;      // by vertex: 1 once stopped
+  long long* stop_sum;  // by vertex, 4: how many particles stop it in this round, sum of their
+                        // velocities in units of velocity_unit
+  int* stopped;         // by particle: triangle it stopped in this round, -1 none
   const float *distance, *cloth_mass, *inverse_mass, *vertex_share;
-  float mass, clearance, cloth_moved;  // cloth_moved: m, farthest vertex from its place at the step's start
-  int attempts;                   // 0: the particle is held at once
+  float mass, clearance,
+      cloth_moved;  // cloth_moved: m, farthest vertex from its place at the step's start
+  int attempts;     // 0: the particle is held at once
 
   struct Hit {
     int triangle = -1;
@@ -87,8 +91,8 @@ struct PathTest {
   };
 
   DRENCH_HD MovingTriangle moving(int t) const {
-    const int *k = polygons.corner + 3 * t;
-    return {to_double(cloth[k[0]]), to_double(cloth[k[1]]), to_double(cloth[k[2]]),
+    const int* k = polygons.corner + 3 * t;
+    return {to_double(cloth[k[0]]),      to_double(cloth[k[1]]),      to_double(cloth[k[2]]),
             to_double(cloth_next[k[0]]), to_double(cloth_next[k[1]]), to_double(cloth_next[k[2]])};
   }
 
@@ -151,10 +155,10 @@ struct PathTest {
     }
   }
 
-  /// Puts the end of the path back on the particle's side of the triangle it met and takes the normal
-  /// part of the relative velocity, once a step and shared by the reduced mass of all contacts on the
-  /// vertices (as in contact_exact.h, or many hits would throw light cloth back); the cloth's part is
-  /// owed to it until the next step.
+  /// Puts the end of the path back on the particle's side of the triangle it met and takes the
+  /// normal part of the relative velocity, once a step and shared by the reduced mass of all
+  /// contacts on the vertices (as in contact_exact.h, or many hits would throw light cloth back);
+  /// the cloth's part is owed to it until the next step.
   DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
     const MovingTriangle m = moving(hit.triangle);
     const Vec3<double> p0 = to_double(from), p1 = to_double(to);
@@ -163,7 +167,8 @@ struct PathTest {
                        e = lerp(m.b0, m.b1, hit.time) - a, f = lerp(m.c0, m.c1, hit.time) - a;
     const Vec3<double> n = cross(e, f);
     const double nn = dot(n, n) > 1e-60 ? dot(n, n) : 1e-60;
-    const double wb = dot(cross(p - a, f), n) / nn, wc = dot(cross(e, p - a), n) / nn, wa = 1 - wb - wc;
+    const double wb = dot(cross(p - a, f), n) / nn, wc = dot(cross(e, p - a), n) / nn,
+                 wa = 1 - wb - wc;
     const Vec3<double> n1 = cross(m.b1 - m.a1, m.c1 - m.a1);
     const Vec3<double> unit = n1 * (side / (length(n1) > 1e-30 ? length(n1) : 1e-30));
     to = to_float(m.a1 * wa + m.b1 * wb + m.c1 * wc + unit * double(clearance));
@@ -181,18 +186,23 @@ struct PathTest {
     if (approach >= 0.f) return;
     const Vec3<float> impulse = direction * (-approach / row);
     owed.set(i, owed[i] + impulse);
-    // Between fluid on both sides a light sheet can neither move nor take more than its share, and the
-    // rest of the velocity would pile up in a particle that does not move: there it is given up.
-    velocity.set(i, velocity[i] + (still(hit.triangle) ? direction * -approach : impulse * (1.f / mass)));
+    // Between fluid on both sides a light sheet can neither move nor take more than its share, and
+    // the rest of the velocity would pile up in a particle that does not move: there it is given
+    // up.
+    velocity.set(
+        i, velocity[i] + (still(hit.triangle) ? direction * -approach : impulse * (1.f / mass)));
   }
 
-  /// Can the particle meet the sheet at all? Its distance at the start of the step against all motion.
+  /// Can the particle meet the sheet at all? Its distance at the start of the step against all
+  /// motion.
   DRENCH_HD bool in_reach(int i, Vec3<float> to) const {
     const float d = distance[i] < 0.f ? -distance[i] : distance[i];
     const float nearest = normal_is_zero(i) ? 0.f : d;
-    return nearest <= length(to - start[i]) + length(to - position[i]) + cloth_moved + 2.f * clearance;
+    return nearest <=
+           length(to - start[i]) + length(to - position[i]) + cloth_moved + 2.f * clearance;
   }
-  DRENCH_HD bool normal_is_zero(int i) const {  // beyond a free edge: near, but the distance is not kept
+  DRENCH_HD bool normal_is_zero(
+      int i) const {  // beyond a free edge: near, but the distance is not kept
     const Vec3<float> n = normal[i];
     return n.x == 0.f && n.y == 0.f && n.z == 0.f;
   }

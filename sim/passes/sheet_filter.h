@@ -1,9 +1,9 @@
 #pragma once
-// Fluid must not feel fluid through a sheet. Each near particle knows the plane of its nearest triangle.
-// A pair whose two planes both put the other in front sees each other; a pair whose planes both put it
-// behind, with opposed normals, does not; the rest (curved sheets, free edges) is decided by testing the
-// segment against the triangles themselves. The density pass tests all near particles and notes those from
-// which anything is hidden; the pressure pass tests only these.
+// Fluid must not feel fluid through a sheet. Each near particle knows the plane of its nearest
+// triangle. A pair whose two planes both put the other in front sees each other; a pair whose
+// planes both put it behind, with opposed normals, does not; the rest (curved sheets, free edges)
+// is decided by testing the segment against the triangles themselves. The density pass tests all
+// near particles and notes those from which anything is hidden; the pressure pass tests only these.
 
 #include "sim/geometry.h"
 #include "sim/pairs.h"
@@ -34,7 +34,8 @@ struct SheetFilter {
       if (hidden) return;
       Vec3<float> a, b, c;
       polygons.corners(polygons.order[k], a, b, c);
-      hidden = segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));
+      hidden =
+          segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));
     });
     return hidden;
   }
@@ -42,7 +43,8 @@ struct SheetFilter {
 #if defined(__CUDACC__)
   DRENCH_HD bool hides(int i, int j) const {
     const Vec3<float> ni = normal[i], nj = normal[j];
-    const bool front_i = dot(ni, position[j]) + plane[i] > 0.f, front_j = dot(nj, position[i]) + plane[j] > 0.f;
+    const bool front_i = dot(ni, position[j]) + plane[i] > 0.f,
+               front_j = dot(nj, position[i]) + plane[j] > 0.f;
     if ((front_i && front_j) || i == j) return false;
     if (length2(position[j] - position[i]) >= support_radius * support_radius) return false;
     if (!front_i && !front_j && dot(ni, nj) < 0.f) return true;
@@ -64,11 +66,14 @@ struct SheetFilter {
 
   /// Moves the neighbours that the sheet hides out of every support.
   template <int N>
-  DRENCH_HD Pack move_hidden_away(Self& i, const float* const* column, int k, Vec3<Pack> position) const {
-    const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k), Pack::load(column[N + 2] + k)};
+  DRENCH_HD Pack move_hidden_away(Self& i, const float* const* column, int k,
+                                  Vec3<Pack> position) const {
+    const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k),
+                              Pack::load(column[N + 2] + k)};
     const Mask back_i = dot(i.normal, position) + i.plane <= Pack(0.f);
     const Mask back_j = dot(normal_j, i.position) + Pack::load(column[N + 3] + k) <= Pack(0.f);
-    if ((back_i | back_j).bits() == 0) [[likely]] return position.x;  // all eight in front of each other
+    if ((back_i | back_j).bits() == 0) [[likely]]
+      return position.x;  // all eight in front of each other
     const Mask within = length2(position - i.position) < Pack(support_radius * support_radius);
     const Mask surely = back_i & back_j & (dot(i.normal, normal_j) < Pack(0.f));
     const int doubtful = ((back_i | back_j) & within & !surely).bits();
@@ -78,8 +83,8 @@ struct SheetFilter {
   }
 
   /// Lanes that are hidden for sure and those of the doubtful ones whose segment meets a triangle.
-  __attribute__((noinline)) Mask::Native hidden_lanes(const float* const* column, int place, int k, int surely,
-                                                      int doubtful) const {
+  __attribute__((noinline)) Mask::Native hidden_lanes(const float* const* column, int place, int k,
+                                                      int surely, int doubtful) const {
     const Vec3<float> p{column[0][place], column[1][place], column[2][place]};
     int hidden = surely;
     for (int bits = doubtful; bits; bits &= bits - 1) {
@@ -97,8 +102,8 @@ struct SheetFilter {
 
 inline SheetFilter sheet_filter(const State& state) {
   const FluidState& f = state.fluid;
-  return {f.shaded.data(), f.position.view(), f.normal.view(), f.plane.data(),
-          polygons_of(state.cloth), state.parameters.support_radius};
+  return {f.shaded.data(), f.position.view(),        f.normal.view(),
+          f.plane.data(),  polygons_of(state.cloth), state.parameters.support_radius};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

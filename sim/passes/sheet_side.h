@@ -39,11 +39,12 @@ struct SheetTopology {
 };
 
 inline SheetTopology topology_of(const ClothState& c) {
-  return {polygons_of(c), c.neighbour.data(), c.sheet.data(), c.fan_start.data(), c.fan_entry.data(),
-          c.rim.data(), c.rest_centroid.view(), c.half_thickness.data()};
+  return {polygons_of(c),     c.neighbour.data(), c.sheet.data(),         c.fan_start.data(),
+          c.fan_entry.data(), c.rim.data(),       c.rest_centroid.view(), c.half_thickness.data()};
 }
 
-/// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no sheet.
+/// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no
+/// sheet.
 struct FootNormal {
   Vec3<float> normal;
   bool free_edge;
@@ -65,7 +66,8 @@ DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, fl
 }
 
 /// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
-DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc, float spacing) {
+DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc,
+                           float spacing) {
   const int* neighbour = sheet.neighbour + 3 * t;
   if (neighbour[0] >= 0 && neighbour[1] >= 0 && neighbour[2] >= 0) return 1.f;
   float inside = 1.f;
@@ -81,9 +83,10 @@ DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb
   return max0(inside);
 }
 
-// Side, normal, signed distance and wall density of every particle near a sheet. The side is taken from
-// the geometry when a particle comes within reach and remembered while its nearest triangle stays on
-// the same patch (rest centroids within two supports); memory ends beyond the support and at free edges.
+// Side, normal, signed distance and wall density of every particle near a sheet. The side is taken
+// from the geometry when a particle comes within reach and remembered while its nearest triangle
+// stays on the same patch (rest centroids within two supports); memory ends beyond the support and
+// at free edges.
 inline void find_sheet_sides(State& state) {
   FluidState& f = state.fluid;
   const SheetTopology sheet = topology_of(state.cloth);
@@ -91,43 +94,47 @@ inline void find_sheet_sides(State& state) {
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
-  float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
+  float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(),
+        *share = f.cloth_share.data();
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing,
               scale = state.parameters.wall_scale;
   const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
-  parallel_for("sheet side", f.count, DRENCH_LAMBDA(int i) {
-    const int t = triangle[i];
-    normal.set(i, {0.f, 0.f, 0.f});
-    distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
-    if (t < 0) {
-      memory_triangle[i] = -1;
-      return;
-    }
-    const float wb = weight_b[i], wc = weight_c[i], wa = 1.f - wb - wc;
-    const FootNormal foot = foot_normal(sheet, t, wa, wb, wc);
-    if (foot.free_edge) {
-      memory_triangle[i] = -1;
-      return;
-    }
-    Vec3<float> a, b, c;
-    sheet.polygons.corners(t, a, b, c);
-    const Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
-    const float d = length(to_particle);
-    const int seen = dot(to_particle, foot.normal) >= 0.f ? 1 : -1;
-    const int old = memory_triangle[i];
-    const bool remembered = old >= 0 && sheet.sheet[old] == sheet.sheet[t] &&
-                            length(sheet.rest_centroid[old] - sheet.rest_centroid[t]) < patch;
-    const int side = remembered ? memory_side[i] : seen;
-    memory_triangle[i] = t, memory_side[i] = side;
-    const Vec3<float> pseudo = foot.normal * (float(side) / maximum(length(foot.normal), 1e-20f));
-    const bool clear = d > 1e-4f * h;  // closer than that the direction is rounding
-    const float flip = side == seen ? 1.f : -1.f;
-    normal.set(i, clear ? to_particle * (flip / d) : pseudo);
-    distance[i] = flip * d;
-    plane[i] = distance[i] - dot(normal[i], position[i]);
-    edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
-    share[i] = scale * edge[i] * spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
-  });
+  parallel_for(
+      "sheet side", f.count, DRENCH_LAMBDA(int i) {
+        const int t = triangle[i];
+        normal.set(i, {0.f, 0.f, 0.f});
+        distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
+        if (t < 0) {
+          memory_triangle[i] = -1;
+          return;
+        }
+        const float wb = weight_b[i], wc = weight_c[i], wa = 1.f - wb - wc;
+        const FootNormal foot = foot_normal(sheet, t, wa, wb, wc);
+        if (foot.free_edge) {
+          memory_triangle[i] = -1;
+          return;
+        }
+        Vec3<float> a, b, c;
+        sheet.polygons.corners(t, a, b, c);
+        const Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
+        const float d = length(to_particle);
+        const int seen = dot(to_particle, foot.normal) >= 0.f ? 1 : -1;
+        const int old = memory_triangle[i];
+        const bool remembered = old >= 0 && sheet.sheet[old] == sheet.sheet[t] &&
+                                length(sheet.rest_centroid[old] - sheet.rest_centroid[t]) < patch;
+        const int side = remembered ? memory_side[i] : seen;
+        memory_triangle[i] = t, memory_side[i] = side;
+        const Vec3<float> pseudo =
+            foot.normal * (float(side) / maximum(length(foot.normal), 1e-20f));
+        const bool clear = d > 1e-4f * h;  // closer than that the direction is rounding
+        const float flip = side == seen ? 1.f : -1.f;
+        normal.set(i, clear ? to_particle * (flip / d) : pseudo);
+        distance[i] = flip * d;
+        plane[i] = distance[i] - dot(normal[i], position[i]);
+        edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
+        share[i] = scale * edge[i] *
+                   spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
+      });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

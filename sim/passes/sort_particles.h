@@ -1,5 +1,6 @@
 #pragma once
-// Particles sorted by cell at the start of every step; ties keep their order, which a checkpoint holds.
+// Particles sorted by cell at the start of every step; ties keep their order, which a checkpoint
+// holds.
 
 #include "sim/passes/polygon_grid.h"
 
@@ -8,18 +9,21 @@ namespace drench::sim::DRENCH_BACKEND {
 inline void permute(Column<float>& column, Column<float>& spare, const int* order, int n) {
   const float* from = column.data();
   float* to = spare.data();
-  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
+  parallel_for(
+      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
 inline void permute(Column<int>& column, Column<int>& spare, const int* order, int n) {
   const int* from = column.data();
   int* to = spare.data();
-  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
+  parallel_for(
+      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
 inline void permute(VecColumn& column, VecColumn& spare, const int* order, int n) {
   const VecView from = column.view(), to = spare.view();
-  parallel_for("permute", n, DRENCH_LAMBDA(int i) { to.set(i, from[order[i]]); });
+  parallel_for(
+      "permute", n, DRENCH_LAMBDA(int i) { to.set(i, from[order[i]]); });
   column.swap(spare);
 }
 
@@ -33,16 +37,18 @@ inline void sort_particles(State& state) {
   const GridShape grid = f.grid;
   // Past an open side of the domain by more than a support a particle is lost: it sorts behind all.
   float low[3], high[3];
-  for (int k = 0; k < 3; ++k) low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
+  for (int k = 0; k < 3; ++k)
+    low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
   const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
   const int lost = grid.cells();
   int* cell = f.cell.data();
-  parallel_for("fluid cells", n, DRENCH_LAMBDA(int i) {
-    const Vec3<float> q = x[i];
-    const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
-                        q.z >= lower.z && q.z <= upper.z;
-    cell[i] = inside ? grid.cell(q) : lost;
-  });
+  parallel_for(
+      "fluid cells", n, DRENCH_LAMBDA(int i) {
+        const Vec3<float> q = x[i];
+        const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
+                            q.z >= lower.z && q.z <= upper.z;
+        cell[i] = inside ? grid.cell(q) : lost;
+      });
   stable_sort_keys(f.cell, n, lost, f.order, f.cell_start, state.scratch);
   const int* order = f.order.data();
   permute(f.position, state.swap_vector, order, n);

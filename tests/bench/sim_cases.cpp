@@ -80,7 +80,8 @@ Shot seed_shot(SeedScene scene, int particles, CouplingScheme scheme) {
 }
 
 struct BlowUp : std::runtime_error {
-  explicit BlowUp(double at) : runtime_error("blew up at t = " + std::to_string(at) + " s"), time(at) {}
+  explicit BlowUp(double at)
+      : runtime_error("blew up at t = " + std::to_string(at) + " s"), time(at) {}
   double time;  // s
 };
 

@@ -10,8 +10,8 @@
 namespace drench::sim_tests {
 namespace {
 
-/// Largest kinetic energy of fluid and cloth, J, while a block of 1.536 kg falls 0.05 m onto a pinned sheet
-/// of light cotton and lies on it; infinite if the solver itself finds a speed absurd.
+/// Largest kinetic energy of fluid and cloth, J, while a block of 1.536 kg falls 0.05 m onto a
+/// pinned sheet of light cotton and lies on it; infinite if the solver itself finds a speed absurd.
 double largest_energy(CouplingScheme scheme) {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -9.81, 0);
@@ -39,8 +39,8 @@ double largest_energy(CouplingScheme scheme) {
   return largest;
 }
 
-// No more than gravity can give: the block's centre is 0.08 m above the sheet and sinks no more than the
-// 0.1 m that a sheet of this stiffness sags under it.
+// No more than gravity can give: the block's centre is 0.08 m above the sheet and sinks no more
+// than the 0.1 m that a sheet of this stiffness sags under it.
 constexpr double energy_of_fall = 1.536 * 9.81 * 0.18;  // J
 
 TEST(Coupling, WaterOnLightCottonIsStable) {

@@ -133,8 +133,8 @@ TEST(CrossingObserver, SeesTheStatesOfTheSolverAndLeavesThemAlone) {
   }
 }
 
-// A ghost 12 mm above the simulated sheet, within the support radius of 20 mm: the jet crosses it, and
-// whoever has done so an odd number of times is below.
+// A ghost 12 mm above the simulated sheet, within the support radius of 20 mm: the jet crosses it,
+// and whoever has done so an odd number of times is below.
 TEST(CrossingObserver, CountsThroughAGhost) {
   Shot shot = jet_at_sheet(V3d(0.3, -10, 0.2), 3);
   const sim::Scene ghost = sim::build_scene(shot);
@@ -149,7 +149,8 @@ TEST(CrossingObserver, CountsThroughAGhost) {
   EXPECT_EQ((count.crossings - below) % 2, 0);
 }
 
-// A ghost that sinks into the falling block, 0.2 mm a substep, meets particles in every one of them.
+// A ghost that sinks into the falling block, 0.2 mm a substep, meets particles in every one of
+// them.
 TEST(CrossingObserver, CountsSubstepBySubstep) {
   Shot shot = jet_at_sheet(V3d(0, -1, 0), 3);
   sim::Scene ghost = sim::build_scene(shot);

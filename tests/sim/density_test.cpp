@@ -52,13 +52,15 @@ TEST(Density, IsRestDensityInsideALattice) {
   }
 }
 
-// The kernel integrates to one, so the lattice sum that scales it is one but for the lattice's error. The
-// spiky kernel's cusp makes that error fall slowly: 4.7 % at three spacings, 1.5 % at four, 0.3 % at six.
+// The kernel integrates to one, so the lattice sum that scales it is one but for the lattice's
+// error. The spiky kernel's cusp makes that error fall slowly: 4.7 % at three spacings, 1.5 % at
+// four, 0.3 % at six.
 TEST(Density, LatticeSumTendsToTheIntegral) {
   Shot shot = empty_shot();
   add_box(shot, V3d(0), {1, 1, 1});
   double before = 1;
-  for (const auto& [ratio, error] : {std::pair(3., 0.048), std::pair(4., 0.0155), std::pair(6., 0.0031)}) {
+  for (const auto& [ratio, error] :
+       {std::pair(3., 0.048), std::pair(4., 0.0155), std::pair(6., 0.0031)}) {
     shot.fluid.support_ratio = ratio;
     const double off = std::abs(sim::build_scene(shot).parameters.lattice_sum - 1);
     EXPECT_LT(off, error) << ratio;

@@ -11,9 +11,9 @@ namespace drench::sim_tests {
 namespace {
 
 struct Profile {
-  double rms = 0;       // of the mean p of slabs one spacing thick, less rho g depth, over rho g H
-  double bottom = 0;    // mean density of the lowest layer over its closed form, less one
-  double speed = 0;     // m/s, largest left
+  double rms = 0;     // of the mean p of slabs one spacing thick, less rho g depth, over rho g H
+  double bottom = 0;  // mean density of the lowest layer over its closed form, less one
+  double speed = 0;   // m/s, largest left
 };
 
 /// A column of height 0.2 m in walls, settled for 1.5 s and averaged over 0.3 s more.
@@ -23,7 +23,8 @@ Profile settled_column(int layers) {
   shot.gravity = V3d(0, -g, 0);
   shot.fluid.spacing = height / layers;
   const int side = std::max(12, layers / 2);
-  shot.domain.min = V3d(0), shot.domain.max = V3d(side * shot.fluid.spacing, 0.4, side * shot.fluid.spacing);
+  shot.domain.min = V3d(0),
+  shot.domain.max = V3d(side * shot.fluid.spacing, 0.4, side * shot.fluid.spacing);
   shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
   add_box(shot, V3d(0), {side, layers, side});
   Stepper run(shot);
@@ -67,9 +68,10 @@ Profile settled_column(int layers) {
 
 class Hydrostatic : public testing::TestWithParam<int> {};
 
-// Slab means more than a support from the side walls. Pressure is never negative, so density noise of a
-// tenth of the 1 % compression at the bottom shows as bias: 5 % measured at all three resolutions, 7 % gated.
-// The density at the bottom is 1 % above rest by design; 2 % is the error allowed to it.
+// Slab means more than a support from the side walls. Pressure is never negative, so density noise
+// of a tenth of the 1 % compression at the bottom shows as bias: 5 % measured at all three
+// resolutions, 7 % gated. The density at the bottom is 1 % above rest by design; 2 % is the error
+// allowed to it.
 TEST_P(Hydrostatic, SettledColumnHasTheLinearProfile) {
   const Profile profile = settled_column(GetParam());
   RecordProperty("rms", std::to_string(profile.rms));

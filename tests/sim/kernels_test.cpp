@@ -118,9 +118,8 @@ TEST(Kernels, WallFunctionOfAHalfSpaceMatchesTheData) {
 
 TEST(Kernels, SpikyHalfSpaceIsTheSumOfItsLayers) {
   for (double q = 0; q < 1; q += 0.0625) {
-    const double layers = integrate(q, 1, [](double s) {
-      return 7.5 * std::pow(1 - s, 4) - 6 * std::pow(1 - s, 5);
-    });
+    const double layers =
+        integrate(q, 1, [](double s) { return 7.5 * std::pow(1 - s, 4) - 6 * std::pow(1 - s, 5); });
     EXPECT_NEAR(sim::cpu::spiky_halfspace(float(q)), layers, rounding) << q;
   }
   EXPECT_EQ(sim::cpu::spiky_halfspace(0), 0.5f);

@@ -104,7 +104,8 @@ V3d centre_of_mass(const sim::HostState& state) {
 
 std::vector<std::vector<std::string>> read_validation(const std::string& name) {
   const char* source = std::getenv("DRENCH_SOURCE");  // set by tests/gpu/gather's run script
-  std::ifstream file(std::string(source ? source : DRENCH_SOURCE_DIR) + "/tests/validation/data/" + name);
+  std::ifstream file(std::string(source ? source : DRENCH_SOURCE_DIR) + "/tests/validation/data/" +
+                     name);
   std::vector<std::vector<std::string>> rows;
   for (std::string line; std::getline(file, line);) {
     if (line.empty() || line[0] == '#') continue;
