@@ -1,6 +1,8 @@
 // What is written of a shot: the lock file, the digests of the stages, the reference, a first shot.
 #include <fmt/format.h>
 
+#include <functional>
+
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/contract/shot_table.h"
@@ -238,54 +240,49 @@ constexpr const char* quality_text =
     "[quality.preview.fluid]\nspacing = 0.02\n\n"
     "[quality.preview.render]\nwidth = 320\nheight = 180\nsamples = 8\n";
 
-}  // namespace
-
-std::string reference_shot(const std::string& name) {
-  check_name(name);
-  Shot shot = one_of_everything(name);
+/// A shot with its descriptions: `about` it, then a line for every key that applies.
+std::string described_shot(
+    Shot shot, const char* about,
+    const std::function<std::string(const Parameter&, const std::string& value)>& line) {
+  check_name(shot.name);
   std::string text = fmt::format(
-      "# {}: every key that a shot may have, at its default where it has one.\n"
-      "# Delete what the shot does not need; [[...]] may stand any number of times or not at all.\n"
+      "# {}: {}\n"
       "# Units are SI, Y is up, colours are linear ACEScg, \"srgb(r, g, b)\" or \"#rrggbb\".\n",
-      name);
+      shot.name, about);
   shot_table::for_each_object(shot, [&](const Section& section, void* object, const std::string&) {
     text += fmt::format("\n# {}\n{}\n", section.description, header_of(section));
-    for (const Parameter* p : shot_table::parameters_of(section.name)) {
-      if (!shot_table::applies(*p, section, object)) continue;
-      const std::string value = shown_value(*p, object);
-      const std::string line =
-          value.empty() ? fmt::format("# {} = ...", p->key) : fmt::format("{} = {}", p->key, value);
-      text += fmt::format("{}  # {}{}: {}\n", line, p->required ? "required; " : "",
-                          value_column(*p), p->description);
-    }
+    for (const Parameter* p : shot_table::parameters_of(section.name))
+      if (shot_table::applies(*p, section, object)) text += line(*p, shown_value(*p, object));
   });
   return text + quality_text;
 }
 
+}  // namespace
+
+std::string reference_shot(const std::string& name) {
+  return described_shot(
+      one_of_everything(name),
+      "every key that a shot may have, at its default where it has one.\n"
+      "# Delete what the shot does not need; [[...]] may stand any number of times or not at all.",
+      [](const Parameter& p, const std::string& value) {
+        const std::string line =
+            value.empty() ? fmt::format("# {} = ...", p.key) : fmt::format("{} = {}", p.key, value);
+        return fmt::format("{}  # {}{}: {}\n", line, p.required ? "required; " : "",
+                           value_column(p), p.description);
+      });
+}
+
 std::string starting_shot(const std::string& name) {
-  check_name(name);
-  Shot shot = first_shot(name);
-  std::string text = fmt::format(
-      "# {}: a ball of water falls on a sheet held at its corners.\n"
-      "# Keys behind '#' show their defaults. `drench init NAME --reference` writes every key "
-      "there "
-      "is.\n"
-      "# Units are SI, Y is up, colours are linear ACEScg, \"srgb(r, g, b)\" or \"#rrggbb\".\n",
-      name);
-  shot_table::for_each_object(shot, [&](const Section& section, void* object, const std::string&) {
-    text += fmt::format("\n# {}\n{}\n", section.description, header_of(section));
-    for (const Parameter* p : shot_table::parameters_of(section.name)) {
-      if (!shot_table::applies(*p, section, object)) continue;
-      std::string value = shown_value(*p, object);
-      const bool absent = value.empty();
-      if (absent) value = "\"\"";
-      const bool standard = absent || (p->field && value == default_text(*p));
-      const std::string unit = p->unit.empty() ? "" : fmt::format("{}: ", p->unit);
-      text += fmt::format("{}{} = {}  # {}{}\n", standard ? "# " : "", p->key, value, unit,
-                          p->description);
-    }
-  });
-  return text + quality_text;
+  return described_shot(
+      first_shot(name),
+      "a ball of water falls on a sheet held at its corners.\n"
+      "# Keys behind '#' show their defaults. `drench init NAME --reference` writes every one.",
+      [](const Parameter& p, const std::string& value) {
+        const bool standard = value.empty() || (p.field && value == default_text(p));
+        const std::string unit = p.unit.empty() ? "" : fmt::format("{}: ", p.unit);
+        return fmt::format("{}{} = {}  # {}{}\n", standard ? "# " : "", p.key,
+                           value.empty() ? "\"\"" : value, unit, p.description);
+      });
 }
 
 }  // namespace drench
