@@ -55,14 +55,14 @@ DRENCH_HD PlaneFoot<T> plane_foot(Vec3<T> p, const PreparedTriangle<T>& t) {
 
 /// A squared distance that the triangle is not nearer than: to its plane and, in the plane, past
 /// the edge line that the foot lies farthest beyond. Cheap, and exact but for corners; less what
-/// rounding may add.
+/// rounding may add, which grows as the corner at a gets sharp.
 template <class T>
 DRENCH_HD T distance2_bound(const PlaneFoot<T>& f, const PreparedTriangle<T>& t) {
-  const T v = max0(-f.v), w = max0(-f.w), u = max0(f.v + f.w - T(1.f));
-  const T along = length2(f.ap);
-  const T plane = max0(along * T(1.f - 1e-5f) - (f.v * f.p1 + f.w * f.p2));
+  const T blur = T(1e-6f) * (t.d11 * t.d22 * t.inverse), det = t.d11 * t.d22 - t.d12 * t.d12;
+  const T v = max0(-f.v - blur), w = max0(-f.w - blur), u = max0(f.v + f.w - T(1.f) - blur);
+  const T plane = max0(length2(f.ap) * (T(1.f - 1e-5f) - blur) - (f.v * f.p1 + f.w * f.p2));
   const T past = maximum(v * v * t.inverse_ac, maximum(w * w * t.inverse_ab, u * u * t.inverse_bc));
-  return plane + past * (T(0.9999f) * (t.d11 * t.d22 - t.d12 * t.d12));
+  return plane + past * det * max0(T(0.9999f) - blur);
 }
 
 /// Exact in all seven regions: the foot on the plane if it lies inside, else the best edge point.

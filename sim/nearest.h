@@ -68,8 +68,8 @@ struct NearestOfPack {
   Pack best, wb{0.f}, wc{0.f};
   LaneIndex which = same_index(-1);
 
-  /// Triangle k of the sorted ones for all eight.
-  DRENCH_HD void test(const PolygonView& polygons, int k) {
+  /// Triangle k of the sorted ones for those of the eight that it may be nearer to.
+  DRENCH_HD void test(const PolygonView& polygons, int k, Mask may) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
     const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
@@ -77,7 +77,7 @@ struct NearestOfPack {
                                    one.inverse_bc, one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
-    const Mask may = (distance2_bound(plane, t) < best) & !same(which, triangle);
+    may = may & (distance2_bound(plane, t) < best) & !same(which, triangle);
     if (may.bits()) take(closest_point(plane, t), triangle, may);
   }
   /// Each its own triangle, -1 for none.
@@ -94,13 +94,13 @@ struct NearestOfPack {
     best = select(closer, foot.distance2, best), which = select(closer, triangle, which);
     wb = select(closer, foot.wb, wb), wc = select(closer, foot.wc, wc);
   }
-  /// Could the triangle in box k be nearer than what any of the eight has?
-  DRENCH_HD bool may_improve(const PolygonView& polygons, int k) const {
+  /// Which of the eight could the triangle in box k be nearer to than what they have?
+  DRENCH_HD Mask may_improve(const PolygonView& polygons, int k) const {
     const Vec3<float> l = polygons.sorted_low[k], h = polygons.sorted_high[k];
     const Vec3<Pack> gap{max0(maximum(Pack(l.x) - p.x, p.x - Pack(h.x))),
                          max0(maximum(Pack(l.y) - p.y, p.y - Pack(h.y))),
                          max0(maximum(Pack(l.z) - p.z, p.z - Pack(h.z)))};
-    return (length2(gap) < best).bits() != 0;
+    return length2(gap) < best;
   }
 };
 
@@ -137,7 +137,8 @@ class PackOfNeighbours {
         if (k + 8 > to) bits &= (1 << (to - k)) - 1;
         for (; bits; bits &= bits - 1) {
           const int place = k + __builtin_ctz(bits);
-          if (pack.may_improve(polygons_, place)) pack.test(polygons_, place);
+          const Mask may = pack.may_improve(polygons_, place);
+          if (may.bits()) pack.test(polygons_, place, may);
         }
       }
     });

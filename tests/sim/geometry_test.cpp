@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/parallel.h"
@@ -48,6 +49,49 @@ TEST(ClosestPoint, IsTheNearestOfAllPointsOfTheTriangle) {
     EXPECT_NEAR(length(p - foot), distance, 2e-4) << trial;  // slivers lose digits in their weights
     EXPECT_LE(distance, nearest + 2e-4) << trial;
     EXPECT_GE(distance, nearest - 3.5 / n) << trial;  // edges are at most 2 sqrt(3) long
+  }
+}
+
+/// Distance to a triangle in double: to its edges, and to its plane where the foot lies inside.
+double distance_in_double(D3 p, const D3 (&corner)[3]) {
+  const D3 n = cross(corner[1] - corner[0], corner[2] - corner[0]);
+  double nearest = 1e30;
+  bool inside = true;
+  for (int k = 0; k < 3; ++k) {
+    const D3 a = corner[k], e = corner[(k + 1) % 3] - a;
+    const double t = std::clamp(dot(p - a, e) / dot(e, e), 0.0, 1.0);
+    nearest = std::min(nearest, length(p - a - e * t));
+    inside &= dot(cross(e, p - a), n) >= 0;
+  }
+  return inside ? std::abs(dot(p - corner[0], n)) / length(n) : nearest;
+}
+
+// The bound that spares the exact distance may not pass it, for triangles down to a corner of half
+// a degree at any of the three, of edges of length 1.
+TEST(ClosestPoint, IsNotNearerThanTheBound) {
+  Random random(12);
+  for (const double degrees : {60., 10., 3., 1., 0.5}) {
+    constexpr int trials = 30000;
+    int close = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      const F3 u = draw(random), e = u * (1 / length(u)), side = cross(e, draw(random)),
+               f = side * (1 / length(side)), apex = draw(random);
+      const double angle = degrees * 3.14159265358979 / 180;
+      const F3 edge = e * float(std::cos(angle)) + f * float(std::sin(angle));
+      F3 corner[3];
+      corner[trial % 3] = apex, corner[(trial + 1) % 3] = apex + e,
+                     corner[(trial + 2) % 3] = apex + edge;
+      const F3 p = corner[trial / 3 % 3] + draw(random) * float(random());
+      const auto t = sim::cpu::prepare_triangle(corner[0], corner[1], corner[2]);
+      const double bound = std::sqrt(sim::cpu::distance2_bound(sim::cpu::plane_foot(p, t), t));
+      const double exact = distance_in_double(
+          to_double(p), {to_double(corner[0]), to_double(corner[1]), to_double(corner[2])});
+      EXPECT_LE(bound, exact + 5e-4) << degrees;
+      close += bound > 0.9 * exact;
+    }
+    if (degrees >= 10) {
+      EXPECT_GT(close, trials / 2) << degrees;  // and it is of use
+    }
   }
 }
 
