@@ -72,7 +72,9 @@ struct AddGuardCounts {
   }
 };
 
-inline PathTest path_test_of(State& state) {
+/// @param moved  how far cloth came in the substeps before, m: a triangle that springs back starts
+/// there.
+inline PathTest path_test_of(State& state, float moved) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const VecView next = c.next.view(), start = c.start.view();
@@ -89,7 +91,6 @@ inline PathTest path_test_of(State& state) {
           f.start.view(),
           f.position.view(),
           f.owed.view(),
-          f.triangle.data(),
           c.held.data(),
           c.stop_sum.data(),
           f.stopped.data(),
@@ -99,7 +100,7 @@ inline PathTest path_test_of(State& state) {
           c.share.data(),
           p.particle_mass,
           path_clearance * p.spacing,
-          std::sqrt(moved2),
+          std::max(std::sqrt(moved2), moved),
           4};
 }
 
@@ -200,7 +201,8 @@ inline void move_unguarded_particles(State& state) {
       },
       Larger{});
   const float reach = 2.f * dt * std::sqrt(speed2) + 0.05f * spacing;
-  state.contact.cloth_reach = reach;
+  // Others than the near ones are only known to be a support away, and may have come nearer since.
+  state.contact.cloth_reach = std::min(reach, 0.4f * state.parameters.support_radius);
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
                 normal = f.normal.view();
   const float* distance = f.sheet_distance.data();
@@ -239,13 +241,14 @@ inline void accept_paths(State& state, const Tested& tested) {
 }
 
 /// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex
-/// has come from its place at the start of the step, m, before it was held.
-inline float guard_substep(State& state, float dt) {
+/// has come from its place at the start of the step so far, m, before it was held.
+/// @param moved  the same of the substep before.
+inline float guard_substep(State& state, float dt, float moved) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
-  PathTest test = path_test_of(state);
-  Tested tested = tested_of(state, test.cloth_moved);
-  const float moved = test.cloth_moved;
+  PathTest test = path_test_of(state, moved);
+  moved = test.cloth_moved;
+  const Tested tested = tested_of(state, moved);
   if (tested.count == 0) return moved;
   f.held.clear_bytes(0);
   f.stopped.clear_bytes(0xff);
@@ -259,7 +262,7 @@ inline float guard_substep(State& state, float dt) {
     ++state.guard_holds;
     const bool everywhere = round >= 24;
     hold_cloth(state, test, tested, everywhere);
-    test = path_test_of(state);
+    test = path_test_of(state, moved);
     if (!everywhere) continue;
     f.held.clear_bytes(1);
     test_paths(state, test, tested, dt);
@@ -278,7 +281,7 @@ inline void move_coupled(State& state) {
   float moved = 0.f;
   for (int s = 0; s < state.substeps; ++s) {
     cloth_verlet(state, cloth_buffers(state.cloth), dt);
-    moved = std::max(moved, guard_substep(state, dt));
+    moved = guard_substep(state, dt, moved);
     finish_substep(state.cloth);
     if (state.after_substep) state.after_substep();
   }

@@ -75,15 +75,14 @@ struct PathTest {
   PolygonView polygons;       // cells from the start of the step
   VecView cloth, cloth_next;  // this substep
   VecView cloth_velocity, velocity, normal, start, position, owed;
-  const int* triangle;
   const int* hold;      // by vertex: 1 once stopped
   long long* stop_sum;  // by vertex, 4: how many particles stop it in this round, sum of their
                         // velocities in units of velocity_unit
   int* stopped;         // by particle: triangle it stopped in this round, -1 none
   const float *distance, *cloth_mass, *inverse_mass, *vertex_share;
-  float mass, clearance,
-      cloth_moved;  // cloth_moved: m, farthest vertex from its place at the step's start
-  int attempts;     // 0: the particle is held at once
+  float mass, clearance;
+  float cloth_moved;  // m, farthest that a vertex has been from its place at the step's start
+  int attempts;       // 0: the particle is held at once
 
   struct Hit {
     int triangle = -1;
