@@ -4,13 +4,16 @@
 // the neighbours of a cell are copied side by side once and read eight at a time; on the GPU every
 // thread walks the 27 cells of its particle. A particle is its own neighbour too (distance 0).
 //
-// Physics:  static constexpr int columns;             number of float columns read
-//           Inputs<columns> inputs() const;           their pointers, in the order of Particle's
-//           members template <class T> struct Particle;       position first; only members of type
-//           T or Vec3<T> template <class T> struct Sum;            members of type T or Vec3<T>,
-//           zero to start with template <class T> void pair(i, j, sum) const; void finish(int i,
-//           const Sum<float>&) const; static constexpr bool costly;             a pair costs more
-//           than to see that all eight are out of reach float support_radius;
+// clang-format off
+// Physics:  static constexpr int columns;        number of float columns read
+//           static constexpr bool costly;        more than to see that all eight are out of reach
+//           Inputs<columns> inputs() const;      their pointers, in the order of Particle's members
+//           template <class T> struct Particle;  position first; members of type T or Vec3<T> only
+//           template <class T> struct Sum;       members of type T or Vec3<T>, zero to start with
+//           template <class T> void pair(i, j, sum) const;
+//           void finish(int i, const Sum<float>&) const;
+//           float support_radius;
+// clang-format on
 // Filter:   hides neighbours behind a sheet (passes/sheet_filter.h); NoFilter hides none.
 
 #include <bit>

@@ -49,7 +49,7 @@ struct FluidState {
   Column<float> cloth_share;  // share of density that the sheet replaces
   VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end
   VecColumn start;            // m, position at the start of the step
-  Column<int> moved;          // 1: out of reach of any sheet, has made its whole step
+  Column<int> moved;          // 1: cannot meet a sheet, has made its whole step
   Column<int> held, stopped;  // by the path test for this substep; triangle it stopped, -1 none
 };
 
