@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "sim/parallel.h"
-#include "sim/passes/path_test.h"
+#include "sim/passes/move.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -168,6 +168,35 @@ TEST(FreeEdge, PushesNothingBesideIt) {
 // g in all.
 TEST(FreeEdge, TheSheetItselfDoesPush) {
   EXPECT_GT(pushed(V3d(0.013, 0.004, 0.017), V3d(0, -0.5, 0)).y, -0.45);
+}
+
+// A triangle rises 1 mm in the first substep and springs back to 0.5 mm in the second, while a
+// particle that followed it at 0.8 mm goes on: the boxes are those of the step's start, 0.8 mm
+// below.
+TEST(PathTest, FindsATriangleThatSpringsBackWithinTheStep) {
+  sim::cpu::State state;
+  state.parameters.spacing = 0.01f, state.parameters.support_radius = 0.02f;
+  state.parameters.particle_mass = 1e-3f;
+  sim::cpu::ClothState& c = state.cloth;
+  c.vertices = 3, c.triangles = 1, c.padded = 8;
+  for (sim::cpu::VecColumn* column : {&c.position, &c.start, &c.next}) column->resize(8);
+  c.centroid.resize(1), c.cell.resize(1);
+  c.sorted_low.resize(9), c.sorted_high.resize(9), c.sorted_triangle.resize(9);
+  sim::cpu::from_host(c.corner, std::vector<int>{0, 1, 2});
+  const auto put = [](const sim::cpu::VecColumn& column, float z) {
+    column.view().set(0, {0.f, 0.f, z});
+    column.view().set(1, {0.02f, 0.f, z});
+    column.view().set(2, {0.f, 0.02f, z});
+  };
+  put(c.position, 0), put(c.start, 0), put(c.next, 1e-3f);
+  sim::cpu::build_polygon_grid(state, state.parameters.support_radius);
+  const float moved = path_test_of(state, 0).cloth_moved;
+  EXPECT_NEAR(moved, 1e-3f, 1e-9f);
+  put(c.position, 1e-3f), put(c.next, 5e-4f);
+  const F3 from{0.005f, 0.005f, 0.8e-3f}, to{0.005f, 0.005f, 1.65e-3f};
+  const auto hit = path_test_of(state, moved).first_hit(from, to);
+  EXPECT_EQ(hit.triangle, 0);
+  EXPECT_NEAR(hit.time, 0.2 / 1.35, 1e-5);  // 0.8 + 0.85 t = 1 - 0.5 t
 }
 
 }  // namespace
