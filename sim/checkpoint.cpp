@@ -8,7 +8,7 @@ namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '1'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '2'};
 
 /// The same list of members writes and reads: Archive is a Writer or a Reader.
 template <class Archive, class C>
@@ -18,7 +18,7 @@ void transfer(Archive& archive, C& c) {
   for (auto* v : {&s.position, &s.velocity, &s.owed, &s.cloth_position, &s.cloth_velocity}) {
     archive(v->x), archive(v->y), archive(v->z);
   }
-  archive(s.id), archive(s.memory_triangle), archive(s.memory_side);
+  archive(s.id), archive(s.memory_triangle), archive(s.memory_side), archive(s.pressure_term);
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
 }
 

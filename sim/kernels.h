@@ -68,8 +68,8 @@ DRENCH_HD T viscosity_halfspace(T q) {
   return max0(T(15.f) * (T(0.5f) - p + p * p * p - T(0.5f) * p * p * p * p));
 }
 
-/// Shapes (without factor) of the two kernels that density may be summed with, of the squared
-/// distance.
+/// Shapes (without factor) of the two kernels that the weakly compressible fluid may sum its
+/// density with, of the squared distance.
 struct Spiky {
   template <class T>
   static DRENCH_HD T shape(T r2, T h) {
@@ -85,6 +85,39 @@ struct Poly6 {
     return u * u * u;
   }
   static float factor(float h) { return poly6_factor(h); }
+};
+
+/// The kernel of the incompressible solver (Wendland 1995; particles do not pair with it, Dehnen
+/// and Aly 2012). u = 1 - r / h, q = distance / h of a plane, negative behind it.
+struct WendlandC2 {
+  /// W h^3.
+  template <class T>
+  static DRENCH_HD T value(T u) {
+    const T u2 = u * u;
+    return T(10.5f / pi) * (u2 * u2) * (T(5.f) - T(4.f) * u);
+  }
+  /// -W'(r) / r h^5.
+  template <class T>
+  static DRENCH_HD T slope(T u) {
+    return T(210.f / pi) * (u * u * u);
+  }
+  /// h times the integral over the plane.
+  static DRENCH_HD float plane(float q) {
+    const float t = max0(1.f - fabsf(q)), t2 = t * t;
+    return 21.f * t2 * t2 * t * (1.f - t * (1.5f - 4.f / 7 * t));
+  }
+  /// Integral over everything beyond the plane.
+  static DRENCH_HD float halfspace(float q) {
+    const float t = max0(1.f - fabsf(q)), t2 = t * t;
+    const float beyond = t2 * t2 * t2 * (3.5f - t * (4.5f - 1.5f * t));
+    return q < 0.f ? 1.f - beyond : beyond;
+  }
+  /// W of the squared distance, without 1 / h^3: see Spiky.
+  template <class T>
+  static DRENCH_HD T shape(T r2, T h) {
+    return value(max0(T(1.f) - square_root(r2) / h));
+  }
+  static float factor(float h) { return 1.f / (h * h * h); }
 };
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -112,24 +112,25 @@ class Tile {
   void fill(const GridView& grid, int cx, int cy, int cz, const Inputs<N>& in, int columns) {
     const GridShape& g = grid.shape;
     const int x0 = std::max(cx - 1, 0), x1 = std::min(cx + 1, g.nx - 1);
-    int begin[9], count[9], rows = 0;
+    int rows = 0;
     size_ = 0;
     for (int z = std::max(cz - 1, 0); z <= std::min(cz + 1, g.nz - 1); ++z) {
       for (int y = std::max(cy - 1, 0); y <= std::min(cy + 1, g.ny - 1); ++y, ++rows) {
-        begin[rows] = grid.cell_start[g.index(x0, y, z)];
-        count[rows] = grid.cell_start[g.index(x1, y, z) + 1] - begin[rows];
-        if (y == cy && z == cz) centre_ = size_ - begin[rows];
-        size_ += count[rows];
+        begin_[rows] = grid.cell_start[g.index(x0, y, z)];
+        count_[rows] = grid.cell_start[g.index(x1, y, z) + 1] - begin_[rows];
+        if (y == cy && z == cz) centre_ = size_ - begin_[rows];
+        size_ += count_[rows];
       }
     }
+    rows_ = rows;
     stride_ = (size_ + 15) / 8 * 8;
     if (data_.size() < size_t(stride_) * columns) data_.resize(size_t(stride_) * columns);
     for (int c = 0; c < columns; ++c) {
       float* to = data_.data() + size_t(c) * stride_;
-      for (int r = 0; r < rows; to += count[r++]) {
+      for (int r = 0; r < rows; to += count_[r++]) {
         // Whole packs, past the end of the row too: what comes next overwrites that.
-        for (int k = 0; k < count[r]; k += Pack::size)
-          Pack::load(in.column[c] + begin[r] + k).store(to + k);
+        for (int k = 0; k < count_[r]; k += Pack::size)
+          Pack::load(in.column[c] + begin_[r] + k).store(to + k);
       }
       // Far away in position; the last column may be the plane of a sheet, which must be far as
       // well.
@@ -137,11 +138,20 @@ class Tile {
     }
   }
   int size() const { return size_; }
+  /// The particle that stands in each place, and anything in the padding.
+  void particles(std::vector<int>& particle) const {
+    if (particle.size() < size_t(stride_)) particle.resize(stride_);
+    int* to = particle.data();
+    for (int r = 0; r < rows_; to += count_[r++]) {
+      for (int k = 0; k < count_[r]; ++k) to[k] = begin_[r] + k;
+    }
+  }
   int place_of(int particle) const { return particle + centre_; }  // of the centre row's particles
   const float* column(int c) const { return data_.data() + size_t(c) * stride_; }
 
  private:
   std::vector<float> data_;
+  int begin_[9], count_[9], rows_ = 0;  // the runs of particles that a tile is made of
   int size_ = 0, stride_ = 0, centre_ = 0;
 };
 

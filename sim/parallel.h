@@ -73,6 +73,24 @@ T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
   return value;
 }
 
+template <class T, class Combine, class Then>
+__global__ void launch_then(int blocks, T value, const T* partial, Combine combine, Then then) {
+  for (int b = 0; b < blocks; ++b) value = combine(value, partial[b]);
+  then(value);
+}
+
+/// As parallel_reduce, but the result goes to `then` on the device: the host does not wait.
+template <class T, class F, class Combine, class Then>
+void reduce_then(const char* name, int n, T start, const F& f, const Combine& combine,
+                 const Then& then) {
+  static Column<T> partial;
+  partial.resize(reduce_blocks);
+  const int blocks = std::min(reduce_blocks, (n + reduce_block - 1) / reduce_block);
+  launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
+  launch_then<<<1, 1>>>(blocks, start, partial.data(), combine, then);
+  check_cuda(cudaGetLastError(), name);
+}
+
 #else
 
 template <class F>
@@ -109,6 +127,13 @@ T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
   T value = start;
   for (const T& part : partial) value = combine(value, part);
   return value;
+}
+
+/// As parallel_reduce, but the result goes to `then` where the data are.
+template <class T, class F, class Combine, class Then>
+void reduce_then(const char* name, int n, T start, const F& f, const Combine& combine,
+                 const Then& then) {
+  then(parallel_reduce(name, n, start, f, combine));
 }
 
 #endif

@@ -9,14 +9,24 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
   const auto consider = [&](double dt, const char* name) {
     if (dt < ruling.dt) ruling = {dt, name};
   };
-  if (p.fluid) {
-    const double h = p.support_radius;
+  const double h = p.support_radius, a = p.spacing;
+  const double viscosity = double(p.dynamic_viscosity) / p.rest_density;
+  const auto consider_viscosity = [&] {
+    if (viscosity > 0) consider(0.125 * h * h / viscosity, "viscosity");
+  };
+  if (p.fluid && p.incompressible) {
+    const double g = std::hypot(p.gravity[0], p.gravity[1], p.gravity[2]);
+    // What has not moved yet may be about to: the sound speed is ten times what is expected.
+    const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
+    consider(0.4 * a / speed, "speed");
+    if (g > 0) consider(0.08 * std::sqrt(a / g), "gravity");
+    consider_viscosity();
+  } else if (p.fluid) {
     // One speed of sound a step, and nothing moves farther than 0.4 supports: cloth speed counts.
     consider(0.4 * h / (double(p.sound_speed) + limits.max_speed), "sound speed");
     if (limits.max_acceleration > 0)
       consider(0.25 * std::sqrt(h / limits.max_acceleration), "force");
-    const double viscosity = double(p.dynamic_viscosity) / p.rest_density;
-    if (viscosity > 0) consider(0.125 * h * h / viscosity, "viscosity");
+    consider_viscosity();
   } else {
     consider(p.cloth_dt_limit, "cloth");
   }

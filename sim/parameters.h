@@ -10,11 +10,15 @@ struct Parameters {
   // fluid
   float spacing = 0, support_radius = 0;      // m, a and h
   float particle_mass = 0, rest_density = 0;  // kg, kg/m^3
-  float lattice_sum = 1;         // of the density kernel over a cubic lattice, times a^3
-  float wall_scale = 1;          // of the half-space integral: a lattice at a wall is whole
-  float sound_speed = 0;         // m/s
-  float dynamic_viscosity = 0;   // Pa s, fluid on fluid and on cloth
-  float wall_viscosity = 0;      // Pa s, fluid on domain walls: the physical one
+  float lattice_sum = 1;        // of the density kernel over a cubic lattice, times a^3
+  float wall_scale = 1;         // of the half-space integral: a lattice at a wall is whole
+  float sound_speed = 0;        // m/s; of the incompressible fluid: a tenth of it is to be expected
+  bool incompressible = false;  // solver: pressures by a solve, or by an equation of state
+  float tolerance = 1e-4f;      // of the incompressible solver: mean density error over rest
+  int most_iterations = 100;    // of it, a step
+  float xsph = 0;               // share of the neighbours' mean velocity taken on a step
+  float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
+  float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one
   float gravity[3] = {0, 0, 0};  // m/s^2
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
@@ -32,13 +36,15 @@ struct Parameters {
 struct Limits {
   float max_speed = 0;         // m/s, fluid and cloth
   float max_acceleration = 0;  // m/s^2, fluid
+  float residual = 0;          // mean density error that the pressure solve left, over rest
+  int iterations = 0;          // of the pressure solve
   int bad_particle = -1;       // index of the first particle that is not finite or absurdly fast
   int bad_vertex = -1;
 };
 
 /// The largest stable fluid step and the name of the limit that rules it.
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
-/// 1992).
+/// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003.
 struct StepLimit {
   double dt;
   const char* name;

@@ -48,8 +48,20 @@ double lattice_sum(double a, double h, int low) {
 template <class Kernel>
 void calibrate(double a, double h, Parameters& p) {
   const double whole = lattice_sum<Kernel>(a, h, -1000), cut = lattice_sum<Kernel>(a, h, 0);
+  const float q = float(0.5 * a / h);
+  const float beyond = p.incompressible ? cpu::WendlandC2::halfspace(q) : cpu::spiky_halfspace(q);
   p.lattice_sum = float(whole);
-  p.wall_scale = float((whole - cut) / whole) / cpu::spiky_halfspace(float(0.5 * a / h));
+  p.wall_scale = float((whole - cut) / whole) / beyond;
+}
+
+bool is_incompressible(const Shot& shot) {
+  return shot.fluid.solver == FluidSolver::incompressible ||
+         (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
+}
+
+double support_ratio(const Shot& shot) {
+  if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;
+  return is_incompressible(shot) ? 2.15 : 2.0;
 }
 
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
@@ -75,20 +87,25 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
 
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
   Parameters p;
-  const double a = shot.fluid.spacing, h = a * shot.fluid.support_ratio;
+  const double a = shot.fluid.spacing, h = a * support_ratio(shot);
   p.fluid = shot.fluid.present();
   p.spacing = float(a), p.support_radius = float(h);
   p.rest_density = float(shot.fluid.rest_density);
   p.particle_mass = float(shot.fluid.rest_density * a * a * a);
   const bool poly6 = shot.coupling.scheme == CouplingScheme::paper && !shot.cloth.empty();
-  poly6 ? calibrate<cpu::Poly6>(a, h, p) : calibrate<cpu::Spiky>(a, h, p);
+  p.incompressible = is_incompressible(shot);
+  p.tolerance = float(shot.fluid.tolerance), p.xsph = float(shot.fluid.xsph);
+  p.incompressible ? calibrate<cpu::WendlandC2>(a, h, p)
+  : poly6          ? calibrate<cpu::Poly6>(a, h, p)
+                   : calibrate<cpu::Spiky>(a, h, p);
   p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed
                                                    : automatic_sound_speed(shot, fluid));
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
   const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;
-  p.dynamic_viscosity =
-      float(shot.fluid.rest_density * std::max(shot.fluid.kinematic_viscosity, numerical));
+  const double viscosity = p.incompressible ? shot.fluid.kinematic_viscosity
+                                            : std::max(shot.fluid.kinematic_viscosity, numerical);
+  p.dynamic_viscosity = float(shot.fluid.rest_density * viscosity);
   p.wall_viscosity = float(shot.fluid.rest_density * shot.fluid.kinematic_viscosity);
   for (int k = 0; k < 3; ++k) {
     p.gravity[k] = float(shot.gravity[k]);

@@ -67,7 +67,7 @@ struct Simulator::Implementation {
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 1").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 2").finish();
     frame = shot.timeline.first;
     next_id = int(scene.start.id.size());
     solver->load(scene.start);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "sim/passes/measure_density.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -41,6 +42,11 @@ class BackendSolver : public Solver {
       from_host(state_.fluid.memory_side, host.memory_side);
       upload(state_.fluid.owed, host.owed);
     }
+    if (allocated_ & column_projection) {
+      std::vector<float> term = host.pressure_term;
+      term.resize(host.id.size(), 0.f);  // a state that no step has made yet has none
+      from_host(state_.fluid.pressure_term, term);
+    }
     state_.fluid.far_by.clear_bytes(0);
     state_.owes = true;
     if (allocated_ & column_cloth) {
@@ -65,6 +71,7 @@ class BackendSolver : public Solver {
       host.memory_side = to_host(f.memory_side, n);
       host.owed = download(f.owed, n);
     }
+    if (allocated_ & column_projection) host.pressure_term = to_host(f.pressure_term, n);
     if (allocated_ & column_cloth) {
       host.cloth_position = download(state_.cloth.position, state_.cloth.vertices);
       host.cloth_velocity = download(state_.cloth.velocity, state_.cloth.vertices);
@@ -102,6 +109,9 @@ class BackendSolver : public Solver {
       put(f.owed, {none, none, none});
       f.far_by.upload(none.data(), more, at);
     }
+    if (allocated_ & column_projection) {
+      f.pressure_term.upload(std::vector<float>(more, 0.f).data(), more, at);
+    }
     f.count = int(at + more);
   }
 
@@ -113,7 +123,12 @@ class BackendSolver : public Solver {
     } else {
       for (const Pass& pass : plan_) pass.launch(state_);
     }
-    return measure_limits(state_);
+    Limits limits = measure_limits(state_);
+    if (state_.parameters.incompressible && state_.fluid.count > 0) {
+      const SolveControl solve = value_at(state_.pressure.control, 0);
+      limits.residual = solve.residual, limits.iterations = solve.iterations;
+    }
+    return limits;
   }
   void observe_substeps(std::function<void(const HostState&)> observer) override {
     state_.after_substep = nullptr;
@@ -122,6 +137,7 @@ class BackendSolver : public Solver {
 
   void refresh() override {
     if (state_.fluid.count == 0) return;
+    if (state_.parameters.incompressible) return measure_density(state_);
     for (const Pass& pass : plan_) {
       pass.launch(state_);
       if (pass.writes & column_density) break;
@@ -145,7 +161,15 @@ class BackendSolver : public Solver {
     for (Column<int>* c : {&f.id, &f.cell, &f.order, &state_.swap_int}) c->resize(n);
     if (allocated_ & column_acceleration) f.acceleration.resize(n);
     if (allocated_ & column_density) {
-      for (Column<float>* c : {&f.density, &f.pressure_term, &f.inverse_density}) c->resize(n);
+      for (Column<float>* c : {&f.density, &f.pressure_term}) c->resize(n);
+      if (!state_.parameters.incompressible) f.inverse_density.resize(n);
+    }
+    if (allocated_ & column_projection) {
+      PressureState& s = state_.pressure;
+      for (Column<Float4>* c : {&s.place, &s.vector, &s.wall}) c->resize(n);
+      for (Column<float>* c : {&s.inverse_diagonal, &s.source, &s.before, &s.next, &s.product})
+        c->resize(n);
+      s.control.resize(1);
     }
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,

@@ -24,7 +24,8 @@ struct HostVec {
 struct HostState {
   HostVec position, velocity;  // m local, m/s
   std::vector<int> id, memory_triangle, memory_side;
-  HostVec owed;  // kg m/s
+  HostVec owed;                      // kg m/s
+  std::vector<float> pressure_term;  // m^5/(kg s^2), of the incompressible solver's last step
   HostVec cloth_position, cloth_velocity;
   Limits limits;  // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
@@ -53,6 +54,7 @@ enum ColumnGroup : unsigned {
   column_memory = 32,   // remembered side
   column_contact = 64,  // impulses
   column_cloth = 128,
+  column_projection = 256,  // neighbour lists and rows of the pressure solve
 };
 
 struct PassInfo {

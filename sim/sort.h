@@ -18,4 +18,10 @@ struct SortScratch {
 void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>& order,
                       Column<int>& start, SortScratch& scratch);
 
+#if defined(__CUDACC__)
+/// first[i] is the sum of counts[0..i), for i up to n.
+void exclusive_scan(const Column<int>& counts, int n, Column<unsigned>& first,
+                    SortScratch& scratch);
+#endif
+
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -1,6 +1,8 @@
-// CUB's radix sort is stable. The heavy headers stay in this one file.
+// CUB's radix sort is stable, and a sum of integers has one result. The heavy headers stay in this one
+// file.
 
 #include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
 
 #include "sim/parallel.h"
 #include "sim/sort.h"
@@ -39,6 +41,22 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
         high = middle;
     }
     first[k] = low;
+  });
+}
+
+void exclusive_scan(const Column<int>& counts, int n, Column<unsigned>& first,
+                    SortScratch& scratch) {
+  size_t bytes = 0;
+  check_cuda(cub::DeviceScan::ExclusiveSum(nullptr, bytes, counts.data(), first.data(), n),
+             "sizing a scan");
+  if (scratch.bytes.size() < bytes) scratch.bytes.resize(bytes);
+  check_cuda(cub::DeviceScan::ExclusiveSum(scratch.bytes.data(), bytes, counts.data(), first.data(),
+                                           n),
+             "scanning");
+  const int* count = counts.data();
+  unsigned* sum = first.data();
+  parallel_for("scan: total", 1, [=] __device__(int) {
+    sum[n] = n > 0 ? sum[n - 1] + unsigned(count[n - 1]) : 0u;
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include "sim/geometry.h"
 #include "sim/grid.h"
+#include "sim/neighbours.h"
 #include "sim/parameters.h"
 #include "sim/sort.h"
 #include "sim/wall_table.h"
@@ -104,10 +105,30 @@ struct ContactState {
   float cloth_reach = 0;  // m, how far cloth may move in the step before all are tested
 };
 
+/// Scalars of a pressure solve, in the memory of the backend: no iteration waits for the host.
+struct SolveControl {
+  int done = 0, iterations = 0;
+  float residual = 1e30f, least_residual = 1e30f;  // mean, over the rest density
+  float relaxation = 0.4f;  // below 1 / the largest eigenvalue of the scaled matrix: 0.5 diverges
+  float momentum = 1.f, extrapolation = 0.f;
+};
+
+/// Columns of the incompressible solver, rebuilt every step (passes/pressure_rows.h). Its warm
+/// start is FluidState::pressure_term.
+struct PressureState {
+  NeighbourLists lists;
+  Column<Float4> place;   // m, position; w: a pressure
+  Column<Float4> vector;  // a vector field; w: 0
+  Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
+  Column<float> inverse_diagonal, source, before, next, product;
+  Column<SolveControl> control;
+};
+
 struct State {
   Parameters parameters;
   WallTableData wall_table{};  // of the paper coupling
   FluidState fluid;
+  PressureState pressure;
   ClothState cloth;
   ContactState contact;
   SortScratch scratch;

@@ -3,6 +3,7 @@
 #include "sim/passes/contact_exact.h"
 #include "sim/passes/contact_paper.h"
 #include "sim/passes/density.h"
+#include "sim/passes/incompressible.h"
 #include "sim/passes/move.h"
 #include "sim/passes/pressure_viscosity.h"
 #include "sim/passes/sheet_filter.h"
@@ -94,15 +95,27 @@ void paper_move(State& state) {
 }
 
 bool fluid(const Parameters& p, bool) { return p.fluid; }
+bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; }
+bool smoothed(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && (p.xsph > 0 || p.dynamic_viscosity > 0);
+}
+bool compressible(const Parameters& p, bool) { return p.fluid && !p.incompressible; }
 bool exact(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
 bool paper(const Parameters& p, bool cloth) { return p.fluid && cloth && p.paper; }
-bool fluid_alone(const Parameters& p, bool cloth) { return p.fluid && !cloth; }
+bool fluid_alone(const Parameters& p, bool cloth) { return compressible(p, cloth) && !cloth; }
 bool cloth_alone(const Parameters& p, bool cloth) { return !p.fluid && cloth; }
 
 constexpr unsigned moving = column_position | column_velocity;
 
 const Pass all_passes[] = {
+    {"predict_particles", projected, moving, moving, predict_particles},
     {"sort_particles", fluid, column_position, moving, sort_particles},
+    {"find_neighbours", projected, column_position, column_density | column_projection,
+     find_neighbours},
+    {"smooth_velocities", smoothed, column_velocity | column_projection, column_velocity,
+     smooth_velocities},
+    {"project_density", projected, moving | column_density | column_projection, moving,
+     project_density},
     {"polygon_grid", exact, column_cloth, column_cloth, exact_grid},
     {"nearest_triangle", exact, column_position | column_cloth, column_sheet, exact_nearest},
     {"sheet_side", exact, column_position | column_cloth, column_sheet | column_memory,
@@ -110,10 +123,11 @@ const Pass all_passes[] = {
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
     {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
      find_nearest_centroids},
-    {"density", fluid, column_position, column_density, sum_density},
-    {"pressure_viscosity", fluid, moving | column_density, column_acceleration, pressure_viscosity},
+    {"density", compressible, column_position, column_density, sum_density},
+    {"pressure_viscosity", compressible, moving | column_density, column_acceleration,
+     pressure_viscosity},
     {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
-    {"integrate_velocity", fluid, column_acceleration, column_velocity, integrate_velocity},
+    {"integrate_velocity", compressible, column_acceleration, column_velocity, integrate_velocity},
     {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
     {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth,
      start_contacts},
@@ -163,14 +177,20 @@ Limits measure_limits(State& state) {
   // Twenty times the speed of sound is no flow but a blow-up; NaN fails the comparison as well.
   const float absurd = p.fluid ? 20.f * p.sound_speed : 1e4f;
   const VecView v = f.velocity.view(), a = f.acceleration.view(), cv = state.cloth.velocity.view();
+  const bool accelerated = f.acceleration.x.size() > 0;  // the incompressible solver keeps none
   Limits limits;
   if (f.count > 0) {
     limits = parallel_reduce(
         "limits: fluid", f.count, Limits{},
         DRENCH_LAMBDA(int i) {
-          const float speed = length(v[i]), push = length(a[i]);
-          const bool bad = !(speed < absurd) || !(push < 1e30f);
-          return Limits{bad ? 0.f : speed, bad ? 0.f : push, bad ? i : -1, -1};
+          const float speed = length(v[i]), push = accelerated ? length(a[i]) : 0.f;
+          Limits one;
+          if (!(speed < absurd) || !(push < 1e30f)) {
+            one.bad_particle = i;
+          } else {
+            one.max_speed = speed, one.max_acceleration = push;
+          }
+          return one;
         },
         JoinLimits{});
   }
@@ -179,8 +199,13 @@ Limits measure_limits(State& state) {
         "limits: cloth", state.cloth.vertices, Limits{},
         DRENCH_LAMBDA(int i) {
           const float speed = length(cv[i]);
-          const bool bad = !(speed < absurd);
-          return Limits{bad ? 0.f : speed, 0.f, -1, bad ? i : -1};
+          Limits one;
+          if (speed < absurd) {
+            one.max_speed = speed;
+          } else {
+            one.bad_vertex = i;
+          }
+          return one;
         },
         JoinLimits{});
     limits = JoinLimits{}(limits, cloth);

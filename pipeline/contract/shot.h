@@ -73,9 +73,15 @@ struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kep
   int particles = 0;  // if > 0: exactly so many particles in all, lattice balls truncated by radius
 };
 
+/// automatic: incompressible without cloth, weakly compressible with it.
+enum class FluidSolver { automatic, incompressible, weakly_compressible };
+
 struct Fluid {
-  double spacing = 0.01;              // m, a
-  double support_ratio = 2;           // support radius / spacing
+  double spacing = 0.01;  // m, a
+  FluidSolver solver = FluidSolver::automatic;
+  double support_ratio = 0;           // support radius / spacing; 0: what suits the solver
+  double tolerance = 1e-4;            // incompressible: mean density error over rest, a step
+  double xsph = 0.01;                 // incompressible: share of the neighbours' velocity, a step
   double rest_density = 1000;         // kg/m^3
   double kinematic_viscosity = 1e-6;  // m^2/s
   double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none

@@ -118,7 +118,12 @@ class Checker {
 
   void check_fluid() const {
     const Fluid& fluid = shot_.fluid;
-    if (fluid.support_ratio < 1.2) {
+    if (fluid.solver == FluidSolver::incompressible && !shot_.cloth.empty()) {
+      fail("fluid.solver",
+           "fluid.solver is \"incompressible\" but the shot has cloth, which only the weakly "
+           "compressible solver couples to. Use \"automatic\"");
+    }
+    if (fluid.support_ratio > 0 && fluid.support_ratio < 1.2) {
       fail("fluid.support_ratio",
            fmt::format("support radius is {} m (support_ratio {}) but fluid.spacing is {} m; "
                        "particles would have no neighbours. Use support_ratio = 2.0 ({} m), at "

@@ -163,14 +163,29 @@ std::vector<Parameter> fluid_rows() {
       row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh | render,
                            "distance a of particles at rest; a particle has mass rest_density a^3"),
       row<&Fluid::support_ratio>("fluid", "support_ratio", "", {0, 6}, simulate,
-                                 "support radius of the kernels / spacing"),
+                                 "support radius of the kernels / spacing; 0 is 2.15 for the "
+                                 "incompressible solver and 2 for the weakly compressible one"),
+      row<&Fluid::solver>("fluid", "solver", "", none, simulate,
+                          "incompressible solves for the pressure that keeps the density, in large "
+                          "steps; weakly_compressible follows sound, in small ones. automatic is "
+                          "incompressible without cloth and weakly_compressible with it")
+          .one_of({"automatic", "incompressible", "weakly_compressible"}),
+      row<&Fluid::tolerance>("fluid", "tolerance", "", {1e-7, 0.1}, simulate,
+                             "of the incompressible solver: mean error of the density over rest "
+                             "density that a step may leave. The one knob of quality against time"),
+      row<&Fluid::xsph>("fluid", "xsph", "", {0, 1}, simulate,
+                        "of the incompressible solver: share of its neighbours' mean velocity that "
+                        "a particle takes on every step"),
       row<&Fluid::rest_density>("fluid", "rest_density", "kg/m^3", {1, 1e5}, simulate, "at rest"),
       row<&Fluid::kinematic_viscosity>("fluid", "kinematic_viscosity", "m^2/s", {0, 1000}, simulate,
                                        "of the fluid; water has 1e-6"),
-      row<&Fluid::artificial_viscosity>("fluid", "artificial_viscosity", "", {0, 10}, simulate,
-                                        "alpha of Monaghan 1992; 0 is none"),
-      row<&Fluid::sound_speed>("fluid", "sound_speed", "m/s", {0, 1e4}, simulate,
-                               "stiffness; 0 chooses ten times the largest speed expected"),
+      row<&Fluid::artificial_viscosity>(
+          "fluid", "artificial_viscosity", "", {0, 10}, simulate,
+          "of the weakly compressible solver: alpha of Monaghan 1992; 0 is none"),
+      row<&Fluid::sound_speed>(
+          "fluid", "sound_speed", "m/s", {0, 1e4}, simulate,
+          "of the weakly compressible solver: stiffness; 0 chooses ten times the "
+          "largest speed expected"),
       row<&Fluid::material>("fluid", "material", "", none, render, "name of a [[material]]"),
 
       row<&FluidBox::min>("fluid.box", "min", "m", place, simulate, "lower corner").needed(),

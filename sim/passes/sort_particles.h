@@ -27,7 +27,8 @@ inline void permute(VecColumn& column, VecColumn& spare, const int* order, int n
   column.swap(spare);
 }
 
-inline void sort_particles(State& state) {
+/// Cells of all particles, their order by cell and where cells begin.
+inline void sort_by_cell(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   const int n = f.count;
@@ -50,10 +51,18 @@ inline void sort_particles(State& state) {
         cell[i] = inside ? grid.cell(q) : lost;
       });
   stable_sort_keys(f.cell, n, lost, f.order, f.cell_start, state.scratch);
+}
+
+inline void sort_particles(State& state) {
+  FluidState& f = state.fluid;
+  const Parameters& p = state.parameters;
+  const int n = f.count;
+  sort_by_cell(state);
   const int* order = f.order.data();
   permute(f.position, state.swap_vector, order, n);
   permute(f.velocity, state.swap_vector, order, n);
   permute(f.id, state.swap_int, order, n);
+  if (p.incompressible) permute(f.pressure_term, state.swap_vector.x, order, n);
   if (f.memory_triangle.size()) {
     permute(f.memory_triangle, state.swap_int, order, n);
     permute(f.memory_side, state.swap_int, order, n);
@@ -61,7 +70,7 @@ inline void sort_particles(State& state) {
     permute(f.far_by, state.swap_vector.x, order, n);
   }
   const bool open = !(p.wall[0] && p.wall[1] && p.wall[2]);
-  if (open) f.count = value_at(f.cell_start, lost);
+  if (open) f.count = value_at(f.cell_start, f.grid.cells());
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

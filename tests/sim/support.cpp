@@ -12,6 +12,7 @@ Shot empty_shot() {
   Shot shot;
   shot.name = "test", shot.file = "test.toml";
   shot.gravity = V3d(0);
+  shot.fluid.solver = FluidSolver::weakly_compressible;
   shot.domain.min = V3d(-1), shot.domain.max = V3d(1);
   shot.domain.axis = {Axis::open, Axis::open, Axis::open};
   return shot;

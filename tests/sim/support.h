@@ -15,7 +15,7 @@
 
 namespace drench::sim_tests {
 
-/// No gravity, no walls, domain of 2 m about the origin, nothing in it.
+/// No gravity, no walls, domain of 2 m about the origin, nothing in it; weakly compressible.
 Shot empty_shot();
 /// Adds a lattice of cells.x cells.y cells.z particles whose box starts at `corner`, m.
 void add_box(Shot& shot, V3d corner, std::array<int, 3> cells, V3d velocity = V3d(0));

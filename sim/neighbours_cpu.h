@@ -1,0 +1,177 @@
+#pragma once
+// Neighbour lists on CPU cores: see neighbours.h.
+
+namespace drench::sim::cpu {
+
+/// Moves the chosen lanes to the front: entry b lists the lanes whose bit is set in b.
+struct LaneOrders {
+  alignas(32) int lane[256][8];
+  constexpr LaneOrders() : lane{} {
+    for (int bits = 0; bits < 256; ++bits) {
+      int at = 0;
+      for (int k = 0; k < 8; ++k) {
+        if (bits >> k & 1) lane[bits][at++] = k;
+      }
+    }
+  }
+};
+inline constexpr LaneOrders lane_orders{};
+
+/// Room for lists, handed out to threads piece by piece. Where a list stands depends on the
+/// threads, what stands in it does not.
+class ListStore {
+ public:
+  explicit ListStore(NeighbourLists& lists) : lists_(lists) {}
+
+  struct Piece {
+    unsigned at = 0, end = 0;  // blocks
+  };
+  /// At least `blocks` blocks; false if the columns are full: the demand is counted all the same.
+  bool reserve(Piece& piece, unsigned blocks) {
+    if (piece.end - piece.at < blocks) {
+      const unsigned size = std::max(piece_blocks, blocks);
+      piece.at = used_.fetch_add(size, std::memory_order_relaxed);
+      piece.end = piece.at + size;
+    }
+    return size_t(piece.end) * 4 <= lists_.index.size();
+  }
+  /// Makes room for all of the demand and a quarter more; false if there was enough.
+  bool grow() {
+    if (size_t(used_) * 4 <= lists_.index.size()) return false;
+    const size_t entries = size_t(used_) * 5;
+    lists_.index.resize(entries), lists_.closeness.resize(entries);
+    used_ = 0;
+    return true;
+  }
+
+ private:
+  static constexpr unsigned piece_blocks = 2048;
+  NeighbourLists& lists_;
+  std::atomic<unsigned> used_{0};
+};
+
+/// The neighbours of one particle out of a tile, their squared distances, to the front.
+class Found {
+ public:
+  int count = 0;
+  std::vector<int> index;
+  std::vector<float> distance2;
+
+  void search(const Tile& tile, int i, float h) {
+    const float *x = tile.column(0), *y = tile.column(1), *z = tile.column(2);
+    const int place = tile.place_of(i);
+    const Vec3<Pack> p{Pack(x[place]), Pack(y[place]), Pack(z[place])};
+    const Pack h2(h * h);
+    count = 0;
+    for (int k = 0; k < tile.size(); k += Pack::size) {
+      const Pack r2 =
+          length2(Vec3<Pack>{Pack::load(x + k), Pack::load(y + k), Pack::load(z + k)} - p);
+      const int hits = (r2 < h2).bits();
+      if (hits == 0) continue;
+      const __m256i order =
+          _mm256_load_si256(reinterpret_cast<const __m256i*>(lane_orders.lane[hits]));
+      const __m256i particles =
+          _mm256_loadu_si256(reinterpret_cast<const __m256i*>(particle_.data() + k));
+      _mm256_storeu_ps(distance2.data() + count, _mm256_permutevar8x32_ps(r2.v, order));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(index.data() + count),
+                          _mm256_permutevar8x32_epi32(particles, order));
+      count += __builtin_popcount(unsigned(hits));
+    }
+    for (int k = count; k < count + Pack::size; ++k) index[k] = i, distance2[k] = h * h;
+  }
+  void set_tile(const Tile& tile) {
+    tile.particles(particle_);
+    if (index.size() < size_t(tile.size()) + 16)
+      index.resize(tile.size() + 64), distance2.resize(tile.size() + 64);
+  }
+
+ private:
+  std::vector<int> particle_;  // of each place in the tile
+};
+
+/// Lists of all particles. density(i, sum) gets the sum of Kernel::value over the neighbours.
+template <class Kernel, class Density>
+void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
+                           NeighbourLists& lists, SortScratch&, const Density& density) {
+  lists.begin.resize(n), lists.blocks.resize(n);
+  ListStore store(lists);
+  const GridShape& g = grid.shape;
+  const auto build_rows = [&](const auto& range) {
+    static thread_local Tile tile;
+    static thread_local Found found;
+    ListStore::Piece piece;
+    for (int row = range.begin(); row < range.end(); ++row) {
+      for (int cx = 0; cx < g.nx; ++cx) {
+        const int cell = row * g.nx + cx, begin = grid.cell_start[cell],
+                  end = grid.cell_start[cell + 1];
+        if (begin == end) continue;
+        tile.fill(grid, cx, row % g.ny, row / g.ny, Inputs<3>{{position.x, position.y, position.z}},
+                  3);
+        found.set_tile(tile);
+        for (int i = begin; i < end; ++i) {
+          found.search(tile, i, h);
+          const unsigned blocks = unsigned(found.count + 3) / 4;
+          const bool room = store.reserve(piece, blocks + 1);  // the last pack may end in the next
+          Pack sum(0.f);
+          for (int k = 0; k < found.count; k += Pack::size) {
+            const Pack u = max0(Pack(1.f) - square_root(Pack::load(found.distance2.data() + k)) *
+                                                Pack(1.f / h));
+            sum = sum + Kernel::value(u);
+            if (!room) continue;
+            const size_t at = size_t(piece.at) * 4 + k;
+            u.store(lists.closeness.data() + at);
+            std::copy_n(found.index.data() + k, Pack::size, lists.index.data() + at);
+          }
+          lists.begin.data()[i] = piece.at, lists.blocks.data()[i] = int(blocks);
+          piece.at += blocks;
+          density(i, sum_of_lanes(sum));
+        }
+      }
+    }
+  };
+  do {
+    ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), build_rows);
+  } while (store.grow());
+}
+
+/// All neighbours of particle i, four at a time.
+template <class Physics>
+DRENCH_HD void visit_neighbours(const NeighbourView& list, const Float4* const* column, int i,
+                                const Physics& physics) {
+  constexpr int N = Physics::columns;
+  using P = typename Physics::template Particle<Quad>;
+  using S = typename Physics::template Sum<Quad>;
+  const auto gather = [&](const auto& load) {
+    Members<P, Quad, N> m;
+    for (int c = 0; c < N; ++c) m.value[c] = load(column[c]);
+    return m.as();
+  };
+  const P self = gather([&](const Float4* c) { return both(c[i]); });
+  S sum[2];  // two chains of additions run at once
+  const int* index = list.index + size_t(list.begin[i]) * 4;
+  const float* closeness = list.closeness + size_t(list.begin[i]) * 4;
+  for (int b = 0; b < list.blocks[i]; ++b, index += 4, closeness += 4) {
+    const Quad weight = physics.weight(both(closeness));
+    const auto first = [&](const Float4* c) { return side_by_side(c[index[0]], c[index[1]]); };
+    const auto last = [&](const Float4* c) { return side_by_side(c[index[2]], c[index[3]]); };
+    physics.pair(self, gather(first), spread_first(weight), sum[0]);
+    physics.pair(self, gather(last), spread_last(weight), sum[1]);
+  }
+  constexpr int M = sizeof(S) / sizeof(Quad);
+  typename Physics::template Sum<Float4> out;
+  const Quad* lane = reinterpret_cast<const Quad*>(sum);
+  Float4* to = reinterpret_cast<Float4*>(&out);
+  for (int m = 0; m < M; ++m) to[m] = add_both(lane[m] + lane[M + m]);
+  physics.finish(i, out);
+}
+
+template <class Physics>
+void for_each_neighbour(const char* name, const NeighbourLists& lists, int n,
+                        const Physics& physics) {
+  if (physics.idle()) return;
+  const NeighbourView list = view_of(lists);
+  const auto inputs = physics.inputs();
+  parallel_for(name, n, [&](int i) { visit_neighbours(list, inputs.column, i, physics); });
+}
+
+}  // namespace drench::sim::cpu

@@ -1,0 +1,97 @@
+#pragma once
+// Neighbour lists on the GPU: see neighbours.h. Counted, scanned and filled; a thread walks the
+// list of its particle.
+
+namespace drench::sim::cuda {
+
+/// Calls visit(j, squared distance) for all neighbours of particle i within h, in the order of
+/// cells.
+template <class Visit>
+__device__ void for_each_within(const GridView& grid, const VecView& position, int i, float h,
+                                const Visit& visit) {
+  const GridShape& g = grid.shape;
+  const Vec3<float> p = position[i];
+  const int cx = g.cell_x(p.x), cy = g.cell_y(p.y), cz = g.cell_z(p.z);
+  for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
+    for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
+      const int begin = grid.cell_start[g.index(max(cx - 1, 0), y, z)];
+      const int end = grid.cell_start[g.index(min(cx + 1, g.nx - 1), y, z) + 1];
+      for (int j = begin; j < end; ++j) {
+        const float r2 = length2(position[j] - p);
+        if (r2 < h * h) visit(j, r2);
+      }
+    }
+  }
+}
+
+template <class Kernel, class Density>
+void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
+                           NeighbourLists& lists, SortScratch& scratch, const Density& density) {
+  lists.begin.resize(size_t(n) + 1), lists.blocks.resize(n);
+  int* blocks = lists.blocks.data();
+  parallel_for("neighbours: count", n, [=] __device__(int i) {
+    int count = 0;
+    for_each_within(grid, position, i, h, [&](int, float) { ++count; });
+    blocks[i] = (count + 3) / 4;
+  });
+  exclusive_scan(lists.blocks, n, lists.begin, scratch);
+  const size_t entries = size_t(value_at(lists.begin, n)) * 4;
+  if (lists.index.size() < entries) lists.index.resize(entries), lists.closeness.resize(entries);
+  int* index = lists.index.data();
+  float* closeness = lists.closeness.data();
+  const unsigned* first = lists.begin.data();
+  parallel_for("neighbours: fill", n, [=] __device__(int i) {
+    size_t at = size_t(first[i]) * 4;
+    float sum = 0.f;
+    for_each_within(grid, position, i, h, [&](int j, float r2) {
+      const float u = max0(1.f - sqrtf(r2) / h);
+      sum += Kernel::value(u);
+      index[at] = j, closeness[at++] = u;
+    });
+    for (; at % 4 != 0; ++at) index[at] = i, closeness[at] = 0.f;
+    density(i, sum);
+  });
+}
+
+template <class Physics>
+__global__ void launch_neighbours(NeighbourView list, int n, Physics physics) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= n || physics.idle()) return;
+  constexpr int N = Physics::columns;
+  using P = typename Physics::template Particle<Quad>;
+  using S = typename Physics::template Sum<Quad>;
+  const auto inputs = physics.inputs();
+  const auto load = [&](int k) {
+    Members<P, float4, N> m;
+    for (int c = 0; c < N; ++c)
+      m.value[c] = __ldg(reinterpret_cast<const float4*>(inputs.column[c]) + k);
+    return m.as();
+  };
+  const P self = load(i);
+  S sum{};
+  const int4* index = reinterpret_cast<const int4*>(list.index) + list.begin[i];
+  const float4* closeness = reinterpret_cast<const float4*>(list.closeness) + list.begin[i];
+  const auto pair = [&](int j, float u) {
+    const float w = physics.weight(u);
+    physics.pair(self, load(j), Quad{w, w, w, w}, sum);
+  };
+  for (int b = 0; b < list.blocks[i]; ++b) {
+    const int4 j = __ldg(index + b);
+    const float4 u = __ldg(closeness + b);
+    pair(j.x, u.x), pair(j.y, u.y), pair(j.z, u.z), pair(j.w, u.w);
+  }
+  typename Physics::template Sum<Float4> out;
+  static_assert(sizeof out == sizeof sum, "a sum has as many members of either type");
+  memcpy(&out, &sum, sizeof out);
+  physics.finish(i, out);
+}
+
+template <class Physics>
+void for_each_neighbour(const char* name, const NeighbourLists& lists, int n,
+                        const Physics& physics) {
+  if (n <= 0) return;
+  launch_neighbours<<<(n + 127) / 128, 128>>>(view_of(lists), n, physics);
+  check_cuda(cudaGetLastError(), name);
+}
+
+}  // namespace drench::sim::cuda

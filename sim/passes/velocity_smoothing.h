@@ -1,0 +1,58 @@
+#pragma once
+// XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
+//   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
+// and physical viscosity, explicit (Brookshaw 1985),
+//   v_i += dt nu sum_j 2 m / rho_0 (v_j - v_i) (-W'_ij) / r_ij.
+// Both are antisymmetric in i and j: momentum is kept. Walls let slip.
+
+#include "sim/passes/pressure_rows.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct VelocitySmoothing {
+  static constexpr int columns = 1;
+  const Float4* velocity;
+  VecView out;
+  float by_value, by_slope;  // factors of the kernel's value and slope
+
+  DRENCH_HD bool idle() const { return false; }
+  DRENCH_HD Columns<1> inputs() const { return {{velocity}}; }
+  template <class Q>
+  struct Particle {
+    Q velocity;
+  };
+  template <class Q>
+  struct Sum {
+    Q change;
+  };
+  template <class T>
+  DRENCH_HD T weight(T u) const {
+    return T(by_value) * WendlandC2::value(u) + T(by_slope) * WendlandC2::slope(u);
+  }
+  template <class Q>
+  DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
+    sum.change = multiply_add(j.velocity - i.velocity, weight, sum.change);
+  }
+  DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
+    const Float4 v = velocity[i], c = sum.change;
+    out.set(i, {v.x + c.x, v.y + c.y, v.z + c.z});
+  }
+};
+
+inline void smooth_velocities(State& state) {
+  const Parameters& p = state.parameters;
+  PressureState& s = state.pressure;
+  const VecView v = state.fluid.velocity.view();
+  Float4* vector = s.vector.data();
+  parallel_for(
+      "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
+        vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
+      });
+  const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
+  for_each_neighbour(
+      "smoothing", s.lists, state.fluid.count,
+      VelocitySmoothing{vector, v, p.xsph * volume * h * h,
+                        2.f * float(state.dt) * volume * p.dynamic_viscosity / p.rest_density});
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
