@@ -67,7 +67,6 @@ class Found {
       const Pack r2 =
           length2(Vec3<Pack>{Pack::load(x + k), Pack::load(y + k), Pack::load(z + k)} - p);
       const int hits = (r2 < h2).bits();
-      if (hits == 0) continue;
       const __m256i order =
           _mm256_load_si256(reinterpret_cast<const __m256i*>(lane_orders.lane[hits]));
       const __m256i particles =

@@ -19,6 +19,12 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
     // What has not moved yet may be about to: the sound speed is ten times what is expected.
     const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
     consider(0.4 * a / speed, "speed");
+    // Impacts may ask for more iterations than there are: shorter steps ask for fewer, each.
+    if (limits.iterations >= p.most_iterations) {
+      consider(0.5 * limits.step, "iterations");
+    } else if (limits.iterations > p.most_iterations / 4) {
+      consider(1.1 * limits.step, "iterations");
+    }
     if (g > 0) consider(0.08 * std::sqrt(a / g), "gravity");
     consider_viscosity();
   } else if (p.fluid) {

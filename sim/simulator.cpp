@@ -134,6 +134,9 @@ struct Simulator::Implementation {
       report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
       report.largest_dt = std::max(report.largest_dt, dt);
       report.max_speed = std::max(report.max_speed, double(limits.max_speed));
+      report.iterations += limits.iterations;
+      report.unconverged += limits.residual > scene.parameters.tolerance;
+      report.worst_residual = std::max(report.worst_residual, double(limits.residual));
       ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
       if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
     }
@@ -173,6 +176,15 @@ struct Simulator::Implementation {
   }
 
   void describe(StepReport& report) const {
+    if (report.unconverged > 0) {
+      log_warning(
+          "sim",
+          fmt::format("frame {}: in {} of {} steps {} iterations of the pressure solve "
+                      "did not reach fluid.tolerance = {:.2g}; mean density error {:.2g} "
+                      "at worst",
+                      frame, report.unconverged, report.steps, scene.parameters.most_iterations,
+                      scene.parameters.tolerance, report.worst_residual));
+    }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();
     report.time = time;

@@ -127,6 +127,7 @@ class BackendSolver : public Solver {
     if (state_.parameters.incompressible && state_.fluid.count > 0) {
       const SolveControl solve = value_at(state_.pressure.control, 0);
       limits.residual = solve.residual, limits.iterations = solve.iterations;
+      limits.step = float(dt);
     }
     return limits;
   }

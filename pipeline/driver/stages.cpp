@@ -35,6 +35,8 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"mean_compression", step.mean_compression},
                      {"max_compression", step.max_compression},
                      {"kinetic_energy", step.kinetic_energy},
+                     {"iterations", step.iterations},
+                     {"unconverged", step.unconverged},
                      {"guard_hits", step.guard_hits}}
                     .dump();
   report.line =

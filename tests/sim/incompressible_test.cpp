@@ -179,8 +179,8 @@ TEST(PressureRows, AccelerationIsTheTransposeOfTheRate) {
   }
 }
 
-// A lattice that fills walls has rest density everywhere: at walls as inside, at corners within 0.6 %
-// (5.2 kg/m^3 measured).
+// A lattice that fills walls has rest density everywhere: at walls as inside, at corners within 0.6
+// % (5.2 kg/m^3 measured).
 TEST(ImageWalls, MakeALatticeBetweenThemWhole) {
   Shot shot = water();
   shot.domain.min = V3d(0), shot.domain.max = V3d(0.1);
@@ -290,6 +290,18 @@ TEST(Incompressible, FallsByTheParabola) {
   const V3d moved = centre_of_mass(run.solver->save()) - before;
   EXPECT_NEAR(moved.y, -0.5 * 9.81 * 0.2 * 0.2 * (1 + 1.0 / n), 1e-6);
   EXPECT_NEAR(moved.x, 0, 1e-6);
+}
+
+// A solve that may not go on says what it left, and the next step is half as long.
+TEST(Incompressible, ASolveCutShortIsToldAndShortensTheStep) {
+  sim::Scene scene = sim::build_scene(column(16, 1e-6));
+  scene.parameters.most_iterations = 3;
+  Stepper run(scene);
+  run.step(2e-3);
+  EXPECT_EQ(run.limits.iterations, 3);
+  EXPECT_GT(run.limits.residual, 1e-6f);
+  EXPECT_NEAR(run.stable_dt(), 1e-3, 1e-9);
+  EXPECT_STREQ(sim::stable_step(scene.parameters, run.limits).name, "iterations");
 }
 
 sim::HostState after(const Shot& shot, int steps, bool refreshed = false) {
