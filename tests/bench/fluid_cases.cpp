@@ -1,3 +1,5 @@
+// Cases fluid_martin_moyce and fluid_rest: flows with a known answer (tests/validation/fluid.h).
+//
 // Cases fluid_dam_64k and fluid_dam_250k: a cube of water of 1 m collapses in a tank of 3 x 2 x 1
 // m, with the time step 0.4 a / v, capped. Time against the mean of max(rho / rho_0 - 1, 0) over
 // particles and steps, density measured anew at the positions a step ends with, off the clock. The
@@ -13,6 +15,7 @@
 #include "sim/scene.h"
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
+#include "tests/validation/fluid.h"
 
 namespace drench::bench {
 namespace {
@@ -124,6 +127,46 @@ const Registration dam_250k{"fluid_dam_250k", "the same, finer, its first quarte
                               for (const Quality q : {Quality{2e-4, 1.3e-4}})
                                 run_dam({63, 0.25, 2e-3}, q, emit);
                             }};
+
+void martin_moyce(const Emit& emit) {
+  for (const int across : {10, 20, 40, 60}) {
+    validation::Collapse result;
+    Line line;
+    line.cost = measure([&] { result = validation::martin_moyce(across, 1e-4); });
+    line.method = "incompressible, tolerance 0.01 %";
+    line.resolution = std::to_string(result.particles) + " particles, " + std::to_string(across) +
+                      " across the column";
+    line.threads = hardware_threads();
+    line.error = result.front, line.gate = 0.05;
+    line.error_of = "RMS of the front's relative error";
+    line.more["shift"] = result.shift;
+    line.more["slope"] = result.slope;
+    line.more["height_rms"] = result.height;
+    emit(line);
+  }
+}
+
+void resting_column(const Emit& emit) {
+  for (const int layers : {10, 20, 40}) {
+    validation::Rest result;
+    Line line;
+    line.cost = measure([&] { result = validation::resting_column(layers, 5, 1e-5); });
+    line.method = "incompressible, tolerance 0.001 %";
+    line.resolution =
+        std::to_string(result.particles) + " particles, " + std::to_string(layers) + " layers";
+    line.threads = hardware_threads();
+    line.error = result.pressure;
+    line.error_of = "RMS of the pressure's error over rho g H, by slabs";
+    line.more["density_error"] = result.density;
+    line.more["drift"] = result.drift;
+    line.more["volume"] = result.volume;
+    emit(line);
+  }
+}
+
+const Registration collapse{"fluid_martin_moyce", "a collapsing column against the experiment",
+                            martin_moyce};
+const Registration rest{"fluid_rest", "a column at rest for 5 s", resting_column};
 
 }  // namespace
 }  // namespace drench::bench

@@ -154,5 +154,32 @@ TEST(WallTable, MatchesMeansOverTheLattice) {
   }
 }
 
+double wendland(double r) {
+  return sim::cpu::WendlandC2::value(std::max(0.0, 1 - r / h)) / (h * h * h);
+}
+
+TEST(Kernels, WendlandIntegratesToOneAndItsSlopeIsItsDerivative) {
+  const double volume = integrate(0, h, [](double r) { return 4 * M_PI * r * r * wendland(r); });
+  EXPECT_NEAR(volume, 1, rounding);
+  for (double q = 0.0625; q < 1; q += 0.0625) {
+    const double step = 1e-6 * h, r = q * h;
+    const double slope = (wendland(r - step) - wendland(r + step)) / (2 * step * r);
+    EXPECT_NEAR(sim::cpu::WendlandC2::slope(1 - q), slope * std::pow(h, 5), 1e-6 * 210 / M_PI) << q;
+  }
+}
+
+// Behind the plane, where q is negative, the half-space has what is left of the whole.
+TEST(Kernels, WendlandWallFunctionsAreItsIntegrals) {
+  for (double q = 0; q < 1; q += 0.0625) {
+    const double plane = integrate(q * h, h, [](double r) { return 2 * M_PI * r * wendland(r); });
+    const double half =
+        integrate(q * h, h, [&](double r) { return 2 * M_PI * r * (r - q * h) * wendland(r); });
+    EXPECT_NEAR(sim::cpu::WendlandC2::plane(float(q)), h * plane, 2 * rounding) << q;
+    EXPECT_NEAR(sim::cpu::WendlandC2::plane(float(-q)), h * plane, 2 * rounding) << q;
+    EXPECT_NEAR(sim::cpu::WendlandC2::halfspace(float(q)), half, rounding) << q;
+    EXPECT_NEAR(sim::cpu::WendlandC2::halfspace(float(-q)), 1 - half, rounding) << q;
+  }
+}
+
 }  // namespace
 }  // namespace drench::sim_tests

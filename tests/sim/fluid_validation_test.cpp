@@ -1,0 +1,54 @@
+// The incompressible solver against an experiment and against statics. The bench has the curves of
+// time against error; these are the gates, at three resolutions each or two where a third takes
+// minutes.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/fluid.h"
+
+namespace drench::sim_tests {
+namespace {
+
+struct CollapseGate {
+  int across;
+  double height;
+};
+class MartinMoyce : public testing::TestWithParam<CollapseGate> {};
+
+// Measured: front 2.1, 2.4, 2.5 %, shift -0.11, -0.20, -0.24, slope 1.46, 1.49, 1.50 (experiment
+// 1.33 to T = 3), height 0.040, 0.029, 0.021.
+TEST_P(MartinMoyce, FrontAndHeightFollowTheExperiment) {
+  const validation::Collapse collapse = validation::martin_moyce(GetParam().across, 1e-4);
+  EXPECT_LT(collapse.front, 0.05);
+  EXPECT_LT(collapse.slope, 2);  // Ritter's front, which no friction slows
+  EXPECT_LT(collapse.height, GetParam().height);
+}
+
+INSTANTIATE_TEST_SUITE_P(Across, MartinMoyce,
+                         testing::Values(CollapseGate{10, 0.045}, CollapseGate{20, 0.033},
+                                         CollapseGate{40, 0.03}),
+                         [](const auto& gate) { return std::to_string(gate.param.across); });
+
+struct RestGate {
+  int layers;
+  double pressure;
+};
+class Resting : public testing::TestWithParam<RestGate> {};
+
+// The two layers at the floor share their load by 6 % wrongly, which is most of the pressure's
+// error and less of a deeper column. Measured after 5 s at 10 and 20 layers: pressure 4.4 and 2.2
+// %, mean density error 2e-5, drift 2.5e-3 and 1.5e-3, volume -0.53 and -0.40 %.
+TEST_P(Resting, ColumnHasTheLinearPressureAndKeepsItsVolume) {
+  const validation::Rest rest = validation::resting_column(GetParam().layers, 3, 1e-5);
+  EXPECT_LT(rest.pressure, GetParam().pressure);
+  EXPECT_LT(rest.density, 1e-3);
+  EXPECT_LT(rest.drift, 6e-3);
+  EXPECT_GT(rest.volume, -7e-3);
+  EXPECT_LT(rest.volume, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Layers, Resting, testing::Values(RestGate{10, 0.06}, RestGate{20, 0.045}),
+                         [](const auto& gate) { return std::to_string(gate.param.layers); });
+
+}  // namespace
+}  // namespace drench::sim_tests

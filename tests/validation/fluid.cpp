@@ -1,0 +1,178 @@
+#include "tests/validation/fluid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "sim/passes/image_walls.h"
+#include "tests/sim/support.h"
+
+namespace drench::validation {
+
+namespace {
+
+using sim_tests::Stepper;
+
+constexpr double g = 9.81;
+
+Shot tank(double spacing, const V3d& size, double tolerance) {
+  Shot shot;
+  shot.name = shot.file = "validation";
+  shot.fluid.solver = FluidSolver::incompressible;
+  shot.fluid.spacing = spacing, shot.fluid.tolerance = tolerance;
+  shot.domain.min = V3d(0), shot.domain.max = size;
+  return shot;
+}
+
+struct Series {
+  std::vector<double> time, value;
+
+  double at(double t) const {
+    const size_t k = size_t(std::lower_bound(time.begin(), time.end(), t) - time.begin());
+    if (k == 0) return value.front();
+    if (k == time.size()) return value.back();
+    const double share = (t - time[k - 1]) / (time[k] - time[k - 1]);
+    return value[k - 1] + share * (value[k] - value[k - 1]);
+  }
+  double slope_past(double least) const {
+    size_t first = 0;
+    while (first + 1 < value.size() && value[first] < least) ++first;
+    return (value.back() - value[first]) / std::max(time.back() - time[first], 1e-9);
+  }
+};
+
+Series read_series(const std::string& name) {
+  Series series;
+  const auto rows = sim_tests::read_validation(name);
+  for (size_t k = 1; k < rows.size(); ++k) {
+    series.time.push_back(std::stod(rows[k][0])), series.value.push_back(std::stod(rows[k][1]));
+  }
+  return series;
+}
+
+/// RMS of `error` of run and data where the run reaches the data, `run` being late by `shift`.
+template <class Error>
+double rms(const Series& run, const Series& data, double shift, const Error& error) {
+  double sum = 0;
+  int count = 0;
+  for (size_t k = 0; k < data.time.size() && data.time[k] + shift <= run.time.back(); ++k, ++count)
+    sum += std::pow(error(run.at(data.time[k] + shift), data.value[k]), 2);
+  return std::sqrt(sum / count);
+}
+
+/// How much of a vertical strain about the floor the density of each particle shows, 1 in a
+/// continuum: by virtual work, rho_0 q times this is what a particle's pressure does to its volume.
+std::vector<double> vertical_response(const sim::Parameters& p, const sim::HostState& state) {
+  const double h = p.support_radius;
+  const sim::cpu::ImageWalls walls = sim::cpu::image_walls_of(p);
+  const double scale = p.particle_mass / p.lattice_sum / std::pow(h, 5) / p.rest_density;
+  std::vector<double> response(state.id.size());
+  for (size_t i = 0; i < response.size(); ++i) {
+    const V3d x = sim_tests::at(state.position, i);
+    for (size_t j = 0; j < response.size(); ++j) {
+      const V3d d = sim_tests::at(state.position, j) - x;
+      if (d.length2() < h * h)
+        response[i] += scale * sim::cpu::WendlandC2::slope(float(1 - d.length() / h)) * d.y * d.y;
+    }
+    const sim::cpu::WallShare share = walls.share({float(x.x), float(x.y), float(x.z)});
+    response[i] -= share.gradient.y * (x.y - p.low[1]);
+  }
+  return response;
+}
+
+/// The k-th largest of what `of` gives for the particles that it gives anything for.
+double nth_largest(const sim::HostState& state, size_t k, const std::function<double(size_t)>& of) {
+  std::vector<double> values;
+  for (size_t i = 0; i < state.id.size(); ++i) values.push_back(of(i));
+  std::nth_element(values.begin(), values.begin() + long(k), values.end(), std::greater<>());
+  return values[k];
+}
+
+}  // namespace
+
+Collapse martin_moyce(int across, double tolerance) {
+  constexpr double width = 0.05715;
+  constexpr int thick = 6;  // particles between the free-slip walls: nearly three supports
+  const double a = width / across;
+  Shot shot = tank(a, V3d(7 * width, 4 * width, thick * a), tolerance);
+  sim_tests::add_box(shot, V3d(0), {across, 2 * across, thick});
+  Stepper run(shot);
+  Series front, height;
+  while (run.time < 3.1 / std::sqrt(g / width)) {
+    run.step();
+    const sim::HostState state = run.solver->save();
+    // As many particles as the sheet is thick make a front; fewer are drops.
+    front.time.push_back(run.time * std::sqrt(2 * g / width));
+    front.value.push_back(
+        (nth_largest(state, thick, [&](size_t i) { return state.position.x[i]; }) + 0.5 * a) /
+        width);
+    height.time.push_back(run.time * std::sqrt(g / width));
+    height.value.push_back((nth_largest(state, thick,
+                                        [&](size_t i) {
+                                          return state.position.x[i] < 1.5 * a
+                                                     ? double(state.position.y[i])
+                                                     : 0.;
+                                        }) +
+                            0.5 * a) /
+                           (2 * width));
+  }
+  const Series data = read_series("dambreak_martin_moyce_front_table2.csv"),
+               heights = read_series("dambreak_martin_moyce_height_table6.csv");
+  Collapse result;
+  result.front = 1e30, result.particles = run.solver->particles();
+  for (double shift = -0.3; shift <= 0.3001; shift += 0.01) {
+    const double error = rms(front, data, shift, [](double z, double d) { return z / d - 1; });
+    if (error < result.front) result.front = error, result.shift = shift;
+  }
+  result.slope = front.slope_past(2);
+  result.height = rms(height, heights, 0, [](double h, double d) { return h - d; });
+  return result;
+}
+
+Rest resting_column(int layers, double seconds, double tolerance) {
+  constexpr double depth = 0.2;
+  const double a = depth / layers;
+  const int side = std::max(12, layers / 2);
+  Shot shot = tank(a, V3d(side * a, 2 * depth, side * a), tolerance);
+  sim_tests::add_box(shot, V3d(0), {side, layers, side});
+  Stepper run(shot);
+  const double start = sim_tests::centre_of_mass(run.solver->save()).y;
+  run.advance(0.9 * seconds);
+  Rest rest;
+  std::vector<double> error(size_t(layers) + 4, 0);
+  std::vector<int> count(size_t(layers) + 4, 0);
+  sim::HostState state;
+  for (int sample = 1; sample <= 20; ++sample) {
+    run.advance(seconds * (0.9 + 0.005 * sample));
+    state = run.solver->save();
+    const std::vector<double> response = vertical_response(run.scene.parameters, state);
+    const float top = *std::max_element(state.position.y.begin(), state.position.y.end());
+    for (size_t i = 0; i < state.id.size(); ++i) {
+      const double y = state.position.y[i];
+      if (y > top - 1.5 * a) continue;
+      const double pressure = double(state.pressure_term[i]) * 1e6 * response[i];
+      error[size_t(y / a)] += pressure - 1000 * g * (top + 0.5 * a - y), ++count[size_t(y / a)];
+    }
+  }
+  double squares = 0, speed2 = 0, density = 0;
+  int slabs = 0, inner = 0;
+  for (size_t k = 0; k < error.size(); ++k) {
+    if (count[k] > 0) squares += std::pow(error[k] / count[k], 2), ++slabs;
+  }
+  run.solver->refresh();
+  const std::vector<float> rho = run.solver->density();
+  for (size_t i = 0; i < state.id.size(); ++i) {
+    speed2 += sim_tests::at(state.velocity, i).length2();
+    if (state.position.y[i] < depth - 4 * a) density += std::abs(rho[i] / 1000 - 1), ++inner;
+  }
+  rest.pressure = std::sqrt(squares / slabs) / (1000 * g * depth);
+  rest.density = density / inner;
+  rest.drift = std::sqrt(speed2 / double(state.id.size()) / (g * depth));
+  rest.volume = sim_tests::centre_of_mass(state).y / start - 1;
+  rest.particles = run.solver->particles();
+  return rest;
+}
+
+}  // namespace drench::validation
