@@ -87,6 +87,7 @@ inline bool solve_ended(const PressureState& s, int iteration) {
 inline void solve_pressure(State& state, float tolerance, int most_iterations) {
   PressureState& s = state.pressure;
   const int n = state.fluid.count;
+  if (n == 0) return;  // the last ones have just left an open domain
   SolveControl* control = s.control.data();
   Float4* place = s.place.data();
   float *term = state.fluid.pressure_term.data(), *before = s.before.data();
