@@ -87,8 +87,9 @@ Checkpoint read_checkpoint(const std::filesystem::path& path, const Digest& layo
   reader(checkpoint.layout), reader(content);
   if (std::memcmp(found, magic, sizeof magic) != 0 ||
       content != hash_bytes(reader.at, reader.end - reader.at)) {
-    throw Error(path.string() +
-                ": not a whole checkpoint. Delete it; the run starts from an earlier one");
+    throw Error(
+        path.string() +
+        ": not a whole checkpoint of this version. Delete it; the run starts from an earlier one");
   }
   if (checkpoint.layout != layout) {
     throw Error(path.string() +

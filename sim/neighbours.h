@@ -16,6 +16,9 @@
 //           bool idle() const;                   true: nothing is to be done
 // clang-format on
 
+#include <limits>
+
+#include "pipeline/contract/error.h"
 #include "sim/pairs.h"
 #include "sim/quad.h"
 #include "sim/sort.h"

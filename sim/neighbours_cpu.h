@@ -24,30 +24,35 @@ class ListStore {
   explicit ListStore(NeighbourLists& lists) : lists_(lists) {}
 
   struct Piece {
-    unsigned at = 0, end = 0;  // blocks
+    size_t at = 0, end = 0;  // blocks
   };
   /// At least `blocks` blocks; false if the columns are full: the demand is counted all the same.
-  bool reserve(Piece& piece, unsigned blocks) {
+  bool reserve(Piece& piece, size_t blocks) {
     if (piece.end - piece.at < blocks) {
-      const unsigned size = std::max(piece_blocks, blocks);
+      const size_t size = std::max(piece_blocks, blocks);
       piece.at = used_.fetch_add(size, std::memory_order_relaxed);
       piece.end = piece.at + size;
     }
-    return size_t(piece.end) * 4 <= lists_.index.size();
+    return piece.end * 4 <= lists_.index.size();
   }
   /// Makes room for all of the demand and a quarter more; false if there was enough.
   bool grow() {
-    if (size_t(used_) * 4 <= lists_.index.size()) return false;
-    const size_t entries = size_t(used_) * 5;
+    if (used_ * 4 <= lists_.index.size()) return false;
+    if (used_ > std::numeric_limits<unsigned>::max()) {
+      throw Error(
+          "the fluid has more than 17 billion pairs of neighbours. Use a larger "
+          "fluid.spacing or a smaller fluid.support_ratio");
+    }
+    const size_t entries = used_ * 5;
     lists_.index.resize(entries), lists_.closeness.resize(entries);
     used_ = 0;
     return true;
   }
 
  private:
-  static constexpr unsigned piece_blocks = 2048;
+  static constexpr size_t piece_blocks = 2048;
   NeighbourLists& lists_;
-  std::atomic<unsigned> used_{0};
+  std::atomic<size_t> used_{0};
 };
 
 /// The neighbours of one particle out of a tile, their squared distances, to the front.
@@ -117,11 +122,11 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
                                                 Pack(1.f / h));
             sum = sum + Kernel::value(u);
             if (!room) continue;
-            const size_t at = size_t(piece.at) * 4 + k;
+            const size_t at = piece.at * 4 + size_t(k);
             u.store(lists.closeness.data() + at);
             std::copy_n(found.index.data() + k, Pack::size, lists.index.data() + at);
           }
-          lists.begin.data()[i] = piece.at, lists.blocks.data()[i] = int(blocks);
+          lists.begin.data()[i] = unsigned(piece.at), lists.blocks.data()[i] = int(blocks);
           piece.at += blocks;
           density(i, sum_of_lanes(sum));
         }

@@ -86,7 +86,7 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
   static Column<T> partial;
   partial.resize(reduce_blocks);
   const int blocks = std::min(reduce_blocks, (n + reduce_block - 1) / reduce_block);
-  launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
+  if (n > 0) launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
   launch_then<<<1, 1>>>(blocks, start, partial.data(), combine, then);
   check_cuda(cudaGetLastError(), name);
 }

@@ -45,7 +45,9 @@ struct Limits {
 
 /// The largest stable fluid step and the name of the limit that rules it.
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
-/// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003.
+/// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003,
+/// viscosity 0.05 h^2/nu, and a step follows the one before: half of it when its solve was cut
+/// short.
 struct StepLimit {
   double dt;
   const char* name;

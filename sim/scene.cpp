@@ -98,8 +98,8 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.incompressible ? calibrate<cpu::WendlandC2>(a, h, p)
   : poly6          ? calibrate<cpu::Poly6>(a, h, p)
                    : calibrate<cpu::Spiky>(a, h, p);
-  p.sound_speed = float(shot.fluid.sound_speed > 0 ? shot.fluid.sound_speed
-                                                   : automatic_sound_speed(shot, fluid));
+  const bool chosen = shot.fluid.sound_speed > 0 && !is_incompressible(shot);
+  p.sound_speed = float(chosen ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
   const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;

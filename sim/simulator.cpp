@@ -78,7 +78,7 @@ struct Simulator::Implementation {
 
   double frame_time(int f) const { return (f - shot.timeline.first) / shot.timeline.fps; }
 
-  /// Layers due by `until`, each moved on from the moment it left.
+  /// Layers due by `until`, each moved on from the moment it left; the next step knows their speed.
   void emit(double until) {
     const double a = shot.fluid.spacing;
     for (size_t e = 0; e < layer.size(); ++e) {
@@ -93,6 +93,7 @@ struct Simulator::Implementation {
               "stop the emitter earlier",
               shot.file.string(), e + 1, max_particles, until));
         }
+        limits.max_speed = std::max(limits.max_speed, float(source.speed));
         add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)),
                   direction * source.speed);
       }
@@ -117,6 +118,7 @@ struct Simulator::Implementation {
     std::map<std::string, int> ruled;
     while (time < end) {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
+      emit(time);
       sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
       if (shot.time_step > 0) limit = fixed_step(limit);
       const double rest = end - time;
@@ -126,7 +128,6 @@ struct Simulator::Implementation {
           shot.cloth.empty()
               ? 1
               : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
-      emit(time);
       limits = solver->step(dt, substeps);
       time = parts <= 1 ? end : time + dt;
       ++steps;
@@ -166,13 +167,14 @@ struct Simulator::Implementation {
         "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m "
         "has speed "
         "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a "
-        "smaller shot.time_step, "
-        "a softer cloth or a larger fluid.sound_speed",
+        "smaller shot.time_step{}",
         shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll",
         time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
         scene.frame.to_world(2, x.z[i]), speed,
-        last_checkpoint.empty() ? "none" : last_checkpoint.string()));
+        last_checkpoint.empty() ? "none" : last_checkpoint.string(),
+        scene.parameters.incompressible ? " or a smaller fluid.tolerance"
+                                        : ", a softer cloth or a larger fluid.sound_speed"));
   }
 
   void describe(StepReport& report) const {

@@ -1,5 +1,5 @@
-// CUB's radix sort is stable, and a sum of integers has one result. The heavy headers stay in this one
-// file.
+// CUB's radix sort is stable, and a sum of integers has one result. The heavy headers stay in this
+// one file.
 
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>

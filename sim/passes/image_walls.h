@@ -26,17 +26,20 @@ struct ImageWalls {
   float inverse_h;  // 1/m
   float spacing;    // m
 
+  /// Where the image of a wall at `distance` m begins, over h; at most 1.
+  DRENCH_HD float image(float distance, bool there) const {
+    return there ? minimum((2.f * distance - 0.5f * spacing) * inverse_h, 1.f) : 1.f;
+  }
+
   /// Share of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
   /// corners are not counted twice; H is the kernel's integral over the image, over h.
   DRENCH_HD WallShare share(Vec3<float> p) const {
     const float x[3] = {p.x, p.y, p.z};
     float open[3], slope[3];
     for (int k = 0; k < 3; ++k) {
-      const float to_low = on[k] ? x[k] - low[k] : 1e30f, to_high = on[k] ? high[k] - x[k] : 1e30f;
-      const float distance = minimum(to_low, to_high);
-      const float q = minimum((2.f * distance - 0.5f * spacing) * inverse_h, 1.f);
-      open[k] = 1.f - scale * WendlandC2::halfspace(q);
-      slope[k] = 2.f * scale * WendlandC2::plane(q) * inverse_h * (to_low < to_high ? -1.f : 1.f);
+      const float below = image(x[k] - low[k], on[k]), above = image(high[k] - x[k], on[k]);
+      open[k] = 1.f - scale * (WendlandC2::halfspace(below) + WendlandC2::halfspace(above));
+      slope[k] = 2.f * scale * inverse_h * (WendlandC2::plane(above) - WendlandC2::plane(below));
     }
     return {
         1.f - open[0] * open[1] * open[2],

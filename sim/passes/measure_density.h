@@ -38,6 +38,7 @@ inline void measure_density(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   sort_by_cell(state);
+  f.density.clear_bytes(0);  // lost particles have none
   const VecView x = f.position.view(), sorted = state.swap_vector.view();
   const int* order = f.order.data();
   parallel_for(

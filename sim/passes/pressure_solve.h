@@ -34,7 +34,7 @@ struct PressureIteration {
     if (control->done) return {};
     const float y = place[i].w, d = inverse_diagonal[i];
     const float gradient = -product[i] - source[i];
-    const float x = max0(y - control->relaxation * d * gradient);
+    const float x = d == 0.f ? 0.f : max0(y - control->relaxation * d * gradient);
     next[i] = x;
     const float left = d == 0.f ? 0.f : y > 0.f ? fabsf(gradient) : max0(-gradient);
     const double change = double(x) - before[i];

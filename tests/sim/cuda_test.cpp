@@ -130,6 +130,7 @@ TEST_P(Cuda, KeepsMeanHeightsOfCpuAfterHundredSteps) {
 
 // No float atomics and fixed trees: nothing may depend on how blocks are scheduled.
 TEST_P(Cuda, GivesTheSameBitsInEveryRun) {
+  scene.parameters.tolerance = 1e-4f, scene.parameters.most_iterations = 100;
   const sim::HostState a = on_cuda(scene, 100), b = on_cuda(scene, 100);
   EXPECT_EQ(a.id, b.id);
   EXPECT_TRUE(same_bits(a.position, b.position));
