@@ -2,8 +2,7 @@
 // Neighbour lists for iterative solvers, and for_each_neighbour over them: one physics functor over
 // the listed neighbours of every particle. A list holds a neighbour's index and closeness
 // u = 1 - r / h, from which a kernel follows without a root, so that an iteration only gathers: on
-// a CPU core two neighbours at a time, four floats each, in less than half the time of a pass over
-// cells. A particle is its own neighbour too.
+// a CPU core two neighbours at a time, four floats each. A particle is its own neighbour too.
 //
 // clang-format off
 // Physics:  static constexpr int columns;        number of Float4 columns read

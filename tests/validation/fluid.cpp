@@ -144,10 +144,11 @@ Rest resting_column(int layers, double seconds, double tolerance) {
   std::vector<double> error(size_t(layers) + 4, 0);
   std::vector<int> count(size_t(layers) + 4, 0);
   sim::HostState state;
+  std::vector<double> response;
   for (int sample = 1; sample <= 20; ++sample) {
     run.advance(seconds * (0.9 + 0.005 * sample));
     state = run.solver->save();
-    const std::vector<double> response = vertical_response(run.scene.parameters, state);
+    response = vertical_response(run.scene.parameters, state);
     const float top = *std::max_element(state.position.y.begin(), state.position.y.end());
     for (size_t i = 0; i < state.id.size(); ++i) {
       const double y = state.position.y[i];
@@ -156,8 +157,8 @@ Rest resting_column(int layers, double seconds, double tolerance) {
       error[size_t(y / a)] += pressure - 1000 * g * (top + 0.5 * a - y), ++count[size_t(y / a)];
     }
   }
-  double squares = 0, speed2 = 0, density = 0;
-  int slabs = 0, inner = 0;
+  double squares = 0, speed2 = 0, density = 0, answer = 0;
+  int slabs = 0, below = 0, inner = 0;
   for (size_t k = 0; k < error.size(); ++k) {
     if (count[k] > 0) squares += std::pow(error[k] / count[k], 2), ++slabs;
   }
@@ -165,10 +166,12 @@ Rest resting_column(int layers, double seconds, double tolerance) {
   const std::vector<float> rho = run.solver->density();
   for (size_t i = 0; i < state.id.size(); ++i) {
     speed2 += sim_tests::at(state.velocity, i).length2();
-    if (state.position.y[i] < depth - 4 * a) density += std::abs(rho[i] / 1000 - 1), ++inner;
+    const double y = state.position.y[i];
+    if (y < depth - 4 * a) density += std::abs(rho[i] / 1000 - 1), ++below;
+    if (y < depth - 4 * a && y > 4 * a) answer += response[i], ++inner;
   }
   rest.pressure = std::sqrt(squares / slabs) / (1000 * g * depth);
-  rest.density = density / inner;
+  rest.density = density / below, rest.response = answer / inner;
   rest.drift = std::sqrt(speed2 / double(state.id.size()) / (g * depth));
   rest.volume = sim_tests::centre_of_mass(state).y / start - 1;
   rest.particles = run.solver->particles();

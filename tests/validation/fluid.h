@@ -22,7 +22,9 @@ struct Rest {
   double pressure = 0;  // RMS of the error of the mean pressure of slabs, over rho g H
   double density = 0;   // mean of |rho / rho_0 - 1| a support below the surface
   double drift = 0;     // RMS speed at the end over sqrt(g H)
-  double volume = 0;    // twice the centre of mass' height over that of the start, less 1
+  double response =
+      0;              // mean of vertical_response a support off floor and surface; 1 in a continuum
+  double volume = 0;  // twice the centre of mass' height over that of the start, less 1
   int particles = 0;
 };
 Rest resting_column(int layers, double seconds, double tolerance);
