@@ -25,10 +25,9 @@ inline NearestOutput nearest_output(State& state, float reach) {
 
 #if defined(__CUDACC__)
 
-inline void find_nearest_triangles(State& state, float reach) {
+inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
   FluidState& f = state.fluid;
   const PolygonView polygons = polygons_of(state.cloth);
-  const VecView position = f.position.view();
   const NearestOutput out = nearest_output(state, reach);
   const int* before = f.memory_triangle.data();
   parallel_for(
@@ -167,10 +166,9 @@ class PackOfNeighbours {
   int member_[8], count_ = 0;
 };
 
-inline void find_nearest_triangles(State& state, float reach) {
+inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
   FluidState& f = state.fluid;
   const PolygonView polygons = polygons_of(state.cloth);
-  const VecView position = f.position.view();
   const NearestOutput out = nearest_output(state, reach);
   const int *cell_start = f.cell_start.data(), *before = f.memory_triangle.data();
   const GridShape g = f.grid;

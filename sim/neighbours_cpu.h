@@ -62,16 +62,31 @@ class Found {
   std::vector<int> index;
   std::vector<float> distance2;
 
-  void search(const Tile& tile, int i, float h) {
+  template <class Filter>
+  void search(const Tile& tile, int i, float h, const Filter& filter) {
     const float *x = tile.column(0), *y = tile.column(1), *z = tile.column(2);
     const int place = tile.place_of(i);
     const Vec3<Pack> p{Pack(x[place]), Pack(y[place]), Pack(z[place])};
     const Pack h2(h * h);
+    [[maybe_unused]] const float* columns[7];
+    [[maybe_unused]] auto hidden_from = [&] {
+      if constexpr (Filter::columns > 0) {
+        for (int c = 0; c < 7; ++c) columns[c] = tile.column(3 + c);
+        return filter.template self<3>(columns, place);
+      } else {
+        return 0;
+      }
+    }();
     count = 0;
     for (int k = 0; k < tile.size(); k += Pack::size) {
       const Pack r2 =
           length2(Vec3<Pack>{Pack::load(x + k), Pack::load(y + k), Pack::load(z + k)} - p);
-      const int hits = (r2 < h2).bits();
+      int hits = (r2 < h2).bits();
+      if constexpr (Filter::columns > 0) {
+        const auto at = [&](int c) { return Pack::load(columns[c] + k); };
+        if (hits)
+          hits &= ~filter.template hidden<3>(hidden_from, columns, k, {at(0), at(1), at(2)}).bits();
+      }
       const __m256i order =
           _mm256_load_si256(reinterpret_cast<const __m256i*>(lane_orders.lane[hits]));
       const __m256i particles =
@@ -94,9 +109,10 @@ class Found {
 };
 
 /// Lists of all particles. density(i, sum) gets the sum of Kernel::value over the neighbours.
-template <class Kernel, class Density>
+template <class Kernel, class Density, class Filter = NoFilter>
 void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
-                           NeighbourLists& lists, SortScratch&, const Density& density) {
+                           NeighbourLists& lists, SortScratch&, const Density& density,
+                           const Filter& filter = {}) {
   lists.begin.resize(n), lists.blocks.resize(n);
   ListStore store(lists);
   const GridShape& g = grid.shape;
@@ -109,11 +125,22 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
         const int cell = row * g.nx + cx, begin = grid.cell_start[cell],
                   end = grid.cell_start[cell + 1];
         if (begin == end) continue;
-        tile.fill(grid, cx, row % g.ny, row / g.ny, Inputs<3>{{position.x, position.y, position.z}},
-                  3);
+        const Inputs<3> places{{position.x, position.y, position.z}};
+        bool filtered = false;
+        if constexpr (Filter::columns > 0) {
+          for (int i = begin; i < end; ++i) filtered |= filter.tests(i);
+          if (filtered) {
+            tile.fill(grid, cx, row % g.ny, row / g.ny,
+                      join(places, filter.inputs_with_position().column), 10);
+          }
+        }
+        if (!filtered) tile.fill(grid, cx, row % g.ny, row / g.ny, places, 3);
         found.set_tile(tile);
         for (int i = begin; i < end; ++i) {
-          found.search(tile, i, h);
+          if (filtered)
+            found.search(tile, i, h, filter);
+          else
+            found.search(tile, i, h, NoFilter{});
           const unsigned blocks = unsigned(found.count + 3) / 4;
           const bool room = store.reserve(piece, blocks + 1);  // the last pack may end in the next
           Pack sum(0.f);

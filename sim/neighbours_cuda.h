@@ -6,11 +6,13 @@ namespace drench::sim::cuda {
 
 /// Calls visit(j, squared distance) for all neighbours of particle i within h, in the order of
 /// cells.
-template <class Visit>
+template <class Filter, class Visit>
 __device__ void for_each_within(const GridView& grid, const VecView& position, int i, float h,
-                                const Visit& visit) {
+                                const Filter& filter, const Visit& visit) {
   const GridShape& g = grid.shape;
   const Vec3<float> p = position[i];
+  bool tested = false;
+  if constexpr (Filter::columns > 0) tested = filter.tests(i);
   const int cx = g.cell_x(p.x), cy = g.cell_y(p.y), cz = g.cell_z(p.z);
   for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
     for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
@@ -18,20 +20,25 @@ __device__ void for_each_within(const GridView& grid, const VecView& position, i
       const int end = grid.cell_start[g.index(min(cx + 1, g.nx - 1), y, z) + 1];
       for (int j = begin; j < end; ++j) {
         const float r2 = length2(position[j] - p);
-        if (r2 < h * h) visit(j, r2);
+        if (r2 >= h * h) continue;
+        if constexpr (Filter::columns > 0) {
+          if (tested && filter.hides(i, j)) continue;
+        }
+        visit(j, r2);
       }
     }
   }
 }
 
-template <class Kernel, class Density>
+template <class Kernel, class Density, class Filter = NoFilter>
 void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
-                           NeighbourLists& lists, SortScratch& scratch, const Density& density) {
+                           NeighbourLists& lists, SortScratch& scratch, const Density& density,
+                           const Filter& filter = {}) {
   lists.begin.resize(size_t(n) + 1), lists.blocks.resize(n);
   int* blocks = lists.blocks.data();
   parallel_for("neighbours: count", n, [=] __device__(int i) {
     int count = 0;
-    for_each_within(grid, position, i, h, [&](int, float) { ++count; });
+    for_each_within(grid, position, i, h, filter, [&](int, float) { ++count; });
     blocks[i] = (count + 3) / 4;
   });
   exclusive_scan(lists.blocks, n, lists.begin, scratch);
@@ -43,7 +50,7 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
   parallel_for("neighbours: fill", n, [=] __device__(int i) {
     size_t at = size_t(first[i]) * 4;
     float sum = 0.f;
-    for_each_within(grid, position, i, h, [&](int j, float r2) {
+    for_each_within(grid, position, i, h, filter, [&](int j, float r2) {
       const float u = max0(1.f - sqrtf(r2) / h);
       sum += Kernel::value(u);
       index[at] = j, closeness[at++] = u;

@@ -187,8 +187,9 @@ DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& phys
     Members<P, Pack, N> m;
     for (int c = 0; c < N; ++c) m.value[c] = Pack::load(column[c] + k);
     if constexpr (Filter::columns > 0) {
-      m.value[0] = filter.template move_hidden_away<N>(hidden_from, column, k,
-                                                       {m.value[0], m.value[1], m.value[2]});
+      const Mask hidden =
+          filter.template hidden<N>(hidden_from, column, k, {m.value[0], m.value[1], m.value[2]});
+      m.value[0] = select(hidden, Pack(Tile::far_away), m.value[0]);
     }
     const P j = m.as();
     if constexpr (Physics::costly) {

@@ -38,6 +38,7 @@ struct Limits {
   float max_acceleration = 0;  // m/s^2, fluid
   float residual = 0;          // mean density error that the pressure solve left, over rest
   int iterations = 0;          // of the pressure solve
+  int sheet_sweeps = 0;        // of the conjugate gradients of the sheets
   float step = 0;              // s, of the step that was made
   int bad_particle = -1;       // index of the first particle that is not finite or absurdly fast
   int bad_vertex = -1;

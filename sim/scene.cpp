@@ -341,7 +341,9 @@ Scene build_scene(const Shot& shot) {
   }
   scene.first_vertex.push_back(scene.cloth.vertices());
   scene.first_triangle.push_back(scene.cloth.triangles());
-  scene.parameters.cloth_dt_limit = float(std::min(dt_limit, 1e-3));
+  // The implicit step of the sheets has no limit.
+  scene.parameters.cloth_dt_limit =
+      scene.parameters.incompressible ? 1e30f : float(std::min(dt_limit, 1e-3));
   check_overlap(shot, scene);
   return scene;
 }

@@ -128,6 +128,8 @@ class BackendSolver : public Solver {
       const SolveControl solve = value_at(state_.pressure.control, 0);
       limits.residual = solve.residual, limits.iterations = solve.iterations;
       limits.step = float(dt);
+      if (allocated_ & column_cloth_system)
+        limits.sheet_sweeps = value_at(state_.cloth_system.control, 0).sweeps;
     }
     return limits;
   }
@@ -182,6 +184,7 @@ class BackendSolver : public Solver {
     }
     if (allocated_ & column_contact) {
       for (VecColumn* c : {&f.impulse, &f.start}) c->resize(n);
+      if (allocated_ & column_cloth_system) f.drift.resize(n);
       state_.contact.stride = int(n + 23) / 8 * 8;
       state_.contact.index.resize(size_t(4) * state_.contact.stride);
       state_.contact.field.resize(size_t(23) * state_.contact.stride);
@@ -225,8 +228,21 @@ class BackendSolver : public Solver {
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
+    if (allocated_ & column_cloth_system) allocate_cloth_system();
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
+  }
+
+  void allocate_cloth_system() {
+    const ClothState& c = state_.cloth;
+    ClothSystem& s = state_.cloth_system;
+    const size_t springs = size_t(c.spring_slots) * c.padded;
+    s.tension.resize(springs), s.axis.resize(springs);
+    s.inertia.resize(c.padded), s.factor.resize(size_t(6) * c.padded);
+    for (VecColumn* v :
+         {&s.base, &s.right, &s.free, &s.change, &s.answer, &s.residual, &s.direction, &s.image})
+      v->resize(c.padded);
+    s.control.resize(1);
   }
 
   /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices

@@ -54,7 +54,8 @@ enum ColumnGroup : unsigned {
   column_memory = 32,   // remembered side
   column_contact = 64,  // impulses
   column_cloth = 128,
-  column_projection = 256,  // neighbour lists and rows of the pressure solve
+  column_cloth_system = 512,  // the implicit step of the sheets
+  column_projection = 256,    // neighbour lists and rows of the pressure solve
 };
 
 struct PassInfo {

@@ -50,6 +50,7 @@ struct FluidState {
   Column<float> cloth_share;  // share of density that the sheet replaces
   VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end
   VecColumn start;            // m, position at the start of the step
+  VecColumn drift;            // m, of a path beside dt times the velocity (incompressible)
   Column<int> moved;          // 1: cannot meet a sheet, has made its whole step
   Column<int> held, stopped;  // by the path test for this substep; triangle it stopped, -1 none
 };
@@ -91,6 +92,27 @@ struct ClothState {
   Column<long long> stop_sum;  // 4 a vertex: see PathTest
 };
 
+/// Scalars of the conjugate gradients of the sheets, in the memory of the backend.
+struct ClothControl {
+  int done = 0, sweeps = 0;
+  double reference = 0, energy = 0, step = 0, turn = 0;  // r . z of the loads, of the residual
+};
+
+/// Columns of the implicit step of the sheets (passes/cloth_implicit.h), rebuilt every step.
+struct ClothSystem {
+  Column<float> tension;  // kg, across a spring, slot by slot as ClothState::spring_end
+  VecColumn axis;         // sqrt(kg), along a spring: the rest of its stiffness is axis axis^T
+  Column<float> inertia;  // kg
+  Column<float> factor;   // 6 fields a vertex: L D L^T of its block, D inverted
+  VecColumn base;    // kg m, forces on the sheet where its velocity takes it, but for the fluid's
+  VecColumn right;   // kg m, with the fluid's
+  VecColumn free;    // 1 along axes that a vertex may move on, 0 where a pin or a wall holds it
+  VecColumn change;  // m, off the place where its velocity takes it: the unknown
+  VecColumn answer;  // m, to the same pressure all over the sheets
+  VecColumn residual, direction, image;
+  Column<ClothControl> control;
+};
+
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
@@ -130,6 +152,7 @@ struct State {
   FluidState fluid;
   PressureState pressure;
   ClothState cloth;
+  ClothSystem cloth_system;
   ContactState contact;
   SortScratch scratch;
   VecColumn swap_vector;

@@ -47,7 +47,7 @@ void sum_density(State& state) {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state));
+                  sheet_filter(state, state.fluid.position.view()));
   }
 }
 
@@ -67,7 +67,8 @@ void pressure_viscosity(State& state) {
                                {p.gravity[0], p.gravity[1], p.gravity[2]},
                                walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass, sheet_filter(state));
+    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
+                  sheet_filter(state, state.fluid.position.view()));
   } else {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
   }
@@ -82,7 +83,15 @@ void integrate_velocity(State& state) {
 }
 
 void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
-void exact_nearest(State& state) { find_nearest_triangles(state, state.parameters.support_radius); }
+/// Particles stand where sheets do: at the start of the step.
+VecView beside_sheets(const State& state) {
+  return state.parameters.incompressible ? state.fluid.start.view() : state.fluid.position.view();
+}
+void exact_nearest(State& state) {
+  find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
+}
+void exact_sides(State& state) { find_sheet_sides(state, beside_sheets(state)); }
+void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.
 void paper_grid(State& state) { build_polygon_grid(state, 0.f); }
 void paper_reaction(State& state) {
@@ -100,7 +109,9 @@ bool smoothed(const Parameters& p, bool cloth) {
   return projected(p, cloth) && (p.xsph > 0 || p.dynamic_viscosity > 0);
 }
 bool compressible(const Parameters& p, bool) { return p.fluid && !p.incompressible; }
-bool exact(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
+bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
+bool exact(const Parameters& p, bool cloth) { return coupled(p, cloth) && !p.incompressible; }
+bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool paper(const Parameters& p, bool cloth) { return p.fluid && cloth && p.paper; }
 bool fluid_alone(const Parameters& p, bool cloth) { return compressible(p, cloth) && !cloth; }
 bool cloth_alone(const Parameters& p, bool cloth) { return !p.fluid && cloth; }
@@ -110,16 +121,19 @@ constexpr unsigned moving = column_position | column_velocity;
 const Pass all_passes[] = {
     {"predict_particles", projected, moving, moving, predict_particles},
     {"sort_particles", fluid, column_position, moving, sort_particles},
+    {"polygon_grid", coupled, column_cloth, column_cloth, exact_grid},
+    {"nearest_triangle", coupled, column_position | column_cloth, column_sheet, exact_nearest},
+    {"sheet_side", coupled, column_position | column_cloth, column_sheet | column_memory,
+     exact_sides},
+    {"sort_near", strong, column_sheet, column_contact, sort_all_contacts},
+    {"start_rows", strong, column_sheet | column_contact, column_cloth, start_contacts},
+    {"linearise_cloth", strong, column_cloth, column_cloth_system, linearise_cloth},
     {"find_neighbours", projected, column_position, column_density | column_projection,
      find_neighbours},
     {"smooth_velocities", smoothed, column_velocity | column_projection,
      column_velocity | column_projection, smooth_velocities},
     {"project_density", projected, moving | column_density | column_projection,
      moving | column_density | column_projection, project_density},
-    {"polygon_grid", exact, column_cloth, column_cloth, exact_grid},
-    {"nearest_triangle", exact, column_position | column_cloth, column_sheet, exact_nearest},
-    {"sheet_side", exact, column_position | column_cloth, column_sheet | column_memory,
-     find_sheet_sides},
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
     {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
      find_nearest_centroids},
@@ -137,6 +151,8 @@ const Pass all_passes[] = {
     {"paper_reaction", paper, column_contact, column_cloth, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
     {"move_cloth", cloth_alone, column_cloth, column_cloth, move_cloth},
+    {"move_with_sheets", strong, moving | column_cloth | column_cloth_system,
+     moving | column_cloth | column_contact, move_with_sheets},
     {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact,
      move_coupled},
     {"paper_move", paper, moving | column_cloth, moving | column_cloth, paper_move},
@@ -168,6 +184,13 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
 
 void step_cloth_alone(State& state) {
   state.cloth.force.clear();
+  if (state.parameters.incompressible) {
+    state.contact.near = 0;
+    linearise_cloth(state);
+    settle_sheets(state);
+    finish_sheets(state);
+    return finish_substep(state.cloth);
+  }
   move_cloth(state);
 }
 

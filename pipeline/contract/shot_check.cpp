@@ -118,10 +118,12 @@ class Checker {
 
   void check_fluid() const {
     const Fluid& fluid = shot_.fluid;
-    if (fluid.solver == FluidSolver::incompressible && !shot_.cloth.empty()) {
+    if (fluid.solver == FluidSolver::incompressible && !shot_.cloth.empty() &&
+        shot_.coupling.scheme == CouplingScheme::paper) {
       fail("fluid.solver",
-           "fluid.solver is \"incompressible\" but the shot has cloth, which only the weakly "
-           "compressible solver couples to. Use \"automatic\"");
+           "fluid.solver is \"incompressible\" but coupling.scheme is \"paper\", which knows "
+           "explicit pressures alone. Use coupling.scheme = \"exact\" or fluid.solver = "
+           "\"weakly_compressible\"");
     }
     if (fluid.support_ratio > 0 && fluid.support_ratio < 1.2) {
       fail("fluid.support_ratio",

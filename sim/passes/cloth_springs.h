@@ -7,10 +7,8 @@ namespace drench::sim::DRENCH_BACKEND {
 // Spring force on a vertex, eq (4) of the seed, with damping along each spring (momentum is kept).
 // Springs stand by slot, slot s of all vertices together, so that eight vertices read them at once;
 // vertices with fewer springs have slots of no stiffness that end on themselves.
-struct ClothSprings {
-  VecView position, velocity;
+struct SpringEnds {
   const int *end, *slot_offset;
-  const float *rest_length, *stiffness, *damping;
   int slots, stride;
 
   /// A vector at the other ends of slot s.
@@ -26,17 +24,27 @@ struct ClothSprings {
     return view.at(load(end, i + s * stride));
   }
 #endif
+};
+
+inline SpringEnds spring_ends_of(const ClothState& c) {
+  return {c.spring_end.data(), c.slot_offset.data(), c.spring_slots, c.padded};
+}
+
+struct ClothSprings {
+  VecView position, velocity;
+  SpringEnds ends;
+  const float *rest_length, *stiffness, *damping;
 
   template <class Index>
   DRENCH_HD auto force(Index i) const {
     using T = decltype(load(stiffness, i));
     const Vec3<T> x = position.at(i), v = velocity.at(i);
     Vec3<T> f{T(0.f), T(0.f), T(0.f)};
-    for (int s = 0; s < slots; ++s) {
-      const auto at = i + s * stride;
-      const Vec3<T> d = at_end(position, i, s) - x;
+    for (int s = 0; s < ends.slots; ++s) {
+      const auto at = i + s * ends.stride;
+      const Vec3<T> d = ends.at_end(position, i, s) - x;
       const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
-      const T rate = dot(at_end(velocity, i, s) - v, d) * inverse;
+      const T rate = dot(ends.at_end(velocity, i, s) - v, d) * inverse;
       const T pull = load(stiffness, at) * (l - load(rest_length, at)) + load(damping, at) * rate;
       f = f + d * (pull * inverse);
     }
@@ -49,31 +57,45 @@ struct ClothBuffers {
   VecView position, velocity, next, next_velocity;
 };
 
+/// Domain walls stop cloth and hold half of its sliding back.
+struct ClothWalls {
+  Vec3<float> low, high;
+
+  template <class T>
+  DRENCH_HD void stop(Vec3<T>& x, Vec3<T>& v) const {
+    const Vec3<T> inside{minimum(maximum(x.x, T(low.x)), T(high.x)),
+                         minimum(maximum(x.y, T(low.y)), T(high.y)),
+                         minimum(maximum(x.z, T(low.z)), T(high.z))};
+    const Vec3<T> out = x - inside;
+    const Vec3<T> stopped{select((out.x * out.x) > T(0.f), T(0.f), v.x * T(0.5f)),
+                          select((out.y * out.y) > T(0.f), T(0.f), v.y * T(0.5f)),
+                          select((out.z * out.z) > T(0.f), T(0.f), v.z * T(0.5f))};
+    v = select(length2(out) > T(0.f), stopped, v);
+    x = inside;
+  }
+};
+
+inline ClothWalls cloth_walls_of(const Parameters& p) {
+  const float margin = 0.25f * p.spacing;  // room for a particle (move.h) between cloth and wall
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = p.wall[k] ? p.low[k] + margin : -1e30f;
+    high[k] = p.wall[k] ? p.high[k] - margin : 1e30f;
+  }
+  return {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+}
+
 // One damped Verlet step, eq (3) of the seed with v = (x_t - x_{t-dt}) / dt, which makes a change
 // of dt and the first step right: v' = d v + dt F/m, x' = x + dt v', d = exp(-rate dt).
 inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  const ClothSprings springs{b.position,
-                             b.velocity,
-                             c.spring_end.data(),
-                             c.slot_offset.data(),
-                             c.rest_length.data(),
-                             c.stiffness.data(),
-                             c.spring_damping.data(),
-                             c.spring_slots,
-                             c.padded};
+  const ClothSprings springs{b.position,           b.velocity,         spring_ends_of(c),
+                             c.rest_length.data(), c.stiffness.data(), c.spring_damping.data()};
   const VecView fluid_force = c.force.view();
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
-  const float margin = 0.25f * p.spacing;  // room for a particle (move.h) between cloth and wall
-  const float open = 1e30f;
-  const Vec3<float> low{p.wall[0] ? p.low[0] + margin : -open,
-                        p.wall[1] ? p.low[1] + margin : -open,
-                        p.wall[2] ? p.low[2] + margin : -open};
-  const Vec3<float> high{p.wall[0] ? p.high[0] - margin : open,
-                         p.wall[1] ? p.high[1] - margin : open,
-                         p.wall[2] ? p.high[2] - margin : open};
+  const ClothWalls walls = cloth_walls_of(p);
   for_each_lane(
       "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
@@ -83,18 +105,9 @@ inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
         const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
         Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
         Vec3<T> x = b.position.at(i) + v * T(dt);
-        // A wall stops cloth and holds half of its sliding back.
-        const Vec3<T> inside{minimum(maximum(x.x, T(low.x)), T(high.x)),
-                             minimum(maximum(x.y, T(low.y)), T(high.y)),
-                             minimum(maximum(x.z, T(low.z)), T(high.z))};
-        const Vec3<T> out = x - inside;
-        const auto touches = length2(out) > T(0.f);
-        const Vec3<T> stopped{select((out.x * out.x) > T(0.f), T(0.f), v.x * T(0.5f)),
-                              select((out.y * out.y) > T(0.f), T(0.f), v.y * T(0.5f)),
-                              select((out.z * out.z) > T(0.f), T(0.f), v.z * T(0.5f))};
-        v = select(touches, stopped, v);
+        walls.stop(x, v);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-        b.next.put(i, select(free, inside, b.position.at(i)));
+        b.next.put(i, select(free, x, b.position.at(i)));
         b.next_velocity.put(i, select(free, v, none));
       });
 }

@@ -31,15 +31,28 @@ struct ImageWalls {
     return there ? minimum((2.f * distance - 0.5f * spacing) * inverse_h, 1.f) : 1.f;
   }
 
+  /// 1 where the foot on a wall lies before a sheet, 0 where it lies a fifth of a spacing behind.
+  DRENCH_HD float seen(float behind) const {
+    return 1.f - minimum(max0(behind) / (0.2f * spacing), 1.f);
+  }
+
   /// Share of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
   /// corners are not counted twice; H is the kernel's integral over the image, over h.
-  DRENCH_HD WallShare share(Vec3<float> p) const {
-    const float x[3] = {p.x, p.y, p.z};
+  DRENCH_HD WallShare share(Vec3<float> p) const { return share(p, {0.f, 0.f, 0.f}, 0.f); }
+
+  /// The same beside a sheet at `distance` m against its normal: a wall is not seen through it.
+  DRENCH_HD WallShare share(Vec3<float> p, Vec3<float> normal, float distance) const {
+    const float x[3] = {p.x, p.y, p.z}, n[3] = {normal.x, normal.y, normal.z};
     float open[3], slope[3];
     for (int k = 0; k < 3; ++k) {
-      const float below = image(x[k] - low[k], on[k]), above = image(high[k] - x[k], on[k]);
-      open[k] = 1.f - scale * (WendlandC2::halfspace(below) + WendlandC2::halfspace(above));
-      slope[k] = 2.f * scale * inverse_h * (WendlandC2::plane(above) - WendlandC2::plane(below));
+      const float to_low = x[k] - low[k], to_high = high[k] - x[k];
+      const float below = image(to_low, on[k]), above = image(to_high, on[k]);
+      const float seen_below = scale * seen(to_low * n[k] - distance),
+                  seen_above = scale * seen(-to_high * n[k] - distance);
+      open[k] = 1.f - seen_below * WendlandC2::halfspace(below) -
+                seen_above * WendlandC2::halfspace(above);
+      slope[k] = 2.f * inverse_h *
+                 (seen_above * WendlandC2::plane(above) - seen_below * WendlandC2::plane(below));
     }
     return {
         1.f - open[0] * open[1] * open[2],

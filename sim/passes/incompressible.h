@@ -10,6 +10,7 @@
 #include "sim/passes/image_walls.h"
 #include "sim/passes/move.h"
 #include "sim/passes/pressure_solve.h"
+#include "sim/passes/sheet_filter.h"
 #include "sim/passes/velocity_smoothing.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -22,9 +23,12 @@ inline void predict_particles(State& state) {
   const VecView x = f.position.view(), v = f.velocity.view();
   const Vec3<float> kick{dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]};
   const Mover mover = mover_of(p, dt);
+  const VecView start = f.start.view();
+  const bool keep = f.start.x.size() > 0;  // sheets stand where they stood
   parallel_for(
       "predict", f.count, DRENCH_LAMBDA(int i) {
         Vec3<float> velocity = v[i] + kick;
+        if (keep) start.set(i, x[i]);
         x.set(i, mover(x[i], velocity));
         v.set(i, velocity);
       });
@@ -48,15 +52,23 @@ inline void find_neighbours(State& state) {
         wall[i] = {rest * share.gradient.x, rest * share.gradient.y, rest * share.gradient.z,
                    rest * share.value};
       });
+  const bool sheets = state.contact.near > 0;
+  if (sheets) add_sheets_to_walls(state);
   const float scale = mass / (h * h * h);
-  build_neighbour_lists<WendlandC2>(
-      {f.grid, f.cell_start.data()}, f.count, x, h, s.lists, state.scratch,
-      DRENCH_LAMBDA(int i, float sum) {
-        density[i] = scale * sum + wall[i].w;
-        source[i] = density[i] - rest;
-      });
+  const GridView grid{f.grid, f.cell_start.data()};
+  const auto add_up = DRENCH_LAMBDA(int i, float sum) {
+    density[i] = scale * sum + wall[i].w;
+    source[i] = density[i] - rest;
+  };
+  if (sheets) {
+    build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up,
+                                      sheet_filter(state, f.start.view()));
+  } else {
+    build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
+  }
   for_each_neighbour("neighbours: diagonal", s.lists, f.count,
                      InverseDiagonal{place, wall, s.inverse_diagonal.data(), gradient_scale(p)});
+  if (sheets) limit_recovery(state);
 }
 
 /// Pressures, and what they do to positions and velocities.
@@ -64,6 +76,7 @@ inline void project_density(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   solve_pressure(state, p.tolerance, p.most_iterations);
+  if (state.cloth.vertices > 0) settle_sheets(state);
   const VecView x = f.position.view(), v = f.velocity.view();
   const Float4* displacement = state.pressure.vector.data();
   const float inverse_dt = float(1 / state.dt);
@@ -75,6 +88,22 @@ inline void project_density(State& state) {
         x.set(i, mover(x[i], change));
         v.set(i, v[i] + change);
       });
+}
+
+/// Fluid and sheets go to their new places, each path tested against the moving triangles.
+inline void move_with_sheets(State& state) {
+  FluidState& f = state.fluid;
+  const float dt = float(state.dt);
+  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
+                drift = f.drift.view();
+  finish_sheets(state);
+  parallel_for(
+      "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
+        const Vec3<float> from = start[i];
+        drift.set(i, x[i] - from - v[i] * dt);
+        x.set(i, from);
+      });
+  move_coupled(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -63,6 +63,18 @@ inline void copy_vectors(const char* name, VecView to, VecView from, int n) {
       name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
 }
 
+/// What a particle's path has beside dt times its velocity.
+struct Drift {
+  VecView drift;
+  bool any;
+  DRENCH_HD Vec3<float> operator[](int i) const {
+    return any ? drift[i] : Vec3<float>{0.f, 0.f, 0.f};
+  }
+};
+inline Drift drift_of(const State& state) {
+  return {state.fluid.drift.view(), state.fluid.drift.x.size() > 0};
+}
+
 struct GuardCount {
   int hits = 0, unresolved = 0;
 };
@@ -123,6 +135,7 @@ inline Tested tested_of(const State& state, float cloth_moved) {
 inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
+  const Drift drift = drift_of(state);
   const Mover mover = mover_of(state.parameters, dt);
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
@@ -132,7 +145,7 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
         const int i = tested[k];
         const bool still = held[i] || moved[i];
         Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-        Vec3<float> to = mover(x[i], velocity);
+        Vec3<float> to = still ? x[i] : mover(x[i] + drift[i], velocity);
         if (!still) v.set(i, velocity);
         GuardCount result;
         if (triangle[i] < 0 || test.in_reach(i, to)) {
@@ -210,6 +223,7 @@ inline void move_unguarded_particles(State& state) {
   int *moved = f.moved.data(), *key = state.contact.key.data();
   float* far_by = f.far_by.data();
   const Mover mover = mover_of(state.parameters, dt);
+  const Drift drift = drift_of(state);
   const float room = reach + 2.f * path_clearance * spacing;
   parallel_for(
       "guard: move", f.count, DRENCH_LAMBDA(int i) {
@@ -218,10 +232,11 @@ inline void move_unguarded_particles(State& state) {
         const float d = distance[i] < 0.f ? -distance[i] : distance[i];
         // Beyond a free edge the distance is not kept.
         const bool guard =
-            triangle[i] >= 0 && (length2(normal[i]) == 0.f || d <= dt * length(velocity) + room);
+            triangle[i] >= 0 &&
+            (length2(normal[i]) == 0.f || d <= dt * length(velocity) + length(drift[i]) + room);
         moved[i] = !guard;
         if (guard) return;
-        x.set(i, mover(x[i], velocity));
+        x.set(i, mover(x[i] + drift[i], velocity));
         v.set(i, velocity);
         far_by[i] -= length(x[i] - start[i]);
       });
@@ -280,7 +295,7 @@ inline void move_coupled(State& state) {
   move_unguarded_particles(state);
   float moved = 0.f;
   for (int s = 0; s < state.substeps; ++s) {
-    cloth_verlet(state, cloth_buffers(state.cloth), dt);
+    if (!state.parameters.incompressible) cloth_verlet(state, cloth_buffers(state.cloth), dt);
     moved = guard_substep(state, dt, moved);
     finish_substep(state.cloth);
     if (state.after_substep) state.after_substep();

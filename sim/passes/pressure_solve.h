@@ -8,7 +8,7 @@
 // starts the conjugation anew, so that they need more iterations than Jacobi.
 
 #include "sim/parallel.h"
-#include "sim/passes/pressure_rows.h"
+#include "sim/passes/sheet_pressure.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -106,9 +106,15 @@ inline void solve_pressure(State& state, float tolerance, int most_iterations) {
       "solve: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   parallel_for(
       "solve: warm start", n, DRENCH_LAMBDA(int i) { place[i].w = before[i] = dt2 * term[i]; });
+  const bool sheets = state.contact.near > 0;
+  if (sheets) start_sheets(state);
   for (int k = 0; k <= most_iterations && !solve_ended(s, k - 1); ++k) {
     accelerate_by_pressure(state);
     density_rate(state);
+    if (sheets) {
+      respond_sheets(state, k == 0 ? first_sweeps : next_sweeps, sheet_tolerance);
+      subtract_sheet_rate(state);
+    }
     reduce_then(
         "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
         SolveSums{}, DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });

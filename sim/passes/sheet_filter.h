@@ -22,6 +22,10 @@ struct SheetFilter {
   DRENCH_HD bool tests(int i) const { return shaded[i] != 0; }
   DRENCH_HD void finish(int i, bool any) const { shaded[i] = any; }
   DRENCH_HD Inputs<4> inputs() const { return {{normal.x, normal.y, normal.z, plane}}; }
+  /// With the positions that it decides by, where these are not those of the pairs.
+  DRENCH_HD Inputs<7> inputs_with_position() const {
+    return {{position.x, position.y, position.z, normal.x, normal.y, normal.z, plane}};
+  }
 
   /// The same answer for (i, j) and (j, i): the segment always starts at the smaller end.
   DRENCH_HD bool segment_hidden(Vec3<float> p, Vec3<float> q) const {
@@ -64,22 +68,21 @@ struct SheetFilter {
     return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), place, false};
   }
 
-  /// Moves the neighbours that the sheet hides out of every support.
+  /// Which of the neighbours in places k..k+7 does the sheet hide?
   template <int N>
-  DRENCH_HD Pack move_hidden_away(Self& i, const float* const* column, int k,
-                                  Vec3<Pack> position) const {
+  DRENCH_HD Mask hidden(Self& i, const float* const* column, int k, Vec3<Pack> position) const {
     const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k),
                               Pack::load(column[N + 2] + k)};
     const Mask back_i = dot(i.normal, position) + i.plane <= Pack(0.f);
     const Mask back_j = dot(normal_j, i.position) + Pack::load(column[N + 3] + k) <= Pack(0.f);
     if ((back_i | back_j).bits() == 0) [[likely]]
-      return position.x;  // all eight in front of each other
+      return back_i;  // all eight in front of each other
     const Mask within = length2(position - i.position) < Pack(support_radius * support_radius);
     const Mask surely = back_i & back_j & (dot(i.normal, normal_j) < Pack(0.f));
     const int doubtful = ((back_i | back_j) & within & !surely).bits();
     const Mask hidden{hidden_lanes(column, i.place, k, surely.bits(), doubtful)};
     i.any |= hidden.bits() != 0;
-    return select(hidden, Pack(Tile::far_away), position.x);
+    return hidden;
   }
 
   /// Lanes that are hidden for sure and those of the doubtful ones whose segment meets a triangle.
@@ -100,10 +103,12 @@ struct SheetFilter {
 #endif
 };
 
-inline SheetFilter sheet_filter(const State& state) {
+/// @param position  m, those that the planes of the sheets were taken from
+inline SheetFilter sheet_filter(const State& state, const VecView& position) {
   const FluidState& f = state.fluid;
-  return {f.shaded.data(), f.position.view(),        f.normal.view(),
-          f.plane.data(),  polygons_of(state.cloth), state.parameters.support_radius};
+  return {f.shaded.data(),          position,
+          f.normal.view(),          f.plane.data(),
+          polygons_of(state.cloth), state.parameters.support_radius};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -12,6 +12,20 @@ struct SheetTopology {
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
   VecView rest_centroid;
   const float* half_thickness;
+  Vec3<float> low, high;  // m, half a spacing inside the domain's walls
+
+  /// Is a free edge so near to a wall that no fluid passes between them? Not to a wall that the
+  /// sheet lies along.
+  DRENCH_HD bool closed_by_wall(Vec3<float> normal, int a, int b) const {
+    const Vec3<float> p = polygons.position[a], q = polygons.position[b];
+    const float across = 0.5f * length2(normal);
+    return (beyond(p.x, q.x, low.x, high.x) && normal.x * normal.x < across) ||
+           (beyond(p.y, q.y, low.y, high.y) && normal.y * normal.y < across) ||
+           (beyond(p.z, q.z, low.z, high.z) && normal.z * normal.z < across);
+  }
+  DRENCH_HD static bool beyond(float p, float q, float low, float high) {
+    return (p < low && q < low) || (p > high && q > high);
+  }
 
   DRENCH_HD Vec3<float> area_normal(int t) const {  // twice the area along the unit normal
     Vec3<float> a, b, c;
@@ -38,9 +52,24 @@ struct SheetTopology {
   }
 };
 
-inline SheetTopology topology_of(const ClothState& c) {
-  return {polygons_of(c),     c.neighbour.data(), c.sheet.data(),         c.fan_start.data(),
-          c.fan_entry.data(), c.rim.data(),       c.rest_centroid.view(), c.half_thickness.data()};
+inline SheetTopology topology_of(const ClothState& c, const Parameters& p) {
+  SheetTopology sheet{polygons_of(c),
+                      c.neighbour.data(),
+                      c.sheet.data(),
+                      c.fan_start.data(),
+                      c.fan_entry.data(),
+                      c.rim.data(),
+                      c.rest_centroid.view(),
+                      c.half_thickness.data(),
+                      {},
+                      {}};
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = p.wall[k] ? p.low[k] + 0.5f * p.spacing : -1e30f;
+    high[k] = p.wall[k] ? p.high[k] - 0.5f * p.spacing : 1e30f;
+  }
+  sheet.low = {low[0], low[1], low[2]}, sheet.high = {high[0], high[1], high[2]};
+  return sheet;
 }
 
 /// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no
@@ -57,11 +86,15 @@ DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, fl
   if (!(za || zb || zc)) return {sheet.unit_normal(t), false};
   if ((za && zb) || (zb && zc) || (za && zc)) {
     const int vertex = corner[!za ? 0 : !zb ? 1 : 2];
-    return {sheet.vertex_normal(vertex), sheet.rim[vertex] != 0};
+    return {sheet.vertex_normal(vertex),
+            sheet.rim[vertex] != 0 && !sheet.closed_by_wall(sheet.unit_normal(t), vertex, vertex)};
   }
   const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
   const int other = sheet.neighbour[3 * t + edge];
-  if (other < 0) return {sheet.unit_normal(t), true};
+  if (other < 0) {
+    const Vec3<float> n = sheet.unit_normal(t);
+    return {n, !sheet.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
+  }
   return {sheet.unit_normal(t) + sheet.unit_normal(other), false};
 }
 
@@ -74,9 +107,11 @@ DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb
   const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
   Vec3<float> v[3];
   sheet.polygons.corners(t, v[0], v[1], v[2]);
-  const float twice_area = length(sheet.area_normal(t));
+  const Vec3<float> area = sheet.area_normal(t);
+  const float twice_area = length(area);
   for (int e = 0; e < 3; ++e) {
-    if (neighbour[e] >= 0) continue;
+    const int a = sheet.polygons.corner[3 * t + e], b = sheet.polygons.corner[3 * t + (e + 1) % 3];
+    if (neighbour[e] >= 0 || sheet.closed_by_wall(area, a, b)) continue;
     const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
     inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
   }
@@ -87,10 +122,10 @@ DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb
 // from the geometry when a particle comes within reach and remembered while its nearest triangle
 // stays on the same patch (rest centroids within two supports); memory ends beyond the support and
 // at free edges.
-inline void find_sheet_sides(State& state) {
+inline void find_sheet_sides(State& state, const VecView& position) {
   FluidState& f = state.fluid;
-  const SheetTopology sheet = topology_of(state.cloth);
-  const VecView position = f.position.view(), normal = f.normal.view();
+  const SheetTopology sheet = topology_of(state.cloth, state.parameters);
+  const VecView normal = f.normal.view();
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();

@@ -64,6 +64,7 @@ inline void sort_particles(State& state) {
   permute(f.id, state.swap_int, order, n);
   if (p.incompressible) permute(f.pressure_term, state.swap_vector.x, order, n);
   if (f.memory_triangle.size()) {
+    if (p.incompressible) permute(f.start, state.swap_vector, order, n);
     permute(f.memory_triangle, state.swap_int, order, n);
     permute(f.memory_side, state.swap_int, order, n);
     permute(f.owed, state.swap_vector, order, n);

@@ -63,7 +63,7 @@ class PathCount {
 Shot block_over_sheet(V3d velocity) {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -9.81, 0);
-  const V3d aim = velocity.length() > 0 ? V3d(velocity.x, 0, velocity.z) * 0.02 : V3d(0);
+  const V3d aim = V3d(velocity.x, 0, velocity.z) * (0.2 / velocity.length());
   add_box(shot, V3d(-0.04, 0.015, -0.04) - aim, {8, 8, 8}, velocity);
   pin_edges(add_sheet(shot, 0.3, 0, 16));
   return shot;
@@ -114,6 +114,18 @@ TEST_P(Crossing, NoneByAJetAtTenMetresASecond) {
 
 TEST_P(Crossing, NoneByAGrazingJet) {
   expect_no_crossing(jet_at_sheet(V3d(9.8, -2, 0), GetParam()), 600, GetParam(), 300);
+}
+
+class StrongCrossing : public testing::TestWithParam<V3d> {};
+// Falls, normal jets and grazing ones.
+INSTANTIATE_TEST_SUITE_P(Velocities, StrongCrossing,
+                         testing::Values(V3d(0, -1, 0), V3d(0, -10, 0), V3d(9.8, -2, 0),
+                                         V3d(0, -50, 0), V3d(0, -100, 0), V3d(99.6, -8.7, 0)));
+
+TEST_P(StrongCrossing, NoneInTheIncompressibleFluid) {
+  Shot shot = block_over_sheet(GetParam());
+  shot.fluid.solver = FluidSolver::incompressible;
+  expect_no_crossing(shot, 150, 1, 20);
 }
 
 // What is counted is what the solver went through: the last substep of a step is the state after

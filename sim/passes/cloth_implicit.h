@@ -1,0 +1,253 @@
+#pragma once
+// Implicit Euler of the sheets, linearised once a step about where they are (Baraff and Witkin
+// 1998): with w = x_end - x - dt v, the way that a vertex comes off the straight one,
+//   A w = dt^2 (f(x) + m g + f_owed - m c v) - (dt C + dt^2 K) dt v + loads,   A = m (1 + dt c) +
+//   dt C + dt^2 K,
+// K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed
+// spring would push over sideways, so that A is positive definite. Loads are what the fluid's
+// pressures give (sheet_pressure.h). Solved by conjugate gradients scaled by the 3 x 3 blocks of
+// the vertices. Pinned vertices stay at w = 0, and vertices that a wall of the domain holds up have
+// the w that takes them there.
+
+#include "sim/passes/cloth_springs.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// The components along free axes.
+template <class T>
+DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
+  return {free.x * v.x, free.y * v.y, free.z * v.z};
+}
+
+/// The matrix A, by slots of springs, on free axes alone.
+struct ClothMatrix {
+  SpringEnds ends;
+  const float *tension, *inertia;
+  VecView axis, free;
+
+  template <class Index>
+  DRENCH_HD auto times(const VecView& view, Index i) const {
+    using T = decltype(load(inertia, i));
+    const Vec3<T> x = view.at(i);
+    Vec3<T> y = x * load(inertia, i);
+    for (int s = 0; s < ends.slots; ++s) {
+      const auto at = i + s * ends.stride;
+      const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
+      y = y + d * load(tension, at) + e * dot(e, d);
+    }
+    return along(free.at(i), y);
+  }
+};
+
+inline ClothMatrix cloth_matrix(const State& state) {
+  const ClothSystem& s = state.cloth_system;
+  return {spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(), s.axis.view(),
+          s.free.view()};
+}
+
+/// Inverses of the blocks on A's diagonal, as L D L^T.
+struct BlockInverse {
+  float* factor;
+  int stride;
+
+  DRENCH_HD float* field(int k) const { return factor + k * stride; }
+
+  /// From the block's entries xx xy xz yy yz zz, none of whose pivots is below `least` but by
+  /// rounding.
+  template <class Index, class T>
+  DRENCH_HD void put(Index i, const T (&b)[6], T least) const {
+    const T d0 = T(1.f) / maximum(b[0], least), l10 = b[1] * d0, l20 = b[2] * d0;
+    const T d1 = T(1.f) / maximum(b[3] - l10 * b[1], least), m21 = b[4] - l20 * b[1],
+            l21 = m21 * d1;
+    const T d2 = T(1.f) / maximum(b[5] - l20 * b[2] - l21 * m21, least);
+    const T value[6] = {d0, d1, d2, l10, l20, l21};
+    for (int k = 0; k < 6; ++k) store(field(k), i, value[k]);
+  }
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> times(Index i, Vec3<T> r) const {
+    const T l10 = load(field(3), i), l20 = load(field(4), i), l21 = load(field(5), i);
+    const T y = r.y - l10 * r.x, z = r.z - l20 * r.x - l21 * y;
+    const T c = z * load(field(2), i), b = y * load(field(1), i) - l21 * c;
+    return {r.x * load(field(0), i) - l10 * b - l20 * c, b, c};
+  }
+};
+
+inline BlockInverse block_inverse(const State& state) {
+  return {state.cloth_system.factor.data(), state.cloth.padded};
+}
+
+/// The matrix at the positions and the right side without loads; w = 0.
+inline void linearise_cloth(State& state) {
+  ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const Parameters& p = state.parameters;
+  const float dt = float(state.dt);
+  const VecView x = c.position.view(), v = c.velocity.view(), axis = s.axis.view(),
+                base = s.base.view(), free = s.free.view(), change = s.change.view(),
+                owed = c.force.view();
+  const SpringEnds ends = spring_ends_of(c);
+  const float *rest = c.rest_length.data(), *stiffness = c.stiffness.data(),
+              *damping = c.spring_damping.data(), *mass = c.mass.data(),
+              *rate = c.damping_rate.data(), *inverse_mass = c.inverse_mass.data();
+  float *tension = s.tension.data(), *inertia = s.inertia.data();
+  const BlockInverse block = block_inverse(state);
+  const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
+  ClothControl* control = s.control.data();
+  parallel_for(
+      "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+  for_each_lane(
+      "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
+        using T = decltype(load(mass, i));
+        const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
+        const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
+        Vec3<T> push =
+            Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
+        T b[6] = {heavy, T(0.f), T(0.f), heavy, T(0.f), heavy};
+        Vec3<T> held = none;
+        for (int k = 0; k < ends.slots; ++k) {
+          const auto at = i + k * ends.stride;
+          const Vec3<T> d = ends.at_end(x, i, k) - here;
+          const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
+          const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
+          const T t = stiff * max0(excess * inverse);
+          const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
+          const Vec3<T> away = speed - ends.at_end(v, i, k);
+          push = push + n * (load(stiffness, at) * excess);
+          held = held + away * t + e * dot(e, away);
+          store(tension, at, t), axis.put(at, e);
+          b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
+          b[3] = b[3] + t + e.y * e.y, b[4] = b[4] + e.y * e.z, b[5] = b[5] + t + e.z * e.z;
+        }
+        store(inertia, i, heavy);
+        block.put(i, b, maximum(heavy, T(1e-20f)));
+        const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
+        free.put(i, Vec3<T>{moves, moves, moves});
+        base.put(i, push * T(dt * dt) - held * T(dt));
+        change.put(i, none);
+      });
+}
+
+/// Vertices that forces would take through a wall end at it, and what pushes them stands on it: a
+/// sheet on the floor bears its water.
+inline void hold_at_walls(State& state) {
+  const ClothState& c = state.cloth;
+  const ClothSystem& s = state.cloth_system;
+  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
+                right = s.right.view(), free = s.free.view(), change = s.change.view();
+  const float dt = float(state.dt);
+  const BlockInverse block = block_inverse(state);
+  const ClothWalls walls = cloth_walls_of(state.parameters);
+  const float reach = state.parameters.spacing;  // a step is not to end farther off
+  parallel_for(
+      "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
+        const Vec3<float> straight = x[i] + v[i] * dt,
+                          to = straight + block.times(i, base[i] + right[i]);
+        Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, may = free[i], w = change[i];
+        walls.stop(stop, unused);
+        const auto hold = [reach](float stop, float to, float from, float straight, float& may,
+                                  float& w) {
+          if (stop == to || may == 0.f || fabsf(stop - from) > reach) return;
+          may = 0.f, w = stop - straight;
+        };
+        hold(stop.x, to.x, x.x[i], straight.x, may.x, w.x);
+        hold(stop.y, to.y, x.y[i], straight.y, may.y, w.y);
+        hold(stop.z, to.z, x.z[i], straight.z, may.z, w.z);
+        free.set(i, may), change.set(i, w);
+      });
+}
+
+struct AddDoubles {
+  DRENCH_HD double operator()(double a, double b) const { return a + b; }
+};
+
+DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
+  return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
+}
+
+/// What a sweep of conjugate gradients reads and writes.
+struct ClothSweep {
+  BlockInverse block;
+  VecView w, free, residual, direction, image;
+  ClothControl* control;
+  float tolerance;  // of r . z, over the reference
+
+  DRENCH_HD void decide_step(double curvature) const {
+    ClothControl& c = *control;
+    c.step = curvature > 0 ? c.energy / curvature : 0;
+    if (curvature <= 0) c.done = 1;
+  }
+  DRENCH_HD double update(int i) const {
+    if (control->done) return 0;
+    const float step = float(control->step);
+    w.set(i, w[i] + direction[i] * step);
+    const Vec3<float> r = residual[i] - image[i] * step;
+    residual.set(i, r);
+    return dot_double(r, block.times(i, r));
+  }
+  DRENCH_HD void decide_turn(double energy) const {
+    ClothControl& c = *control;
+    if (c.done) return;
+    ++c.sweeps;
+    c.turn = energy / c.energy, c.energy = energy;
+    if (!(energy > double(tolerance) * c.reference)) c.done = 1;
+  }
+  DRENCH_HD void turn(int i) const {
+    if (control->done) return;
+    direction.set(
+        i, along(free[i], block.times(i, residual[i])) + direction[i] * float(control->turn));
+  }
+};
+
+/// Has the solve of the sheets ended? Asked on CPU cores only: on the GPU launches after the end do
+/// nothing.
+inline bool cloth_ended(const State& state) {
+#if defined(__CUDACC__)
+  (void)state;
+  return false;
+#else
+  return state.cloth_system.control.data()->done;
+#endif
+}
+
+/// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
+/// tolerance^2 of ClothControl::reference.
+inline void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps,
+                        float tolerance) {
+  const int n = state.cloth.vertices;
+  ClothSystem& s = state.cloth_system;
+  const ClothMatrix matrix = cloth_matrix(state);
+  const BlockInverse block = block_inverse(state);
+  ClothControl* control = s.control.data();
+  const VecView residual = s.residual.view(), image = s.image.view(),
+                direction = s.direction.view(), free = s.free.view();
+  const ClothSweep sweep{block,     w,     free,    residual,
+                         direction, image, control, tolerance * tolerance};
+  for_each_lane(
+      "cloth: residual", n, DRENCH_LAMBDA(auto i) {
+        const auto r = along(free.at(i), right.at(i)) - matrix.times(w, i);
+        residual.put(i, r);
+        direction.put(i, along(free.at(i), block.times(i, r)));
+      });
+  reduce_then(
+      "cloth: energy", n, 0.,
+      DRENCH_LAMBDA(int i) { return dot_double(residual[i], direction[i]); }, AddDoubles{},
+      DRENCH_LAMBDA(double energy) {
+        control->energy = energy;
+        control->done = !(energy > double(sweep.tolerance) * control->reference);
+      });
+  for (int k = 0; k < sweeps && !cloth_ended(state); ++k) {
+    for_each_lane(
+        "cloth: image", n, DRENCH_LAMBDA(auto i) { image.put(i, matrix.times(direction, i)); });
+    reduce_then(
+        "cloth: curvature", n, 0.,
+        DRENCH_LAMBDA(int i) { return dot_double(direction[i], image[i]); }, AddDoubles{},
+        DRENCH_LAMBDA(double curvature) { sweep.decide_step(curvature); });
+    reduce_then(
+        "cloth: update", n, 0., DRENCH_LAMBDA(int i) { return sweep.update(i); }, AddDoubles{},
+        DRENCH_LAMBDA(double energy) { sweep.decide_turn(energy); });
+    parallel_for(
+        "cloth: turn", n, DRENCH_LAMBDA(int i) { sweep.turn(i); });
+  }
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
