@@ -16,6 +16,7 @@ struct Parameters {
   bool incompressible = false;  // solver: pressures by a solve, or by an equation of state
   float tolerance = 1e-4f;      // of the incompressible solver: mean density error over rest
   int most_iterations = 100;    // of it, a step
+  bool full = false;            // it fills a closed domain: density is made even, not reduced
   float xsph = 0;               // share of the neighbours' mean velocity taken on a step
   float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one

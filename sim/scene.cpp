@@ -82,6 +82,16 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
   return std::max(10 * std::sqrt(g * height + 0.5 * speed2), 1.0);
 }
 
+/// Is there as much fluid as there is room, with no side open and no way in?
+bool fills_domain(const Shot& shot, const InitialFluid& fluid) {
+  if (!shot.cloth.empty() || !shot.fluid.emitter.empty()) return false;
+  for (const Axis axis : shot.domain.axis) {
+    if (axis == Axis::open) return false;
+  }
+  const V3d cells = (shot.domain.max - shot.domain.min) / shot.fluid.spacing;
+  return std::abs(double(fluid.position.size()) - cells.x * cells.y * cells.z) < 0.5;
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
@@ -112,6 +122,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.wall[k] = shot.domain.axis[k] == Axis::walls;
     p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
+  p.full = p.incompressible && fills_domain(shot, fluid);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;
