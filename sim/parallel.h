@@ -138,6 +138,10 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 #endif
 
+struct AddDoubles {
+  DRENCH_HD double operator()(double a, double b) const { return a + b; }
+};
+
 /// Integer sums do not depend on order: the only atomics there are.
 DRENCH_HD void add_atomic(long long* sum, long long value) {
 #if defined(__CUDA_ARCH__)

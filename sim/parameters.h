@@ -16,6 +16,7 @@ struct Parameters {
   bool incompressible = false;  // solver: pressures by a solve, or by an equation of state
   float tolerance = 1e-4f;      // of the incompressible solver: mean density error over rest
   int most_iterations = 100;    // of it, a step
+  bool full = false;            // it fills a closed domain: density is made even, not reduced
   float xsph = 0;               // share of the neighbours' mean velocity taken on a step
   float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one
@@ -23,7 +24,7 @@ struct Parameters {
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
-  bool wall[3] = {true, true, true};
+  bool wall[3] = {true, true, true}, periodic[3] = {false, false, false};  // neither is open
   // cloth
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex

@@ -35,6 +35,8 @@ DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
 }
 /// The fourth component in all four places.
 DRENCH_HD Quad splat_w(Quad a) { return {a.w, a.w, a.w, a.w}; }
+DRENCH_HD Quad both(const Float4& a) { return {a.x, a.y, a.z, a.w}; }
+DRENCH_HD Quad nearest_integer(Quad a) { return {rintf(a.x), rintf(a.y), rintf(a.z), rintf(a.w)}; }
 
 #else
 
@@ -52,6 +54,9 @@ DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
   return Quad(Quad::Native(_mm256_fmadd_ps(a.v, b.v, c.v)));
 }
 DRENCH_HD Quad splat_w(Quad a) { return Quad(Quad::Native(_mm256_permute_ps(a.v, 0xff))); }
+DRENCH_HD Quad nearest_integer(Quad a) {
+  return Quad(Quad::Native(_mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)));
+}
 
 /// Four consecutive floats, twice.
 DRENCH_HD Quad both(const float* a) {

@@ -11,12 +11,19 @@
 #include "pipeline/contract/error.h"
 #include "sim/geometry.h"
 #include "sim/kernels.h"
+#include "sim/periodic.h"
 
 namespace drench::sim {
 
 float LocalFrame::to_local(int axis, double world) const {
   const double step = spacing / 65536;
   return float(std::round((world - origin[axis]) / step) * step);
+}
+
+float Scene::place(int axis, double world) const {
+  const float local = frame.to_local(axis, world);
+  if (!parameters.periodic[axis]) return local;
+  return cpu::wrap(local, parameters.low[axis], parameters.high[axis]);
 }
 
 namespace {
@@ -54,16 +61,6 @@ void calibrate(double a, double h, Parameters& p) {
   p.wall_scale = float((whole - cut) / whole) / beyond;
 }
 
-bool is_incompressible(const Shot& shot) {
-  return shot.fluid.solver == FluidSolver::incompressible ||
-         (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
-}
-
-double support_ratio(const Shot& shot) {
-  if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;
-  return is_incompressible(shot) ? 2.15 : 2.0;
-}
-
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
 double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
@@ -78,11 +75,21 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
     see(fluid.position[i], fluid.velocity[i].length());
   for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
-    if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] == Axis::open) continue;
+    if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] != Axis::walls) continue;
     bottom = std::min(bottom, down[k] < 0 ? shot.domain.min[k] : -shot.domain.max[k]);
   }
   const double height = std::max(top - bottom, shot.fluid.spacing);
   return std::max(10 * std::sqrt(g * height + 0.5 * speed2), 1.0);
+}
+
+/// Is there as much fluid as there is room, with no side open and no way in?
+bool fills_domain(const Shot& shot, const InitialFluid& fluid) {
+  if (!shot.cloth.empty() || !shot.fluid.emitter.empty()) return false;
+  for (const Axis axis : shot.domain.axis) {
+    if (axis == Axis::open) return false;
+  }
+  const V3d cells = (shot.domain.max - shot.domain.min) / shot.fluid.spacing;
+  return std::abs(double(fluid.position.size()) - cells.x * cells.y * cells.z) < 0.5;
 }
 
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
@@ -113,7 +120,9 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.low[k] = float(shot.domain.min[k] - frame.origin[k]);
     p.high[k] = float(shot.domain.max[k] - frame.origin[k]);
     p.wall[k] = shot.domain.axis[k] == Axis::walls;
+    p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
+  p.full = p.incompressible && fills_domain(shot, fluid);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;
@@ -323,8 +332,7 @@ Scene build_scene(const Shot& shot) {
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];
-    start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
-                        scene.frame.to_local(2, p.z));
+    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
     start.velocity.push(float(u.x), float(u.y), float(u.z));
     start.id.push_back(int(i));
   }

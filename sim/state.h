@@ -133,6 +133,7 @@ struct SolveControl {
   float residual = 1e30f, least_residual = 1e30f;  // mean, over the rest density
   float relaxation = 0.4f;  // below 1 / the largest eigenvalue of the scaled matrix: 0.5 diverges
   float momentum = 1.f, extrapolation = 0.f;
+  float mean = 0.f;  // kg/m^3, of the source; only where the fluid is full
 };
 
 /// Columns of the incompressible solver, rebuilt every step (passes/pressure_rows.h). Its warm

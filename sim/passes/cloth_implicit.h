@@ -156,10 +156,6 @@ inline void hold_at_walls(State& state) {
       });
 }
 
-struct AddDoubles {
-  DRENCH_HD double operator()(double a, double b) const { return a + b; }
-};
-
 DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
   return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
 }

@@ -66,8 +66,7 @@ inline void find_neighbours(State& state) {
   } else {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
   }
-  for_each_neighbour("neighbours: diagonal", s.lists, f.count,
-                     InverseDiagonal{place, wall, s.inverse_diagonal.data(), gradient_scale(p)});
+  invert_diagonal(state);
   if (sheets) limit_recovery(state);
 }
 
