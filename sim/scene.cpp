@@ -54,6 +54,21 @@ void calibrate(double a, double h, Parameters& p) {
   p.wall_scale = float((whole - cut) / whole) / beyond;
 }
 
+/// What ViscousWeight sums to over a cubic lattice sheared along its axes, over the integral.
+double viscous_lattice_sum(double a, double h) {
+  const int reach = int(std::ceil(h / a));
+  double sum = 0;
+  for (int z = -reach; z <= reach; ++z) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
+        const double u = std::max(0.0, 1 - std::sqrt(double(x * x + y * y + z * z)) * a / h);
+        sum += cpu::ViscousWeight::value(u) * x * x * y * y;
+      }
+    }
+  }
+  return 0.5 * cpu::ViscousWeight::factor * sum * std::pow(a / h, 7);
+}
+
 bool is_incompressible(const Shot& shot) {
   return shot.fluid.solver == FluidSolver::incompressible ||
          (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
@@ -85,6 +100,30 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
   return std::max(10 * std::sqrt(g * height + 0.5 * speed2), 1.0);
 }
 
+/// Do the domain's walls hold the fluid? Automatic: where the layer that a wall brakes grows a
+/// spacing thick within a second, or where a wall moves.
+bool walls_hold(const Shot& shot) {
+  const Domain& domain = shot.domain;
+  if (domain.slip != Slip::automatic) return domain.slip == Slip::none;
+  for (const V3d& v : domain.wall_velocity.all()) {
+    if (v.length() > 0) return true;
+  }
+  const double layer = std::sqrt(shot.fluid.kinematic_viscosity * 1.0);  // m after 1 s
+  return layer >= shot.fluid.spacing;
+}
+
+void set_viscosity(const Shot& shot, Parameters& p) {
+  p.viscous_lattice_sum = float(viscous_lattice_sum(p.spacing, p.support_radius));
+  p.no_slip = walls_hold(shot);
+  const auto velocity = shot.domain.wall_velocity.all();
+  for (int k = 0; k < 3; ++k) {
+    for (int end = 0; end < 2; ++end) {
+      for (int c = 0; c < 3; ++c)
+        p.wall_velocity[k][end][c] = float(velocity[size_t(2 * k + end)][c]);
+    }
+  }
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
@@ -114,6 +153,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.high[k] = float(shot.domain.max[k] - frame.origin[k]);
     p.wall[k] = shot.domain.axis[k] == Axis::walls;
   }
+  if (p.incompressible) set_viscosity(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;

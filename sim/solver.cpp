@@ -6,6 +6,7 @@
 #include <map>
 
 #include "sim/passes/measure_density.h"
+#include "sim/passes/viscosity_solve.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -128,6 +129,11 @@ class BackendSolver : public Solver {
       const SolveControl solve = value_at(state_.pressure.control, 0);
       limits.residual = solve.residual, limits.iterations = solve.iterations;
       limits.step = float(dt);
+    }
+    if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
+      const ViscousControl solve = value_at(state_.viscosity.control, 0);
+      limits.viscous_residual = solve.converged ? 0.f : solve.residual;
+      limits.viscous_iterations = solve.iterations;
     }
     return limits;
   }
