@@ -57,8 +57,28 @@ Source lattice_ball(const FluidSphere& sphere, double a) {
   return source;
 }
 
+/// The image of a point inside the domain.
+V3d inside(const Domain& domain, V3d p) {
+  for (int k = 0; k < 3; ++k) {
+    const double low = domain.min[k], period = domain.max[k] - low;
+    if (domain.axis[size_t(k)] == Axis::periodic)
+      p[k] -= period * std::floor((p[k] - low) / period);
+  }
+  return p;
+}
+
+/// From one point to the nearest image of another.
+V3d nearest_image(const Domain& domain, V3d d) {
+  for (int k = 0; k < 3; ++k) {
+    const double period = domain.max[k] - domain.min[k];
+    if (domain.axis[size_t(k)] == Axis::periodic) d[k] -= period * std::round(d[k] / period);
+  }
+  return d;
+}
+
 /// Centres drawn evenly in the box, each at least a drop's width from the others.
-std::vector<V3d> drop_centres(const FluidDrops& drops, double reach, double a, uint32_t seed) {
+std::vector<V3d> drop_centres(const FluidDrops& drops, const Domain& domain, double reach, double a,
+                              uint32_t seed) {
   std::mt19937 random(seed);
   const auto unit = [&] {
     return double(random()) / 4294967296.0;
@@ -74,13 +94,15 @@ std::vector<V3d> drop_centres(const FluidDrops& drops, double reach, double a, u
     }
     V3d c;
     for (int k = 0; k < 3; ++k) c[k] = low[k] + unit() * std::max(0.0, high[k] - low[k]);
-    const auto close = [&](const V3d& o) { return (o - c).length() < 2 * reach + a; };
+    const auto close = [&](const V3d& o) {
+      return nearest_image(domain, o - c).length() < 2 * reach + a;
+    };
     if (std::none_of(centres.begin(), centres.end(), close)) centres.push_back(c);
   }
   return centres;
 }
 
-Source lattice_drops(const FluidDrops& drops, double a, uint32_t seed) {
+Source lattice_drops(const FluidDrops& drops, const Domain& domain, double a, uint32_t seed) {
   Source source{{}, drops.velocity};
   if (drops.count <= 0) return source;
   const std::vector<V3d> ball = ball_points(std::max(drops.radius, a), a);
@@ -93,7 +115,7 @@ Source lattice_drops(const FluidDrops& drops, double a, uint32_t seed) {
                 std::to_string(drops.radius) + " m. Use a larger radius or other counts");
   }
   const double reach = ball[each + (larger > 0) - 1].length() + 0.5 * a;
-  for (const V3d& c : drop_centres(drops, reach, a, seed)) {
+  for (const V3d& c : drop_centres(drops, domain, reach, a, seed)) {
     const size_t n = each + (larger > 0 ? 1 : 0);
     if (larger > 0) --larger;
     for (size_t k = 0; k < n; ++k) source.position.push_back(c + ball[k]);
@@ -104,8 +126,32 @@ Source lattice_drops(const FluidDrops& drops, double a, uint32_t seed) {
 /// Cells of one spacing: finds an earlier particle closer than half a spacing.
 class Occupancy {
  public:
-  explicit Occupancy(double a) : a_(a) {}
+  Occupancy(double a, const Domain& domain) : a_(a), domain_(domain) {}
+  /// @param p  and all points inside the domain where it is periodic.
   bool taken(const V3d& p, const std::vector<V3d>& points) const {
+    return taken_around(p, 0, points);
+  }
+  void add(const V3d& p, size_t index) {
+    const auto c = cell(p);
+    cells_.emplace(key(c[0], c[1], c[2]), index);
+  }
+
+ private:
+  /// Is p taken, or an image of it that a periodic axis from `axis` on puts beside the domain?
+  bool taken_around(const V3d& p, int axis, const std::vector<V3d>& points) const {
+    if (axis == 3) return taken_there(p, points);
+    if (taken_around(p, axis + 1, points)) return true;
+    if (domain_.axis[size_t(axis)] != Axis::periodic) return false;
+    const double low = domain_.min[axis], high = domain_.max[axis];
+    for (const double side : {low - high, high - low}) {
+      V3d image = p;
+      image[axis] += side;
+      const bool beside = image[axis] > low - a_ && image[axis] < high + a_;
+      if (beside && taken_around(image, axis + 1, points)) return true;
+    }
+    return false;
+  }
+  bool taken_there(const V3d& p, const std::vector<V3d>& points) const {
     const auto c = cell(p);
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dy = -1; dy <= 1; ++dy) {
@@ -119,12 +165,6 @@ class Occupancy {
     }
     return false;
   }
-  void add(const V3d& p, size_t index) {
-    const auto c = cell(p);
-    cells_.emplace(key(c[0], c[1], c[2]), index);
-  }
-
- private:
   std::array<int64_t, 3> cell(const V3d& p) const {
     return {int64_t(std::floor(p.x / a_)), int64_t(std::floor(p.y / a_)),
             int64_t(std::floor(p.z / a_))};
@@ -133,6 +173,7 @@ class Occupancy {
     return (uint64_t(x & 0x1fffff) << 42) | (uint64_t(y & 0x1fffff) << 21) | uint64_t(z & 0x1fffff);
   }
   double a_;
+  const Domain& domain_;
   std::unordered_multimap<uint64_t, size_t> cells_;
 };
 
@@ -159,13 +200,14 @@ InitialFluid initial_fluid(const Shot& shot) {
   for (const FluidBox& box : shot.fluid.box) sources.push_back(lattice_box(box, a));
   for (const FluidSphere& sphere : shot.fluid.sphere) sources.push_back(lattice_ball(sphere, a));
   for (size_t k = 0; k < shot.fluid.drops.size(); ++k) {
-    sources.push_back(lattice_drops(shot.fluid.drops[k], a, shot.seed + uint32_t(k)));
+    sources.push_back(lattice_drops(shot.fluid.drops[k], shot.domain, a, shot.seed + uint32_t(k)));
   }
   InitialFluid fluid;
-  Occupancy occupied(a);
+  Occupancy occupied(a, shot.domain);
   for (const Source& source : sources) {
     const size_t before = fluid.position.size();
-    for (const V3d& p : source.position) {
+    for (const V3d& place : source.position) {
+      const V3d p = inside(shot.domain, place);
       if (before > 0 && occupied.taken(p, fluid.position)) continue;
       fluid.position.push_back(p);
       fluid.velocity.push_back(source.velocity);

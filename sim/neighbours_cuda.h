@@ -11,17 +11,14 @@ __device__ void for_each_within(const GridView& grid, const VecView& position, i
                                 const Visit& visit) {
   const GridShape& g = grid.shape;
   const Vec3<float> p = position[i];
-  const int cx = g.cell_x(p.x), cy = g.cell_y(p.y), cz = g.cell_z(p.z);
-  for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
-    for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
-      const int begin = grid.cell_start[g.index(max(cx - 1, 0), y, z)];
-      const int end = grid.cell_start[g.index(min(cx + 1, g.nx - 1), y, z) + 1];
-      for (int j = begin; j < end; ++j) {
-        const float r2 = length2(position[j] - p);
-        if (r2 < h * h) visit(j, r2);
-      }
-    }
-  }
+  for_each_run(grid, g.cell_x(p.x), g.cell_y(p.y), g.cell_z(p.z),
+               [&](int begin, int end, Vec3<float> shift) {
+                 const Vec3<float> seen = p - shift;  // from where they are
+                 for (int j = begin; j < end; ++j) {
+                   const float r2 = length2(position[j] - seen);
+                   if (r2 < h * h) visit(j, r2);
+                 }
+               });
 }
 
 template <class Kernel, class Density>

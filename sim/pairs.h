@@ -68,24 +68,22 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
   [[maybe_unused]] bool tested = false;
   if constexpr (Filter::columns > 0) tested = filter.tests(i);
   const GridShape& g = grid.shape;
-  const int cx = g.cell_x(self.position.x), cy = g.cell_y(self.position.y),
-            cz = g.cell_z(self.position.z);
-  for (int z = max(cz - 1, 0); z <= min(cz + 1, g.nz - 1); ++z) {
-    for (int y = max(cy - 1, 0); y <= min(cy + 1, g.ny - 1); ++y) {
-      const int begin = grid.cell_start[g.index(max(cx - 1, 0), y, z)];
-      const int end = grid.cell_start[g.index(min(cx + 1, g.nx - 1), y, z) + 1];
-      for (int j = begin; j < end; ++j) {
-        const P other = load(j);
-        if constexpr (Filter::columns > 0) {
-          if (tested && filter.hides(i, j)) {
-            any_hidden = true;
-            continue;
-          }
-        }
-        physics.pair(self, other, sum);
-      }
-    }
-  }
+  const Vec3<float> p = self.position;
+  for_each_run(grid, g.cell_x(p.x), g.cell_y(p.y), g.cell_z(p.z),
+               [&](int begin, int end, Vec3<float> shift) {
+                 P seen = self;  // from where they are
+                 seen.position = p - shift;
+                 for (int j = begin; j < end; ++j) {
+                   const P other = load(j);
+                   if constexpr (Filter::columns > 0) {
+                     if (tested && filter.hides(i, j)) {
+                       any_hidden = true;
+                       continue;
+                     }
+                   }
+                   physics.pair(seen, other, sum);
+                 }
+               });
   physics.finish(i, sum);
   if constexpr (Filter::columns > 0) {
     if (tested) filter.finish(i, any_hidden);
@@ -110,18 +108,16 @@ class Tile {
 
   template <int N>
   void fill(const GridView& grid, int cx, int cy, int cz, const Inputs<N>& in, int columns) {
-    const GridShape& g = grid.shape;
-    const int x0 = std::max(cx - 1, 0), x1 = std::min(cx + 1, g.nx - 1);
+    const int self = grid.cell_start[grid.shape.index(cx, cy, cz)];
     int rows = 0;
     size_ = 0;
-    for (int z = std::max(cz - 1, 0); z <= std::min(cz + 1, g.nz - 1); ++z) {
-      for (int y = std::max(cy - 1, 0); y <= std::min(cy + 1, g.ny - 1); ++y, ++rows) {
-        begin_[rows] = grid.cell_start[g.index(x0, y, z)];
-        count_[rows] = grid.cell_start[g.index(x1, y, z) + 1] - begin_[rows];
-        if (y == cy && z == cz) centre_ = size_ - begin_[rows];
-        size_ += count_[rows];
-      }
-    }
+    for_each_run(grid, cx, cy, cz, [&](int begin, int end, Vec3<float> shift) {
+      begin_[rows] = begin, count_[rows] = end - begin;
+      shift_[rows][0] = shift.x, shift_[rows][1] = shift.y, shift_[rows][2] = shift.z;
+      const bool straight = shift.x == 0.f && shift.y == 0.f && shift.z == 0.f;
+      if (straight && begin <= self && self < end) centre_ = size_ - begin;
+      size_ += count_[rows++];
+    });
     rows_ = rows;
     stride_ = (size_ + 15) / 8 * 8;
     if (data_.size() < size_t(stride_) * columns) data_.resize(size_t(stride_) * columns);
@@ -131,6 +127,9 @@ class Tile {
         // Whole packs, past the end of the row too: what comes next overwrites that.
         for (int k = 0; k < count_[r]; k += Pack::size)
           Pack::load(in.column[c] + begin_[r] + k).store(to + k);
+        if (c < 3 && shift_[r][c] != 0.f) {
+          for (int k = 0; k < count_[r]; ++k) to[k] += shift_[r][c];
+        }
       }
       // Far away in position; the last column may be the plane of a sheet, which must be far as
       // well.
@@ -151,7 +150,10 @@ class Tile {
 
  private:
   std::vector<float> data_;
-  int begin_[9], count_[9], rows_ = 0;  // the runs of particles that a tile is made of
+  static constexpr int most_rows = 18;       // nine, and each in two at the seam of a periodic x
+  int begin_[most_rows], count_[most_rows];  // the runs of particles that a tile is made of
+  float shift_[most_rows][3];                // m, from beyond the seam of a periodic axis
+  int rows_ = 0;
   int size_ = 0, stride_ = 0, centre_ = 0;
 };
 

@@ -20,7 +20,6 @@ struct Parameters {
   float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one
   // viscosity of the incompressible solver
-  float viscous_lattice_sum = 1;    // of its weight over a cubic lattice, over the integral
   float viscous_tolerance = 1e-4f;  // RMS of what the solve leaves over RMS of the velocity
   int most_viscous_iterations = 200;
   bool no_slip = false;               // at the domain's walls
@@ -29,7 +28,7 @@ struct Parameters {
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
-  bool wall[3] = {true, true, true};
+  bool wall[3] = {true, true, true}, periodic[3] = {false, false, false};  // neither is open
   // cloth
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex

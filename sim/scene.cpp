@@ -11,12 +11,19 @@
 #include "pipeline/contract/error.h"
 #include "sim/geometry.h"
 #include "sim/kernels.h"
+#include "sim/periodic.h"
 
 namespace drench::sim {
 
 float LocalFrame::to_local(int axis, double world) const {
   const double step = spacing / 65536;
   return float(std::round((world - origin[axis]) / step) * step);
+}
+
+float Scene::place(int axis, double world) const {
+  const float local = frame.to_local(axis, world);
+  if (!parameters.periodic[axis]) return local;
+  return cpu::wrap(local, parameters.low[axis], parameters.high[axis]);
 }
 
 namespace {
@@ -54,31 +61,6 @@ void calibrate(double a, double h, Parameters& p) {
   p.wall_scale = float((whole - cut) / whole) / beyond;
 }
 
-/// What ViscousWeight sums to over a cubic lattice sheared along its axes, over the integral.
-double viscous_lattice_sum(double a, double h) {
-  const int reach = int(std::ceil(h / a));
-  double sum = 0;
-  for (int z = -reach; z <= reach; ++z) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) {
-        const double u = std::max(0.0, 1 - std::sqrt(double(x * x + y * y + z * z)) * a / h);
-        sum += cpu::ViscousWeight::value(u) * x * x * y * y;
-      }
-    }
-  }
-  return 0.5 * cpu::ViscousWeight::factor * sum * std::pow(a / h, 7);
-}
-
-bool is_incompressible(const Shot& shot) {
-  return shot.fluid.solver == FluidSolver::incompressible ||
-         (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
-}
-
-double support_ratio(const Shot& shot) {
-  if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;
-  return is_incompressible(shot) ? 2.15 : 2.0;
-}
-
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
 double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
@@ -93,7 +75,7 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
     see(fluid.position[i], fluid.velocity[i].length());
   for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
-    if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] == Axis::open) continue;
+    if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] != Axis::walls) continue;
     bottom = std::min(bottom, down[k] < 0 ? shot.domain.min[k] : -shot.domain.max[k]);
   }
   const double height = std::max(top - bottom, shot.fluid.spacing);
@@ -113,7 +95,6 @@ bool walls_hold(const Shot& shot) {
 }
 
 void set_viscosity(const Shot& shot, Parameters& p) {
-  p.viscous_lattice_sum = float(viscous_lattice_sum(p.spacing, p.support_radius));
   p.no_slip = walls_hold(shot);
   const auto velocity = shot.domain.wall_velocity.all();
   for (int k = 0; k < 3; ++k) {
@@ -152,6 +133,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.low[k] = float(shot.domain.min[k] - frame.origin[k]);
     p.high[k] = float(shot.domain.max[k] - frame.origin[k]);
     p.wall[k] = shot.domain.axis[k] == Axis::walls;
+    p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
   if (p.incompressible) set_viscosity(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
@@ -363,8 +345,7 @@ Scene build_scene(const Shot& shot) {
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];
-    start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
-                        scene.frame.to_local(2, p.z));
+    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
     start.velocity.push(float(u.x), float(u.y), float(u.z));
     start.id.push_back(int(i));
   }

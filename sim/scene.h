@@ -47,7 +47,7 @@ struct EmitterLayer {
 EmitterLayer emitter_layer(const FluidEmitter& emitter, double spacing);
 
 /// Particles of the sources that are there at the start; later sources lose those closer than half
-/// a spacing to earlier ones.
+/// a spacing to earlier ones, across the seams of periodic axes too.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
 };
@@ -61,6 +61,9 @@ struct Scene {
   std::vector<int> first_vertex, first_triangle;  // of each sheet, and one past the end
   ClothTopology cloth;
   HostState start;
+
+  /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
+  float place(int axis, double world) const;
 };
 
 /// @throws Error as build_sheet, if nothing is to be simulated, or if fluid starts inside cloth.

@@ -105,8 +105,7 @@ struct Simulator::Implementation {
     std::vector<int> id;
     for (const V3d& offset : disc.offset) {
       const V3d p = centre + offset;
-      position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
-                    scene.frame.to_local(2, p.z));
+      position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
       id.push_back(next_id++);
     }

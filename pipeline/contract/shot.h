@@ -46,7 +46,9 @@ struct Timeline {
   double fps = 24;
 };
 
-enum class Axis { open, walls };  // walls: a plane at both ends of the domain
+// walls: a plane at both ends of the domain; periodic: its two ends are one, and what leaves
+// through one comes in at the other
+enum class Axis { open, walls, periodic };
 
 /// How fluid meets the domain's walls; automatic: none where a wall's influence spreads by a
 /// spacing within a second, sqrt(nu 1 s) >= spacing, or where a wall moves; free elsewhere.
@@ -59,7 +61,7 @@ struct WallVelocity {  // m/s, along the wall
 };
 
 struct Domain {
-  V3d min{-1, 0, -1}, max{1, 2, 1};  // m; walls stand on these planes
+  V3d min{-1, 0, -1}, max{1, 2, 1};  // m; walls stand on these planes, seams of periodic axes too
   std::array<Axis, 3> axis{Axis::walls, Axis::walls, Axis::walls};
   Slip slip = Slip::automatic;
   WallVelocity wall_velocity;
@@ -228,5 +230,15 @@ struct Shot {
   Ground ground;
   RenderSettings render;
 };
+
+/// What `automatic` and 0 stand for.
+inline bool is_incompressible(const Shot& shot) {
+  return shot.fluid.solver == FluidSolver::incompressible ||
+         (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
+}
+inline double support_ratio(const Shot& shot) {
+  if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;
+  return is_incompressible(shot) ? 2.15 : 2.0;
+}
 
 }  // namespace drench

@@ -86,6 +86,7 @@ class Checker {
                  "at most {:.0f} are allowed. Use a larger spacing or a smaller domain",
                  shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i], cells, most_cells));
       }
+      if (domain.axis[size_t(i)] == Axis::periodic) check_periodic(i);
     }
   }
 
@@ -119,9 +120,7 @@ class Checker {
 
   void check_drags(const std::string& key) const {
     const Fluid& fluid = shot_.fluid;
-    const bool weak = fluid.solver == FluidSolver::weakly_compressible ||
-                      (fluid.solver == FluidSolver::automatic && !shot_.cloth.empty());
-    if (weak) {
+    if (!is_incompressible(shot_)) {
       fail(key, fmt::format("{} is set but the shot's fluid is weakly compressible, which knows "
                             "walls at rest only. Use fluid.solver = \"incompressible\" without "
                             "cloth, or remove it",
@@ -134,12 +133,62 @@ class Checker {
     }
   }
 
+  /// A particle must not see a neighbour twice, nor cloth reach the seam, which it does not know.
+  void check_periodic(int axis) const {
+    const std::string key = fmt::format("domain.{}", "xyz"[axis]);
+    const double length = shot_.domain.max[axis] - shot_.domain.min[axis];
+    if (!shot_.cloth.empty()) {
+      fail(key, fmt::format("{} is \"periodic\" but the shot has cloth, which cannot pass through "
+                            "the seam. Use \"walls\" or \"open\"",
+                            key));
+    }
+    const double support = support_ratio(shot_) * shot_.fluid.spacing;
+    if (length < 2 * support * (1 - 1e-9)) {
+      fail(key, fmt::format("{} is \"periodic\" but domain.min and domain.max are only {:.6g} m "
+                            "apart there; particles would see each other from both sides. Use at "
+                            "least two support radii, {:.6g} m",
+                            key, length, 2 * support));
+    }
+    for (size_t i = 0; i < shot_.fluid.box.size(); ++i) check_seam_of_box(i, axis, length);
+    for (size_t i = 0; i < shot_.fluid.sphere.size(); ++i) {
+      check_seam_of_ball(fmt::format("fluid.sphere[{}]", i), shot_.fluid.sphere[i].radius, axis,
+                         length);
+    }
+    for (size_t i = 0; i < shot_.fluid.drops.size(); ++i) {
+      check_seam_of_ball(fmt::format("fluid.drops[{}]", i), shot_.fluid.drops[i].radius, axis,
+                         length);
+    }
+  }
+
+  /// The lattice of a box that goes all around must join itself.
+  void check_seam_of_box(size_t i, int axis, double length) const {
+    const FluidBox& box = shot_.fluid.box[i];
+    const double a = shot_.fluid.spacing, layers = std::round(length / a);
+    const double gap = length - a * std::floor((box.max[axis] - box.min[axis]) / a + 1e-6);
+    if (gap > 0.999 * a || std::abs(gap) < 1e-3 * a) return;
+    const std::string path = fmt::format("fluid.box[{}]", i);
+    fail(path,
+         fmt::format("{} goes all around the periodic {} axis, {:.9g} m, but its layers {} by "
+                     "{:.3g} m at the seam: that is {:.6g} times fluid.spacing = {} m. Use "
+                     "fluid.spacing = {:.9g} m, a domain of {:.9g} m, or a shorter box",
+                     path, "xyz"[axis], length, gap > 0 ? "part" : "overlap", std::abs(gap),
+                     length / a, a, length / layers, layers * a));
+  }
+
+  void check_seam_of_ball(const std::string& path, double radius, int axis, double length) const {
+    const double most = 0.5 * (length - shot_.fluid.spacing);
+    if (radius <= most) return;
+    fail(path, fmt::format("{}.radius is {} m but the periodic {} axis is {:.6g} m long; the ball "
+                           "would touch itself across the seam. Use at most {:.6g} m",
+                           path, radius, "xyz"[axis], length, most));
+  }
+
   /// Fluid must start between the walls; half a spacing is the rounding of a lattice.
   void check_inside(const std::string& path, const V3d& min, const V3d& max) const {
     const Domain& domain = shot_.domain;
     const double slack = 0.5 * shot_.fluid.spacing + 1e-9;
     for (int i = 0; i < 3; ++i) {
-      if (domain.axis[size_t(i)] == Axis::open) continue;
+      if (domain.axis[size_t(i)] != Axis::walls) continue;
       if (min[i] < domain.min[i] - slack || max[i] > domain.max[i] + slack) {
         fail(path, fmt::format("{} reaches from {} to {} m in {}, beyond the domain's walls at {} "
                                "and {} m. Move it, or widen [domain]",

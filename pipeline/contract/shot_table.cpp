@@ -106,7 +106,7 @@ Row axis_row(std::string_view key, std::string_view description) {
   row.stages = simulate;
   row.description = description;
   row.field = axis_field<I>;
-  return row.one_of({"open", "walls"});
+  return row.one_of({"open", "walls", "periodic"});
 }
 
 Row grid_pins_row() {
@@ -150,11 +150,13 @@ std::vector<Parameter> shot_rows() {
       row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
                             "fixed step; 0 chooses the largest stable one, step by step"),
 
-      row<&Domain::min>("domain", "min", "m", place, simulate, "lower corner; walls stand here"),
-      row<&Domain::max>("domain", "max", "m", place, simulate, "upper corner; walls stand here"),
-      axis_row<0>("x", "both ends of the x axis"),
-      axis_row<1>("y", "both ends of the y axis"),
-      axis_row<2>("z", "both ends of the z axis"),
+      row<&Domain::min>("domain", "min", "m", place, simulate,
+                        "lower corner; walls stand here, and periodic axes begin"),
+      row<&Domain::max>("domain", "max", "m", place, simulate,
+                        "upper corner; walls stand here, and periodic axes begin anew"),
+      axis_row<0>("x", "both ends of the x axis; periodic ones are one and the same place"),
+      axis_row<1>("y", "both ends of the y axis; periodic ones are one and the same place"),
+      axis_row<2>("z", "both ends of the z axis; periodic ones are one and the same place"),
       row<&Domain::slip>("domain", "slip", "", none, simulate,
                          "how the incompressible solver's fluid meets these walls: free, or none "
                          "(it moves with them). automatic is none if a layer that a wall brakes "

@@ -19,7 +19,7 @@ inline void find_nearest_centroids(State& state) {
   const WallTable table{state.wall_table};
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
-  const float reach = 1.f / polygons.grid.inverse_edge;
+  const float reach = 1.f / polygons.grid.inverse_edge.x;
   parallel_for(
       "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> p = position[i];

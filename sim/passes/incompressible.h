@@ -55,8 +55,7 @@ inline void find_neighbours(State& state) {
         density[i] = scale * sum + wall[i].w;
         source[i] = density[i] - rest;
       });
-  for_each_neighbour("neighbours: diagonal", s.lists, f.count,
-                     InverseDiagonal{place, wall, s.inverse_diagonal.data(), gradient_scale(p)});
+  invert_diagonal(state);
 }
 
 /// Pressures, and what they do to positions and velocities.

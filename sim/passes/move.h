@@ -3,19 +3,22 @@
 
 #include "sim/passes/cloth_springs.h"
 #include "sim/passes/path_test.h"
+#include "sim/periodic.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 /// Symplectic Euler inside the walls: velocity first, then position. A particle that still reaches
-/// the last tenth of a spacing before a wall stops there (the wall's pressure has failed it).
+/// the last tenth of a spacing before a wall stops there (the wall's pressure has failed it). One
+/// that leaves through a periodic side comes in at the other.
 struct Mover {
   float low[3], high[3];
-  bool wall[3];
+  bool wall[3], periodic[3];
   float dt;
 
   DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
     float p[3] = {x.x + dt * v.x, x.y + dt * v.y, x.z + dt * v.z}, u[3] = {v.x, v.y, v.z};
     for (int k = 0; k < 3; ++k) {
+      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
       if (!wall[k]) continue;
       if (p[k] < low[k]) p[k] = low[k], u[k] = max0(u[k]);
       if (p[k] > high[k]) p[k] = high[k], u[k] = -max0(-u[k]);
@@ -26,9 +29,11 @@ struct Mover {
 };
 
 inline Mover mover_of(const Parameters& p, float dt) {
-  Mover mover{{}, {}, {p.wall[0], p.wall[1], p.wall[2]}, dt};
+  Mover mover{{}, {}, {}, {}, dt};
   for (int k = 0; k < 3; ++k) {
-    mover.low[k] = p.low[k] + 0.1f * p.spacing, mover.high[k] = p.high[k] - 0.1f * p.spacing;
+    const float margin = p.periodic[k] ? 0.f : 0.1f * p.spacing;
+    mover.wall[k] = p.wall[k], mover.periodic[k] = p.periodic[k];
+    mover.low[k] = p.low[k] + margin, mover.high[k] = p.high[k] - margin;
   }
   return mover;
 }

@@ -6,17 +6,20 @@
 // symmetric and not negative. Its diagonal is what DFSPH divides by.
 
 #include "sim/kernels.h"
+#include "sim/periodic.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 /// vector = -D^T q.
+template <class Separation>
 struct PressureAcceleration {
   static constexpr int columns = 1;
   const Float4 *place, *wall;  // position and q; rho_0 grad S, kg/m^4
   Float4* vector;
   const int* done;
   float scale;  // m / h^5 over the lattice sum, kg/m^5
+  Separation separation;
 
   DRENCH_HD bool idle() const { return *done; }
   DRENCH_HD Columns<1> inputs() const { return {{place}}; }
@@ -34,7 +37,8 @@ struct PressureAcceleration {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.push = multiply_add(i.place - j.place, weight * splat_w(i.place + j.place), sum.push);
+    sum.push =
+        multiply_add(separation(i.place, j.place), weight * splat_w(i.place + j.place), sum.push);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const float q = place[i].w;
@@ -44,12 +48,14 @@ struct PressureAcceleration {
 };
 
 /// rate = D vector.
+template <class Separation>
 struct DensityRate {
   static constexpr int columns = 2;
   const Float4 *place, *vector, *wall;
   float* rate;
   const int* done;
   float scale;
+  Separation separation;
 
   DRENCH_HD bool idle() const { return *done; }
   DRENCH_HD Columns<2> inputs() const { return {{place, vector}}; }
@@ -67,7 +73,8 @@ struct DensityRate {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.product = multiply_add(weight * (i.place - j.place), i.vector - j.vector, sum.product);
+    sum.product =
+        multiply_add(weight * separation(i.place, j.place), i.vector - j.vector, sum.product);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 g = wall[i], v = vector[i], p = sum.product;  // p.w is 0, as all vectors' w
@@ -76,11 +83,13 @@ struct DensityRate {
 };
 
 /// 1 / (D D^T)_ii; 0 for a particle that nothing pushes.
+template <class Separation>
 struct InverseDiagonal {
   static constexpr int columns = 1;
   const Float4 *place, *wall;
   float* inverse;
   float scale;
+  Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
   DRENCH_HD Columns<1> inputs() const { return {{place}}; }
@@ -98,7 +107,7 @@ struct InverseDiagonal {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q gradient = weight * (i.place - j.place);
+    const Q gradient = weight * separation(i.place, j.place);
     sum.gradient = sum.gradient + gradient;
     sum.square = multiply_add(gradient, gradient, sum.square);
   }
@@ -119,18 +128,34 @@ inline float gradient_scale(const Parameters& p) {
 /// vector = -D^T q with the q beside the positions.
 inline void accelerate_by_pressure(State& state) {
   PressureState& s = state.pressure;
-  for_each_neighbour(
-      "pressure: acceleration", s.lists, state.fluid.count,
-      PressureAcceleration{s.place.data(), s.wall.data(), s.vector.data(), &s.control.data()->done,
-                           gradient_scale(state.parameters)});
+  with_separation(state.parameters, [&](auto separation) {
+    for_each_neighbour("pressure: acceleration", s.lists, state.fluid.count,
+                       PressureAcceleration<decltype(separation)>{
+                           s.place.data(), s.wall.data(), s.vector.data(), &s.control.data()->done,
+                           gradient_scale(state.parameters), separation});
+  });
 }
 
 /// product = D vector.
 inline void density_rate(State& state) {
   PressureState& s = state.pressure;
-  for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
-                     DensityRate{s.place.data(), s.vector.data(), s.wall.data(), s.product.data(),
-                                 &s.control.data()->done, gradient_scale(state.parameters)});
+  with_separation(state.parameters, [&](auto separation) {
+    for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
+                       DensityRate<decltype(separation)>{
+                           s.place.data(), s.vector.data(), s.wall.data(), s.product.data(),
+                           &s.control.data()->done, gradient_scale(state.parameters), separation});
+  });
+}
+
+/// Of D D^T.
+inline void invert_diagonal(State& state) {
+  PressureState& s = state.pressure;
+  with_separation(state.parameters, [&](auto separation) {
+    for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
+                       InverseDiagonal<decltype(separation)>{
+                           s.place.data(), s.wall.data(), s.inverse_diagonal.data(),
+                           gradient_scale(state.parameters), separation});
+  });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

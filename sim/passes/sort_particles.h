@@ -3,6 +3,7 @@
 // holds.
 
 #include "sim/passes/polygon_grid.h"
+#include "sim/periodic.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -33,8 +34,12 @@ inline void sort_by_cell(State& state) {
   const Parameters& p = state.parameters;
   const int n = f.count;
   const VecView x = f.position.view();
-  const Bounds box = bounds_of_points("fluid bounds", x, n);
-  f.grid = make_grid_shape(box.low, box.high, p.support_radius);
+  Bounds box = bounds_of_points("fluid bounds", x, n);
+  const Vec3<float> period = periods_of(p);
+  if (period.x > 0.f) box.low.x = p.low[0];
+  if (period.y > 0.f) box.low.y = p.low[1];
+  if (period.z > 0.f) box.low.z = p.low[2];
+  f.grid = make_grid_shape(box.low, box.high, p.support_radius, period);
   const GridShape grid = f.grid;
   // Past an open side of the domain by more than a support a particle is lost: it sorts behind all.
   float low[3], high[3];
@@ -69,7 +74,8 @@ inline void sort_particles(State& state) {
     permute(f.owed, state.swap_vector, order, n);
     permute(f.far_by, state.swap_vector.x, order, n);
   }
-  const bool open = !(p.wall[0] && p.wall[1] && p.wall[2]);
+  bool open = false;
+  for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];
   if (open) f.count = value_at(f.cell_start, f.grid.cells());
 }
 

@@ -13,6 +13,7 @@
 // a closed form in d, which stands on the diagonal, and times v_wall on the right-hand side.
 
 #include "sim/kernels.h"
+#include "sim/periodic.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -54,10 +55,12 @@ struct NoSlipWalls {
 };
 
 /// What a step does to velocities by viscosity, without dimension: dt times the rates above.
+template <class Separation>
 struct ViscousPairs {
   const Float4* place;  // m; w: anything finite
   float scale;          // dt nu V (6300 / pi) / h^7, 1/m^2
   NoSlipWalls walls;
+  Separation separation;
 
   template <class T>
   DRENCH_HD T weight(T u) const {
@@ -66,7 +69,10 @@ struct ViscousPairs {
 };
 
 /// product = K vector, K = dt times the rates, walls at rest.
-struct ViscousProduct : ViscousPairs {
+template <class Separation>
+struct ViscousProduct : ViscousPairs<Separation> {
+  using Pairs = ViscousPairs<Separation>;
+  using Pairs::place, Pairs::scale, Pairs::walls, Pairs::separation;
   static constexpr int columns = 2;
   const Float4* vector;  // w: 0
   Float4* product;
@@ -84,7 +90,7 @@ struct ViscousProduct : ViscousPairs {
   };
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q apart = i.place - j.place;
+    const Q apart = separation(i.place, j.place);
     sum.push = multiply_add(weight * apart, splat_sum(apart * (i.vector - j.vector)), sum.push);
   }
   DRENCH_HD Vec3<float> result(int i, const Sum<Float4>& sum) const {
@@ -99,17 +105,23 @@ struct ViscousProduct : ViscousPairs {
 };
 
 /// velocity -= K vector, walls moving: a step so short that it need not be implicit.
-struct ExplicitViscosity : ViscousProduct {
+template <class Separation>
+struct ExplicitViscosity : ViscousProduct<Separation> {
+  using Product = ViscousProduct<Separation>;
+  using Product::place, Product::walls;
   VecView velocity;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
-    velocity.set(i, velocity[i] - result(i, sum) + walls.drag(place[i]).source);
+  DRENCH_HD void finish(int i, const typename Product::template Sum<Float4>& sum) const {
+    velocity.set(i, velocity[i] - this->result(i, sum) + walls.drag(place[i]).source);
   }
 };
 
 /// Inverses of the 3 x 3 blocks on the diagonal of 1 + K.
-struct ViscousBlocks : ViscousPairs {
+template <class Separation>
+struct ViscousBlocks : ViscousPairs<Separation> {
+  using Pairs = ViscousPairs<Separation>;
+  using Pairs::place, Pairs::scale, Pairs::walls, Pairs::separation;
   static constexpr int columns = 1;
   Float4 *diagonal, *cross;  // xx, yy, zz; xy, yz, zx
 
@@ -125,7 +137,7 @@ struct ViscousBlocks : ViscousPairs {
   };
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q apart = i.place - j.place, weighted = weight * apart;
+    const Q apart = separation(i.place, j.place), weighted = weight * apart;
     sum.square = multiply_add(weighted, apart, sum.square);
     sum.cross = multiply_add(weighted, rotate(apart), sum.cross);
   }
@@ -155,13 +167,13 @@ inline NoSlipWalls no_slip_walls_of(const Parameters& p, float strength) {
   return walls;
 }
 
-inline ViscousPairs viscous_pairs_of(const State& state) {
+template <class Separation>
+ViscousPairs<Separation> viscous_pairs_of(const State& state, const Separation& separation) {
   const Parameters& p = state.parameters;
   const float h = p.support_radius, strength = viscous_strength(p, state.dt);
   const float volume = p.particle_mass / p.rest_density / (h * h * h);
-  return {state.pressure.place.data(),
-          strength * ViscousWeight::factor * volume / p.viscous_lattice_sum / (h * h),
-          no_slip_walls_of(p, strength)};
+  return {state.pressure.place.data(), strength * ViscousWeight::factor * volume / (h * h),
+          no_slip_walls_of(p, strength), separation};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -161,20 +161,21 @@ inline ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& wa
           p.most_viscous_iterations};
 }
 
-inline void solve_viscosity(State& state) {
+template <class Separation>
+void solve_viscosity(State& state, const Separation& separation) {
   ViscosityState& s = state.viscosity;
   const int n = state.fluid.count;
   for (Column<Float4>* c :
        {&s.solution, &s.residual, &s.direction, &s.product, &s.diagonal, &s.cross})
     c->resize(size_t(n));
   s.control.resize(1);
-  const ViscousPairs pairs = viscous_pairs_of(state);
+  const ViscousPairs<Separation> pairs = viscous_pairs_of(state, separation);
   const ViscousIteration iteration = viscous_iteration_of(state, pairs.walls);
-  const ViscousProduct product{pairs, s.direction.data(), s.product.data(),
-                               &s.control.data()->done};
+  const ViscousProduct<Separation> product{pairs, s.direction.data(), s.product.data(),
+                                           &s.control.data()->done};
   const NeighbourLists& lists = state.pressure.lists;
   for_each_neighbour("viscosity: blocks", lists, n,
-                     ViscousBlocks{pairs, s.diagonal.data(), s.cross.data()});
+                     ViscousBlocks<Separation>{pairs, s.diagonal.data(), s.cross.data()});
   ViscousControl* control = s.control.data();
   parallel_for(
       "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
@@ -200,19 +201,29 @@ inline void solve_viscosity(State& state) {
       "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
 }
 
-/// Viscosity over the step's dt, for the velocities that the pressures left.
-inline void apply_viscosity(State& state) {
-  const int n = state.fluid.count;
-  if (n == 0) return;
-  if (viscosity_is_implicit(state.parameters, state.dt)) return solve_viscosity(state);
+template <class Separation>
+void step_viscosity(State& state, const Separation& separation) {
   const VecView v = state.fluid.velocity.view();
   Float4* vector = state.pressure.vector.data();
   parallel_for(
-      "viscosity: velocities", n, DRENCH_LAMBDA(int i) {
+      "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
-  const ViscousProduct product{viscous_pairs_of(state), vector, nullptr, nullptr};
-  for_each_neighbour("viscosity", state.pressure.lists, n, ExplicitViscosity{product, v});
+  const ViscousProduct<Separation> product{viscous_pairs_of(state, separation), vector, nullptr,
+                                           nullptr};
+  for_each_neighbour("viscosity", state.pressure.lists, state.fluid.count,
+                     ExplicitViscosity<Separation>{product, v});
+}
+
+/// Viscosity over the step's dt, for the velocities that the pressures left.
+inline void apply_viscosity(State& state) {
+  if (state.fluid.count == 0) return;
+  with_separation(state.parameters, [&](const auto& separation) {
+    if (viscosity_is_implicit(state.parameters, state.dt))
+      solve_viscosity(state, separation);
+    else
+      step_viscosity(state, separation);
+  });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

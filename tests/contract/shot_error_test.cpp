@@ -51,7 +51,8 @@ TEST_F(ShotError, NamesTheNearestKey) {
       {"[fluid.boxx]\n", {"scene.toml:4", "fluid.boxx", "fluid.box"}},
       {"[camera]\nspacing = 1\n", {"scene.toml:5", "camera.spacing", "[fluid]"}},
       {"[coupling]\nscheme = \"exat\"\n", {"scene.toml:5", "\"exat\"", "did you mean \"exact\""}},
-      {"[domain]\nx = \"periodic\"\n", {"scene.toml:5", "domain.x", "\"open\", \"walls\""}},
+      {"[domain]\nx = \"cyclic\"\n",
+       {"scene.toml:5", "domain.x", "\"open\", \"walls\", \"periodic\""}},
   });
 }
 
@@ -76,6 +77,26 @@ TEST_F(ShotError, NamesWrongTypes) {
       {"spacing 3\n", {"scene.toml:4", "not valid TOML"}},
       {"[fluid]\nspacing = 0.01\nspacing = 0.02\n", {"scene.toml:6", "not valid TOML"}},
   });
+}
+
+TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
+  expect_messages({
+      {"[domain]\nx = \"periodic\"\n[[cloth]]\n", {"scene.toml:5", "domain.x", "cloth", "seam"}},
+      // 0.08 m are less than two supports of 2.15 spacings.
+      {"[fluid]\nspacing = 0.02\n[domain]\nmin = [-1, 0, 0.42]\nmax = [1, 2, 0.5]\nz = "
+       "\"periodic\"\n",
+       {"scene.toml:9", "domain.z", "0.08 m", "two support radii, 0.086 m"}},
+      // 0.5 m are 16.67 layers of 0.03 m.
+      {"[fluid]\nspacing = 0.03\n[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.5]\nz = \"periodic\"\n",
+       {"scene.toml:1", "fluid.box[0]", "part by 0.02 m", "spacing = 0.0294117647 m",
+        "domain of 0.51 m"}},
+      {"[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.48]\nz = \"periodic\"\n",
+       {"scene.toml:1", "fluid.box[0]", "overlap by 0.02 m"}},
+      {"[domain]\ny = \"periodic\"\n[[fluid.sphere]]\ncenter = [0, 0, 0]\nradius = 1\n",
+       {"scene.toml:6", "fluid.sphere[0].radius", "across the seam", "0.995 m"}},
+  });
+  const std::string around = "[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.5]\nz = \"periodic\"\n";
+  EXPECT_EQ(parse_shot(box + around, folder_ / "scene.toml").domain.axis[2], Axis::periodic);
 }
 
 // Letters beyond ASCII belong into strings and comments; toml++ must not see them anywhere else.

@@ -141,8 +141,9 @@ class ViscousMatrix : public testing::Test {
     for (size_t i = 0; i < x.size(); ++i)
       vector.data()[i] = {float(x[i].x), float(x[i].y), float(x[i].z), 0.f};
     for_each_neighbour("product", listed.state.pressure.lists, listed.count(),
-                       sim::cpu::ViscousProduct{viscous_pairs_of(listed.state), vector.data(),
-                                                product.data(), &done});
+                       sim::cpu::ViscousProduct<sim::cpu::Straight>{
+                           viscous_pairs_of(listed.state, sim::cpu::Straight{}), vector.data(),
+                           product.data(), &done});
     std::vector<V3d> y;
     for (size_t i = 0; i < x.size(); ++i)
       y.emplace_back(product.data()[i].x, product.data()[i].y, product.data()[i].z);
@@ -188,7 +189,8 @@ TEST_F(ViscousMatrix, BlocksAreInverse) {
   diagonal.resize(500), cross.resize(500);
   for_each_neighbour(
       "blocks", listed.state.pressure.lists, listed.count(),
-      sim::cpu::ViscousBlocks{viscous_pairs_of(listed.state), diagonal.data(), cross.data()});
+      sim::cpu::ViscousBlocks<sim::cpu::Straight>{
+          viscous_pairs_of(listed.state, sim::cpu::Straight{}), diagonal.data(), cross.data()});
   for (const size_t i : {size_t(0), size_t(170), size_t(499)}) {
     const sim::cpu::Float4 d = diagonal.data()[i], c = cross.data()[i];
     const V3d inverse[3] = {V3d(d.x, c.x, c.z), V3d(c.x, d.y, c.y), V3d(c.z, c.y, d.z)};

@@ -1,0 +1,57 @@
+#pragma once
+// Periodic axes of the domain: positions stay in [low, high), and a neighbour is the nearest of its
+// images. Pairs found through cells get them shifted there (for_each_run in grid.h); lists hold
+// indices, so that passes over lists look for the nearest image themselves.
+
+#include "sim/parameters.h"
+#include "sim/quad.h"
+#include "sim/vec3.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// The image of x in [low, high); NaN stays what it is.
+DRENCH_HD float wrap(float x, float low, float high) {
+  if (x >= low && x < high) return x;
+  const float period = high - low, w = x - period * floorf((x - low) / period);
+  return w < low || w >= high ? low : w;  // rounding may end on the upper border
+}
+
+/// Lengths of the periodic axes, m; 0 for others.
+inline Vec3<float> periods_of(const Parameters& p) {
+  const auto period = [&](int k) { return p.periodic[k] ? p.high[k] - p.low[k] : 0.f; };
+  return {period(0), period(1), period(2)};
+}
+
+/// x_i - x_j of listed neighbours where no axis is periodic, ...
+struct Straight {
+  template <class Q>
+  DRENCH_HD Q operator()(Q i, Q j) const {
+    return i - j;
+  }
+};
+/// ... and where one is. At least two supports to the period: the nearest image is the one listed.
+struct NearestImage {
+  Float4 period, inverse;  // m, 1/m; 0 where an axis is not periodic and in w
+
+  template <class Q>
+  DRENCH_HD Q operator()(Q i, Q j) const {
+    const Q d = i - j;
+    return d - both(period) * nearest_integer(d * both(inverse));
+  }
+};
+inline NearestImage nearest_image_of(const Parameters& p) {
+  const Vec3<float> l = periods_of(p);
+  const auto inverse = [](float length) { return length > 0.f ? 1.f / length : 0.f; };
+  return {{l.x, l.y, l.z, 0.f}, {inverse(l.x), inverse(l.y), inverse(l.z), 0.f}};
+}
+
+/// Calls f with the separation that the axes of the domain ask for.
+template <class F>
+void with_separation(const Parameters& p, const F& f) {
+  if (p.periodic[0] || p.periodic[1] || p.periodic[2])
+    f(nearest_image_of(p));
+  else
+    f(Straight{});
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
