@@ -17,8 +17,6 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
     const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
     consider(0.4 * a / speed, "speed");
     if (g > 0) consider(0.08 * std::sqrt(a / g), "gravity");
-    // Brookshaw's weights sum to 20 nu dt / h^2 on a lattice: 0.076 is the bound, 0.084 grows.
-    if (viscosity > 0) consider(0.05 * h * h / viscosity, "viscosity");
     if (limits.step > 0 && p.fixed_dt == 0) {
       // Impacts may ask for more iterations than there are; shorter steps ask for fewer, each. What
       // a solve leaves turns into speed over a short step: not shorter than a tenth, and no faster

@@ -20,7 +20,12 @@ struct Parameters {
   float xsph = 0;               // share of the neighbours' mean velocity taken on a step
   float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one
-  float gravity[3] = {0, 0, 0};  // m/s^2
+  // viscosity of the incompressible solver
+  float viscous_tolerance = 1e-4f;  // RMS of what the solve leaves over RMS of the velocity
+  int most_viscous_iterations = 200;
+  bool no_slip = false;               // at the domain's walls
+  float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
+  float gravity[3] = {0, 0, 0};       // m/s^2
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
@@ -33,6 +38,15 @@ struct Parameters {
   double fixed_dt = 0;  // s, 0 is adaptive
 };
 
+/// dt nu / h^2, which rules how viscosity is stepped. The largest eigenvalue of the viscous matrix
+/// is about 50 times as large: up to 0.01 an explicit step is stable with room for clumps.
+inline float viscous_strength(const Parameters& p, double dt) {
+  return float(dt) * p.dynamic_viscosity / (p.rest_density * p.support_radius * p.support_radius);
+}
+inline bool viscosity_is_implicit(const Parameters& p, double dt) {
+  return p.incompressible && viscous_strength(p, dt) > 0.01f;
+}
+
 /// Bounds that rule the next step, from the state at the end of a step.
 struct Limits {
   float max_speed = 0;         // m/s, fluid and cloth
@@ -40,6 +54,8 @@ struct Limits {
   float residual = 0;          // mean density error that the pressure solve left, over rest
   int iterations = 0;          // of the pressure solve
   int sheet_sweeps = 0;        // of the conjugate gradients of the sheets
+  float viscous_residual = 0;  // RMS that a viscous solve cut short left, over that of the velocity
+  int viscous_iterations = 0;  // of the viscous solve
   float step = 0;              // s, of the step that was made
   int bad_particle = -1;       // index of the first particle that is not finite or absurdly fast
   int bad_vertex = -1;
@@ -47,9 +63,8 @@ struct Limits {
 
 /// The largest stable fluid step and the name of the limit that rules it.
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
-/// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003,
-/// viscosity 0.05 h^2/nu, and a step follows the one before: half of it when its solve was cut
-/// short.
+/// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003, and
+/// a step follows the one before: half of it when its solve was cut short. Its viscosity sets none.
 struct StepLimit {
   double dt;
   const char* name;

@@ -35,6 +35,13 @@ DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
 }
 /// The fourth component in all four places.
 DRENCH_HD Quad splat_w(Quad a) { return {a.w, a.w, a.w, a.w}; }
+/// The sum of all four components in all four places.
+DRENCH_HD Quad splat_sum(Quad a) {
+  const float sum = (a.x + a.y) + (a.z + a.w);
+  return {sum, sum, sum, sum};
+}
+/// y, z, x, w.
+DRENCH_HD Quad rotate(Quad a) { return {a.y, a.z, a.x, a.w}; }
 DRENCH_HD Quad both(const Float4& a) { return {a.x, a.y, a.z, a.w}; }
 DRENCH_HD Quad nearest_integer(Quad a) { return {rintf(a.x), rintf(a.y), rintf(a.z), rintf(a.w)}; }
 
@@ -54,6 +61,11 @@ DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
   return Quad(Quad::Native(_mm256_fmadd_ps(a.v, b.v, c.v)));
 }
 DRENCH_HD Quad splat_w(Quad a) { return Quad(Quad::Native(_mm256_permute_ps(a.v, 0xff))); }
+DRENCH_HD Quad splat_sum(Quad a) {
+  const Quad pairs = a + Quad(Quad::Native(_mm256_permute_ps(a.v, 0xb1)));
+  return pairs + Quad(Quad::Native(_mm256_permute_ps(pairs.v, 0x4e)));
+}
+DRENCH_HD Quad rotate(Quad a) { return Quad(Quad::Native(_mm256_permute_ps(a.v, 0xc9))); }
 DRENCH_HD Quad nearest_integer(Quad a) {
   return Quad(Quad::Native(_mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)));
 }

@@ -92,6 +92,29 @@ bool fills_domain(const Shot& shot, const InitialFluid& fluid) {
   return std::abs(double(fluid.position.size()) - cells.x * cells.y * cells.z) < 0.5;
 }
 
+/// Do the domain's walls hold the fluid? Automatic: where the layer that a wall brakes grows a
+/// spacing thick within a second, or where a wall moves.
+bool walls_hold(const Shot& shot) {
+  const Domain& domain = shot.domain;
+  if (domain.slip != Slip::automatic) return domain.slip == Slip::none;
+  for (const V3d& v : domain.wall_velocity.all()) {
+    if (v.length() > 0) return true;
+  }
+  const double layer = std::sqrt(shot.fluid.kinematic_viscosity * 1.0);  // m after 1 s
+  return layer >= shot.fluid.spacing;
+}
+
+void set_viscosity(const Shot& shot, Parameters& p) {
+  p.no_slip = walls_hold(shot);
+  const auto velocity = shot.domain.wall_velocity.all();
+  for (int k = 0; k < 3; ++k) {
+    for (int end = 0; end < 2; ++end) {
+      for (int c = 0; c < 3; ++c)
+        p.wall_velocity[k][end][c] = float(velocity[size_t(2 * k + end)][c]);
+    }
+  }
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
@@ -123,6 +146,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
   p.full = p.incompressible && fills_domain(shot, fluid);
+  if (p.incompressible) set_viscosity(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;

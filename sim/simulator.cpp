@@ -67,7 +67,7 @@ struct Simulator::Implementation {
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 2").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 3").finish();
     frame = shot.timeline.first;
     next_id = int(scene.start.id.size());
     solver->load(scene.start);
@@ -137,6 +137,10 @@ struct Simulator::Implementation {
       report.iterations += limits.iterations;
       report.unconverged += limits.residual > scene.parameters.tolerance;
       report.worst_residual = std::max(report.worst_residual, double(limits.residual));
+      report.viscous_iterations += limits.viscous_iterations;
+      report.viscous_unconverged += limits.viscous_residual > 0;
+      report.worst_viscous_residual =
+          std::max(report.worst_viscous_residual, double(limits.viscous_residual));
       ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
       if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
     }
@@ -185,6 +189,15 @@ struct Simulator::Implementation {
                       "at worst",
                       frame, report.unconverged, report.steps, scene.parameters.most_iterations,
                       scene.parameters.tolerance, report.worst_residual));
+    }
+    if (report.viscous_unconverged > 0) {
+      log_warning("sim",
+                  fmt::format("frame {}: in {} of {} steps {} iterations of the viscous solve did "
+                              "not reach {:.2g} of the velocity; {:.2g} at worst. Smaller steps "
+                              "(shot.time_step) ask for fewer",
+                              frame, report.viscous_unconverged, report.steps,
+                              scene.parameters.most_viscous_iterations,
+                              scene.parameters.viscous_tolerance, report.worst_viscous_residual));
     }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();

@@ -30,10 +30,13 @@ struct StepReport {
   double max_speed = 0;            // m/s
   double mean_compression = 0, max_compression = 0;  // max(rho/rho0 - 1, 0)
   double kinetic_energy = 0;                         // J, fluid and cloth
-  int iterations = 0;         // of the incompressible solver's pressure solves
-  int unconverged = 0;        // steps in which these did not reach fluid.tolerance
-  double worst_residual = 0;  // mean density error that a solve left, the largest of the steps
-  uint64_t guard_hits = 0;    // particles that the path test held back
+  int iterations = 0;           // of the incompressible solver's pressure solves
+  int unconverged = 0;          // steps in which these did not reach fluid.tolerance
+  double worst_residual = 0;    // mean density error that a solve left, the largest of the steps
+  int viscous_iterations = 0;   // of the solves for viscosity
+  int viscous_unconverged = 0;  // steps in which these did not reach their tolerance
+  double worst_viscous_residual = 0;  // RMS that one left over the RMS of the velocity
+  uint64_t guard_hits = 0;            // particles that the path test held back
 };
 
 class Simulator {

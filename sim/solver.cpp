@@ -6,6 +6,7 @@
 #include <map>
 
 #include "sim/passes/measure_density.h"
+#include "sim/passes/viscosity_solve.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -130,6 +131,11 @@ class BackendSolver : public Solver {
       limits.step = float(dt);
       if (allocated_ & column_cloth_system)
         limits.sheet_sweeps = value_at(state_.cloth_system.control, 0).sweeps;
+    }
+    if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
+      const ViscousControl solve = value_at(state_.viscosity.control, 0);
+      limits.viscous_residual = solve.converged ? 0.f : solve.residual;
+      limits.viscous_iterations = solve.iterations;
     }
     return limits;
   }

@@ -136,6 +136,23 @@ struct SolveControl {
   float mean = 0.f;  // kg/m^3, of the source; only where the fluid is full
 };
 
+/// Scalars of a viscous solve.
+struct ViscousControl {
+  int done = 0, converged = 0, iterations = 0;
+  float residual = 0;        // RMS, over the RMS of the velocity
+  float step = 0, turn = 0;  // along the direction, and of the old direction in the next
+  double product = 0;        // of the residual with itself preconditioned
+  double size = 0;           // what residuals are compared with: a sum of squares, m^2/s^2
+};
+
+/// Columns of the implicit viscosity (passes/viscosity_solve.h), allocated by the first step that
+/// needs them.
+struct ViscosityState {
+  Column<Float4> solution, residual, direction, product;  // m/s
+  Column<Float4> diagonal, cross;  // inverse blocks: xx, yy, zz and xy, yz, zx
+  Column<ViscousControl> control;
+};
+
 /// Columns of the incompressible solver, rebuilt every step (passes/pressure_rows.h). Its warm
 /// start is FluidState::pressure_term.
 struct PressureState {
@@ -152,6 +169,7 @@ struct State {
   WallTableData wall_table{};  // of the paper coupling
   FluidState fluid;
   PressureState pressure;
+  ViscosityState viscosity;
   ClothState cloth;
   ClothSystem cloth_system;
   ContactState contact;

@@ -9,6 +9,7 @@
 #include "sim/passes/sheet_filter.h"
 #include "sim/passes/sheet_side.h"
 #include "sim/passes/sort_particles.h"
+#include "sim/passes/viscosity_solve.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -105,8 +106,9 @@ void paper_move(State& state) {
 
 bool fluid(const Parameters& p, bool) { return p.fluid; }
 bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; }
-bool smoothed(const Parameters& p, bool cloth) {
-  return projected(p, cloth) && (p.xsph > 0 || p.dynamic_viscosity > 0);
+bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
+bool viscous(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
 bool compressible(const Parameters& p, bool) { return p.fluid && !p.incompressible; }
 bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
@@ -134,6 +136,8 @@ const Pass all_passes[] = {
      column_velocity | column_projection, smooth_velocities},
     {"project_density", projected, moving | column_density | column_projection,
      moving | column_density | column_projection, project_density},
+    {"apply_viscosity", viscous, column_velocity | column_projection,
+     column_velocity | column_projection, apply_viscosity},
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
     {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
      find_nearest_centroids},

@@ -50,9 +50,21 @@ struct Timeline {
 // through one comes in at the other
 enum class Axis { open, walls, periodic };
 
+/// How fluid meets the domain's walls; automatic: none where a wall's influence spreads by a
+/// spacing within a second, sqrt(nu 1 s) >= spacing, or where a wall moves; free elsewhere.
+enum class Slip { automatic, free, none };
+
+struct WallVelocity {  // m/s, along the wall
+  V3d x_low{0, 0, 0}, x_high{0, 0, 0}, y_low{0, 0, 0}, y_high{0, 0, 0}, z_low{0, 0, 0},
+      z_high{0, 0, 0};
+  std::array<V3d, 6> all() const { return {x_low, x_high, y_low, y_high, z_low, z_high}; }
+};
+
 struct Domain {
   V3d min{-1, 0, -1}, max{1, 2, 1};  // m; walls stand on these planes, seams of periodic axes too
   std::array<Axis, 3> axis{Axis::walls, Axis::walls, Axis::walls};
+  Slip slip = Slip::automatic;
+  WallVelocity wall_velocity;
 };
 
 struct FluidBox {  // a lattice of round((max-min)/spacing) particles a side

@@ -27,6 +27,7 @@ class Checker {
   void check() const {
     check_time();
     check_domain();
+    check_wall_velocity();
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
     check_names();
@@ -86,6 +87,49 @@ class Checker {
                  shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i], cells, most_cells));
       }
       if (domain.axis[size_t(i)] == Axis::periodic) check_periodic(i);
+    }
+  }
+
+  /// A moving wall stays in its plane, exists, and drags.
+  void check_wall_velocity() const {
+    const Domain& domain = shot_.domain;
+    const std::array<V3d, 6> velocity = domain.wall_velocity.all();
+    for (size_t i = 0; i < 6; ++i) {
+      const V3d& v = velocity[i];
+      if (v.length() == 0) continue;
+      const char axis = "xyz"[i / 2];
+      const std::string key =
+          fmt::format("domain.wall_velocity.{}_{}", axis, i % 2 == 0 ? "low" : "high");
+      if (v[int(i / 2)] != 0) {
+        fail(key, fmt::format("{} is {} m/s; the wall would leave its plane. Set its {} to 0", key,
+                              text_of(v), axis));
+      }
+      if (domain.axis[i / 2] != Axis::walls) {
+        fail(key, fmt::format("{} is {} m/s but domain.{} has no walls. Set domain.{} = \"walls\" "
+                              "or remove it",
+                              key, text_of(v), axis, axis));
+      }
+      if (domain.slip == Slip::free) {
+        fail(key, fmt::format("{} is {} m/s but domain.slip is \"free\"; such a wall drags "
+                              "nothing. Use \"none\" or \"automatic\"",
+                              key, text_of(v)));
+      }
+      check_drags(key);
+    }
+  }
+
+  void check_drags(const std::string& key) const {
+    const Fluid& fluid = shot_.fluid;
+    if (!is_incompressible(shot_)) {
+      fail(key, fmt::format("{} is set but the shot's fluid is weakly compressible, which knows "
+                            "walls at rest only. Use fluid.solver = \"incompressible\" without "
+                            "cloth, or remove it",
+                            key));
+    }
+    if (fluid.kinematic_viscosity == 0) {
+      fail(key, fmt::format("{} is set but fluid.kinematic_viscosity is 0; nothing would be "
+                            "dragged. Set one above 0",
+                            key));
     }
   }
 

@@ -157,6 +157,25 @@ std::vector<Parameter> shot_rows() {
       axis_row<0>("x", "both ends of the x axis; periodic ones are one and the same place"),
       axis_row<1>("y", "both ends of the y axis; periodic ones are one and the same place"),
       axis_row<2>("z", "both ends of the z axis; periodic ones are one and the same place"),
+      row<&Domain::slip>("domain", "slip", "", none, simulate,
+                         "how the incompressible solver's fluid meets these walls: free, or none "
+                         "(it moves with them). automatic is none if a layer that a wall brakes "
+                         "grows a spacing thick within 1 s, sqrt(kinematic_viscosity 1 s) >= "
+                         "spacing, or if a wall moves; thinner layers cannot be resolved: free")
+          .one_of({"automatic", "free", "none"}),
+
+      row<&WallVelocity::x_low>("domain.wall_velocity", "x_low", "m/s", speed, simulate,
+                                "of the wall at min x; its own x must be 0"),
+      row<&WallVelocity::x_high>("domain.wall_velocity", "x_high", "m/s", speed, simulate,
+                                 "of the wall at max x"),
+      row<&WallVelocity::y_low>("domain.wall_velocity", "y_low", "m/s", speed, simulate,
+                                "of the wall at min y; its own y must be 0"),
+      row<&WallVelocity::y_high>("domain.wall_velocity", "y_high", "m/s", speed, simulate,
+                                 "of the wall at max y"),
+      row<&WallVelocity::z_low>("domain.wall_velocity", "z_low", "m/s", speed, simulate,
+                                "of the wall at min z; its own z must be 0"),
+      row<&WallVelocity::z_high>("domain.wall_velocity", "z_high", "m/s", speed, simulate,
+                                 "of the wall at max z"),
   };
 }
 
@@ -412,6 +431,11 @@ Section single(std::string_view name, std::string_view description) {
   return section;
 }
 
+Section inside(std::string_view parent, Section section) {
+  section.parent = parent;
+  return section;
+}
+
 template <auto MemberPointer>
 Section repeated(std::string_view name, std::string_view parent, std::string_view description) {
   using Owner = typename Member<decltype(MemberPointer)>::Owner;
@@ -457,6 +481,10 @@ const std::vector<Section>& sections() {
   static const std::vector<Section> table{
       whole_shot(),
       single<&Shot::domain>("domain", "The space of the simulation and its walls."),
+      inside("domain", single<&Domain::wall_velocity>(
+                           "domain.wall_velocity",
+                           "Walls that move along themselves, as belts do: they drag the fluid "
+                           "of the incompressible solver.")),
       single<&Shot::fluid>("fluid", "The fluid. Without sources there is none."),
       repeated<&Fluid::box>("fluid.box", "fluid", "A block of fluid at the start."),
       repeated<&Fluid::sphere>("fluid.sphere", "fluid", "A ball of fluid at the start."),

@@ -37,6 +37,8 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"kinetic_energy", step.kinetic_energy},
                      {"iterations", step.iterations},
                      {"unconverged", step.unconverged},
+                     {"viscous_iterations", step.viscous_iterations},
+                     {"viscous_unconverged", step.viscous_unconverged},
                      {"guard_hits", step.guard_hits}}
                     .dump();
   report.line =

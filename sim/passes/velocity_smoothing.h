@@ -1,9 +1,7 @@
 #pragma once
 // XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
 //   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
-// and physical viscosity, explicit (Brookshaw 1985),
-//   v_i += dt nu sum_j 2 m / rho_0 (v_j - v_i) (-W'_ij) / r_ij.
-// Both are antisymmetric in i and j: momentum is kept. Walls let slip.
+// antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h.
 
 #include "sim/passes/pressure_rows.h"
 
@@ -13,7 +11,7 @@ struct VelocitySmoothing {
   static constexpr int columns = 1;
   const Float4* velocity;
   VecView out;
-  float by_value, by_slope;  // factors of the kernel's value and slope
+  float factor;  // of the kernel's value
 
   DRENCH_HD bool idle() const { return false; }
   DRENCH_HD Columns<1> inputs() const { return {{velocity}}; }
@@ -27,7 +25,7 @@ struct VelocitySmoothing {
   };
   template <class T>
   DRENCH_HD T weight(T u) const {
-    return T(by_value) * WendlandC2::value(u) + T(by_slope) * WendlandC2::slope(u);
+    return T(factor) * WendlandC2::value(u);
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
@@ -49,10 +47,8 @@ inline void smooth_velocities(State& state) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
   const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
-  for_each_neighbour(
-      "smoothing", s.lists, state.fluid.count,
-      VelocitySmoothing{vector, v, p.xsph * volume * h * h,
-                        2.f * float(state.dt) * volume * p.dynamic_viscosity / p.rest_density});
+  for_each_neighbour("smoothing", s.lists, state.fluid.count,
+                     VelocitySmoothing{vector, v, p.xsph * volume * h * h});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

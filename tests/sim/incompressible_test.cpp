@@ -8,18 +8,11 @@
 #include <cmath>
 #include <numeric>
 
-#include "sim/passes/incompressible.h"
 #include "sim/passes/measure_density.h"
-#include "tests/sim/support.h"
+#include "tests/sim/listed.h"
 
 namespace drench::sim_tests {
 namespace {
-
-Shot water() {
-  Shot shot = empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible;
-  return shot;
-}
 
 /// A column of 8 x layers x 8 particles that stands free in a tank twice as wide.
 Shot column(int layers, double tolerance) {
@@ -32,42 +25,6 @@ Shot column(int layers, double tolerance) {
   add_box(shot, V3d(0), {8, layers, 8});
   return shot;
 }
-
-/// `count` particles at random in a cube of `side` m inside walls, as a state that a step would
-/// predict: sorted, with lists.
-struct Listed {
-  sim::cpu::State state;
-
-  Listed(int count, double side) {
-    Shot shot = water();
-    shot.domain.min = V3d(0), shot.domain.max = V3d(side);
-    shot.domain.axis = {Axis::walls, Axis::open, Axis::walls};
-    add_box(shot, V3d(0), {1, 1, 1});
-    state.parameters = sim::build_scene(shot).parameters;
-    sim::cpu::FluidState& f = state.fluid;
-    f.count = count;
-    Random random(11);
-    for (sim::cpu::VecColumn* c : {&f.position, &f.velocity, &state.swap_vector}) c->resize(count);
-    for (sim::cpu::Column<int>* c : {&f.id, &f.cell, &f.order, &state.swap_int}) c->resize(count);
-    for (sim::cpu::Column<float>* c : {&f.density, &f.pressure_term}) c->resize(count);
-    const sim::cpu::VecView x = f.position.view();
-    for (int i = 0; i < count; ++i)
-      x.set(i, {float(side * random()), float(side * random()), float(side * random())});
-    sim::cpu::PressureState& s = state.pressure;
-    for (auto* c : {&s.place, &s.vector, &s.wall}) c->resize(count);
-    for (auto* c : {&s.inverse_diagonal, &s.source, &s.before, &s.next, &s.product})
-      c->resize(count);
-    s.control.resize(1);
-    sim::cpu::sort_particles(state);
-    sim::cpu::find_neighbours(state);
-    s.control.data()->done = 0;
-  }
-  int count() const { return state.fluid.count; }
-  V3d place(int i) const {
-    const sim::cpu::Vec3<float> p = state.fluid.position.view()[i];
-    return V3d(p.x, p.y, p.z);
-  }
-};
 
 TEST(NeighbourLists, HoldWhatABruteForceSearchFinds) {
   for (const int count : {1, 7, 900}) {
@@ -313,36 +270,6 @@ TEST(Incompressible, ASolveCutShortIsToldAndShortensTheStep) {
   EXPECT_GT(run.stable_dt(), 1e-3);
 }
 
-// Random velocities in a fluid a hundred thousand times as viscous as water, at the largest step
-// that is called stable: the explicit sum must take energy out.
-TEST(Incompressible, ViscosityIsStableAtItsLimit) {
-  Shot shot = water();
-  shot.fluid.kinematic_viscosity = 0.1, shot.fluid.xsph = 0;
-  add_box(shot, V3d(0), {10, 10, 10});
-  sim::Scene scene = sim::build_scene(shot);
-  Random random(9);
-  for (std::vector<float>* c :
-       {&scene.start.velocity.x, &scene.start.velocity.y, &scene.start.velocity.z}) {
-    for (float& v : *c) v = float(0.1 * (random() - 0.5));
-  }
-  Stepper run(scene);
-  const auto energy = [&] {
-    double sum = 0;
-    const sim::HostState s = run.solver->save();
-    for (size_t i = 0; i < s.id.size(); ++i) sum += at(s.velocity, i).length2();
-    return sum;
-  };
-  EXPECT_STREQ(sim::stable_step(scene.parameters, run.limits).name, "viscosity");
-  const double start = energy();
-  double now = start;
-  for (int k = 0; k < 40; ++k) {
-    run.step();
-    now = energy();
-    EXPECT_LT(now, start) << k;
-  }
-  EXPECT_LT(now, 0.1 * start);
-}
-
 // All fluid leaves through an open side within a step; more comes, and goes on.
 TEST(Incompressible, GoesOnAfterTheLastParticleHasLeft) {
   Shot shot = water();
@@ -414,7 +341,7 @@ TEST(Incompressible, ASavedStateGoesOnWithTheSameBits) {
   expect_same(whole.solver->save(), second.solver->save());
 }
 
-TEST(Incompressible, WithoutViscosityNothingIsSmoothed) {
+TEST(Incompressible, WithoutXsphNothingIsSmoothed) {
   Shot shot = column(4, 1e-4);
   const auto smoothed = [](const Shot& of) {
     const std::vector<sim::PassInfo> plan = Stepper(of).solver->plan();
@@ -422,7 +349,7 @@ TEST(Incompressible, WithoutViscosityNothingIsSmoothed) {
                        [](const sim::PassInfo& p) { return p.name == "smooth_velocities"; });
   };
   EXPECT_TRUE(smoothed(shot));
-  shot.fluid.xsph = 0, shot.fluid.kinematic_viscosity = 0;
+  shot.fluid.xsph = 0;
   EXPECT_FALSE(smoothed(shot));
   EXPECT_EQ(Stepper(shot).solver->allocated() & sim::column_acceleration, 0u);
 }

@@ -181,5 +181,45 @@ TEST(Kernels, WendlandWallFunctionsAreItsIntegrals) {
   }
 }
 
+double viscous(double q) { return std::pow(1 - q, 3); }
+
+// Over the sphere, int w x^2 y^2 dV = 4 pi / 15 int w r^6 dr: 2 is what a Newtonian fluid has.
+TEST(Kernels, ViscousWeightHasTheMomentOfANewtonianFluid) {
+  const double moment =
+      integrate(0, 1, [](double r) { return 4 * M_PI / 15 * viscous(r) * std::pow(r, 6); });
+  EXPECT_NEAR(sim::cpu::ViscousWeight::factor * moment, 2, 2 * rounding);
+  EXPECT_NEAR(sim::cpu::ViscousWeight::value(0.7), viscous(0.3), rounding);
+}
+
+// Beyond the plane at q, by the angle to its normal, c = cos: int over r and c of w times x^2 z or
+// z^3, the mean of x^2 about the normal being r^2 (1 - c^2) / 2.
+TEST(Kernels, ViscousWallsAreIntegralsOverTheHalfSpace) {
+  constexpr double k = 6300 / M_PI;
+  for (double q = 0.0625; q < 1; q += 0.0625) {
+    const auto beyond = [q](const auto& f) {
+      return integrate(q, 1, [&](double r) {
+        constexpr int n = 200;
+        double sum = 0;
+        for (int m = 0; m < n; ++m) {
+          const double c = q / r + (1 - q / r) * (m + 0.5) / n;
+          sum += f(r, c) * (1 - q / r) / n;
+        }
+        return 2 * M_PI * r * r * viscous(r) * sum;
+      });
+    };
+    const double along = beyond([](double r, double c) { return r * r * (1 - c * c) / 2 * r * c; });
+    const double across = beyond([](double r, double c) { return std::pow(r * c, 3); });
+    // Midpoints of 200 angles: a few 1e-5 of the value; rounding of sums of a few thousand.
+    EXPECT_NEAR(sim::cpu::ViscousWeight::wall_along(float(q)), k * along / q,
+                1e-4 * k * along / q + 1e-4)
+        << q;
+    EXPECT_NEAR(sim::cpu::ViscousWeight::wall_across(float(q)), k * across / q,
+                1e-4 * k * across / q + 3e-4)
+        << q;
+  }
+  EXPECT_EQ(sim::cpu::ViscousWeight::wall_along(1.f), 0.f);
+  EXPECT_EQ(sim::cpu::ViscousWeight::wall_across(3.f), 0.f);
+}
+
 }  // namespace
 }  // namespace drench::sim_tests

@@ -144,14 +144,14 @@ TEST_P(Periodic, NothingTellsWhereTheSeamIs) {
   Stepper plain(collision(GetParam(), V3d(0), V3d(0))), moved(collision(GetParam(), far, V3d(0))),
       flying(collision(GetParam(), V3d(0), drift));
   const double dt = 2e-4;
-  for (int k = 0; k < 200; ++k) plain.step(dt), moved.step(dt), flying.step(dt);
+  for (int k = 0; k < 175; ++k) plain.step(dt), moved.step(dt), flying.step(dt);
   const sim::HostState state = plain.solver->save();
   double spread = 0;  // it did collide
   for (const float v : state.velocity.y) spread = std::max(spread, double(std::abs(v)));
   ASSERT_GT(spread, 0.1);
   const V3d period = period_of(collision(GetParam(), V3d(0), V3d(0)));
   EXPECT_LT(difference(state, moved.solver->save(), far, period), 2e-5);
-  EXPECT_LT(difference(state, flying.solver->save(), drift * 0.04, period), 2e-5);
+  EXPECT_LT(difference(state, flying.solver->save(), drift * 0.035, period), 2e-5);
 }
 
 TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {

@@ -44,6 +44,21 @@ TEST(Skip, EachCouplingBringsItsOwnPassesOnly) {
   }
 }
 
+TEST(Skip, AFluidWithoutViscosityHasNoPassForIt) {
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible;
+  add_box(shot, V3d(0), {4, 4, 4});
+  const auto passes = [&](double viscosity) {
+    shot.fluid.kinematic_viscosity = viscosity;
+    int count = 0;
+    for (const sim::PassInfo& pass : Stepper(shot).solver->plan())
+      count += pass.name == "apply_viscosity";
+    return count;
+  };
+  EXPECT_EQ(passes(0), 0);
+  EXPECT_EQ(passes(1e-6), 1);
+}
+
 /// A block that falls onto a floor, with or without a sheet 0.5 m away.
 sim::HostState splash(int steps, bool with_cloth) {
   Shot shot = empty_shot();

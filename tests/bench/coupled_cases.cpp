@@ -1,0 +1,33 @@
+// Case sheet_pool: a pool on a pinned sheet of light cotton against the springs' own static
+// solution (tests/validation/coupled.h), run time against error.
+
+#include <cmath>
+#include <string>
+
+#include "tests/bench/bench.h"
+#include "tests/validation/coupled.h"
+
+namespace drench::bench {
+namespace {
+
+void pools(const Emit& emit) {
+  for (const int across : {15, 20, 30}) {
+    validation::PinnedPool pool;
+    Line line;
+    line.cost = measure([&] { pool = validation::pinned_pool(across, 1, 0.2); });
+    line.method = "incompressible, strong coupling";
+    line.resolution = std::to_string(across) + " across, " + std::to_string(pool.particles);
+    line.error = std::abs(pool.sag / pool.static_sag - 1), line.gate = 0.05;
+    line.error_of = "sag over that of the springs under the hydrostatic load, less 1";
+    line.more["volume"] = pool.volume;
+    line.more["speed_m_s"] = pool.speed;
+    line.more["steps"] = pool.steps;
+    emit(line);
+  }
+}
+
+const Registration sheet_pool{"sheet_pool", "a pool on a pinned sheet: time and error of the sag",
+                              pools};
+
+}  // namespace
+}  // namespace drench::bench
