@@ -9,6 +9,7 @@
 
 #include "sim/passes/image_walls.h"
 #include "sim/passes/move.h"
+#include "sim/passes/obstacle_share.h"
 #include "sim/passes/pressure_solve.h"
 #include "sim/passes/velocity_smoothing.h"
 
@@ -48,6 +49,7 @@ inline void find_neighbours(State& state) {
         wall[i] = {rest * share.gradient.x, rest * share.gradient.y, rest * share.gradient.z,
                    rest * share.value};
       });
+  if (p.obstacles > 0) add_obstacle_shares(state);
   const float scale = mass / (h * h * h);
   build_neighbour_lists<WendlandC2>(
       {f.grid, f.cell_start.data()}, f.count, x, h, s.lists, state.scratch,

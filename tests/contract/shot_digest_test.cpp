@@ -40,6 +40,7 @@ void change(const Parameter& p, void* field, const std::filesystem::path& file) 
       as<std::string>(field) += "x";
       break;
     case Kind::path:
+    case Kind::mesh_files:
       as<std::filesystem::path>(field) = file;
       break;
     case Kind::choice: {
@@ -106,6 +107,10 @@ class ShotDigest : public testing::Test {
     test::write_shot_files(folder_);
     write_file_whole(folder_ / "other.obj", "v 0 0 0\nv 2 0 0\nv 0 0 1\nf 1 2 3\n");
     shot_ = parse_shot(test::full_shot(), folder_ / "scene.toml");
+    for (const ObstacleType type :
+         {ObstacleType::plane, ObstacleType::box, ObstacleType::sphere, ObstacleType::mesh}) {
+      shot_.obstacle.emplace_back().type = type;  // beside cloth, which no shot that is read has
+    }
   }
   TemporaryFolder folder_;
   Shot shot_;
