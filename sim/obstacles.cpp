@@ -168,10 +168,10 @@ double ObstacleSet::limit(double time, double dt) {
   for (Entry& entry : obstacle_) {
     if (!entry.deforms && !moves(entry.obstacle)) continue;
     const double begin = film_frame(time);
-    for (int tries = 0; tries < 16; ++tries) {  // a shorter step may have another mean speed
+    for (int tries = 0; tries < 40; ++tries) {  // a shorter step may have another mean speed
       const double moved = travel(entry, begin, film_frame(time + dt));
       if (moved <= most) break;
-      dt *= 0.999 * most / moved;
+      dt *= std::max(0.5, 0.999 * most / moved);
     }
   }
   return dt;

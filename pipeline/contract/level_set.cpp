@@ -55,7 +55,7 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band) {
   const int bx = set.blocks[0], by = set.blocks[1], total = bx * by * set.blocks[2];
   set.block.assign(size_t(total), LevelSet::outside);
   const auto origin = [&](int b) {
-constexpr int side = LevelSet::side;
+    constexpr int side = LevelSet::side;
     return openvdb::Coord(side * (set.low[0] + b % bx), side * (set.low[1] + b / bx % by),
                           side * (set.low[2] + b / bx / by));
   };

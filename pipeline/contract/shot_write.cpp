@@ -269,8 +269,8 @@ std::string described_shot(
 /// Every key of an obstacle. A comment, because the reference has cloth, which goes with none yet.
 std::string commented_obstacle() {
   const Section& section = *shot_table::find_section("obstacle");
-  std::string text = fmt::format("\n# {} Not together with cloth yet.\n# {}\n",
-                                 section.description, header_of(section));
+  std::string text = fmt::format("\n# {} Not together with cloth yet.\n# {}\n", section.description,
+                                 header_of(section));
   for (const Parameter* p : shot_table::parameters_of(section.name)) {
     const std::string value = default_text(*p);
     text += fmt::format("# {} = {}  # {}{}: {}\n", p->key,
