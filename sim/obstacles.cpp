@@ -14,7 +14,7 @@ namespace drench::sim {
 
 namespace {
 
-constexpr double voxel = 0.5, band = 2.5;  // of level sets, in spacings
+constexpr double voxel = 0.5, band = 2.0;  // of level sets, in spacings
 constexpr double far_off = 1e30;
 
 void bound(const TriangleMesh& mesh, V3d& low, V3d& high) {

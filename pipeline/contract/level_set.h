@@ -16,7 +16,8 @@ struct LevelSet {
   static constexpr int outside = -1, inside = -2;  // blocks without values: beyond the band
 
   float voxel = 0;  // m
-  float band = 0;   // m; farther from the surface only the sign is known
+  float band = 0;   // m; farther off only the sign is known, and samples up to two voxels nearer
+                    // may fall short
   int low[3] = {0, 0, 0}, blocks[3] = {0, 0, 0};
   std::vector<int> block;    // x fastest: which run of `corners` values, or outside or inside
   std::vector<float> value;  // m, x fastest; shared faces are repeated
