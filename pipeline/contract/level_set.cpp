@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/frames.h"
 #include "pipeline/contract/triangle.h"
 #include "pipeline/contract/vdb_archive.h"
 

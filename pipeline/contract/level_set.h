@@ -5,9 +5,9 @@
 #include <functional>
 #include <vector>
 
-#include "pipeline/contract/frames.h"
-
 namespace drench {
+
+struct TriangleMesh;  // frames.h, whose Imath nvcc does not take
 
 /// Signed distance, negative inside. Block (i, j, k) spans voxels 8 (low + (i, j, k)) up to 8 more
 /// along each axis; corner values lie at multiples of the voxel.
