@@ -110,7 +110,7 @@ Settled settle_in_tilted_gravity(double degrees, double seconds) {
 
 Settled settle_in_tilted_tank(double degrees, double seconds) {
   Shot shot = tank_shot(deep);
-  const double a = shot.fluid.spacing, angle = degrees * M_PI / 180;
+  const double a = shot.fluid.spacing;
   // The tank's axes in the world: gravity is then turned the same way in both.
   Obstacle frame;
   frame.rotation_deg = V3d(0, 0, degrees);
@@ -119,7 +119,7 @@ Settled settle_in_tilted_tank(double degrees, double seconds) {
   shot.fluid.box.clear();
   shot.domain.min = V3d(-1), shot.domain.max = V3d(1);
   shot.domain.axis = {Axis::open, Axis::open, Axis::open};
-  (void)angle;
+
   for (int k = 0; k < 3; ++k) {
     add_plane(shot, tank.to_world(V3d(0)), tank.axis[k]);
     add_plane(shot, tank.to_world(size), -tank.axis[k]);
