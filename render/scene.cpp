@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "render/contact.h"
 #include "render/path.h"
 
 namespace drench {
@@ -140,7 +141,15 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                       "use a diffuse one",
                       shot.ground.material));
   }
-  if (!geometry.fluid.triangle.empty()) add_fluid(shot, geometry.fluid);
+  if (!geometry.fluid.triangle.empty()) {
+    if (geometry.obstacle.empty()) {
+      add_fluid(shot, geometry.fluid);
+    } else {
+      add_fluid(shot, pressed_onto_obstacles(device_.get(), geometry.fluid, geometry.obstacle,
+                                             float(shot.fluid.spacing)));
+    }
+  }
+  for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
     if (cloth.mesh.triangle.empty()) continue;
     std::string material = "cotton";
@@ -181,6 +190,19 @@ void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
     lights_in_fluid_ |=
         bounds_of(fluid).intersects(Imath::Box3f(light.center - reach, light.center + reach));
   }
+}
+
+void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
+  std::string material = "ground";
+  for (const Obstacle& o : shot.obstacle)
+    if (o.name == obstacle.name) material = o.material;
+  const uint32_t index = add_material(shot, material);
+  if (materials_[index].type == MaterialType::dielectric)
+    throw Error(
+        fmt::format("obstacle '{}': material '{}' is a dielectric, which only the fluid may have; "
+                    "use a diffuse one",
+                    obstacle.name, material));
+  add_object(obstacle.mesh, fmt::format("obstacle '{}'", obstacle.name), index);
 }
 
 bool Scene::moves_visibly(const TriangleMesh& mesh) const {

@@ -70,6 +70,7 @@ class Scene {
 
  private:
   void add_fluid(const Shot& shot, const TriangleMesh& mesh);
+  void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
   void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void build(SceneObject& object);

@@ -112,6 +112,13 @@ struct WendlandC2 {
     const float beyond = t2 * t2 * t2 * (3.5f - t * (4.5f - 1.5f * t));
     return q < 0.f ? 1.f - beyond : beyond;
   }
+  /// pi times the integral of r W (r - q)^2 from q on, W continued so that moment(-q) =
+  /// moment(q) + 2 q: what a ball misses of the half-space (passes/obstacle_share.h). Times h^4.
+  static DRENCH_HD float moment(float q) {
+    const float t = max0(1.f - fabsf(q)), t2 = t * t;
+    const float beyond = t2 * t2 * t2 * t * (1.f - t * (9.f / 8 - t / 3));
+    return q < 0.f ? beyond - 2.f * q : beyond;
+  }
   /// W of the squared distance, without 1 / h^3: see Spiky.
   template <class T>
   static DRENCH_HD T shape(T r2, T h) {

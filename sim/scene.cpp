@@ -63,9 +63,9 @@ void calibrate(double a, double h, Parameters& p) {
 
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
-double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
+double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double obstacle_speed) {
   const double g = shot.gravity.length();
-  double speed2 = 0, top = -1e300, bottom = 1e300;
+  double speed2 = obstacle_speed * obstacle_speed, top = -1e300, bottom = 1e300;
   const V3d down = g > 0 ? shot.gravity / g : V3d(0, -1, 0);
   const auto see = [&](const V3d& p, double speed) {
     speed2 = std::max(speed2, speed * speed);
@@ -84,7 +84,7 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid) {
 
 /// Is there as much fluid as there is room, with no side open and no way in?
 bool fills_domain(const Shot& shot, const InitialFluid& fluid) {
-  if (!shot.cloth.empty() || !shot.fluid.emitter.empty()) return false;
+  if (!shot.cloth.empty() || !shot.fluid.emitter.empty() || !shot.obstacle.empty()) return false;
   for (const Axis axis : shot.domain.axis) {
     if (axis == Axis::open) return false;
   }
@@ -115,7 +115,8 @@ void set_viscosity(const Shot& shot, Parameters& p) {
   }
 }
 
-Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid) {
+Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
+                            const ObstacleSet& obstacles) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
   p.fluid = shot.fluid.present();
@@ -129,7 +130,9 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   : poly6          ? calibrate<cpu::Poly6>(a, h, p)
                    : calibrate<cpu::Spiky>(a, h, p);
   const bool chosen = shot.fluid.sound_speed > 0 && !is_incompressible(shot);
-  p.sound_speed = float(chosen ? shot.fluid.sound_speed : automatic_sound_speed(shot, fluid));
+  p.sound_speed = float(chosen ? shot.fluid.sound_speed
+                               : automatic_sound_speed(shot, fluid, obstacles.fastest()));
+  p.obstacles = obstacles.count();
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
   const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;
@@ -344,7 +347,11 @@ void check_overlap(const Shot& shot, const Scene& scene) {
 
 }  // namespace
 
-Scene build_scene(const Shot& shot) {
+bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
+  return obstacles.count() == 0 || obstacles.distance(point, time) > 0.499 * spacing;
+}
+
+Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   if (!shot.fluid.present() && shot.cloth.empty()) {
     throw Error(shot.file.string() +
                 ": there is nothing to simulate. Add a [[fluid.box]] or a [[cloth]]");
@@ -352,13 +359,18 @@ Scene build_scene(const Shot& shot) {
   Scene scene;
   scene.frame = local_frame(shot);
   const InitialFluid fluid = shot.fluid.present() ? initial_fluid(shot) : InitialFluid{};
-  scene.parameters = build_parameters(shot, scene.frame, fluid);
+  scene.obstacles = ObstacleSet(shot, scene.frame, make_level_set);
+  scene.parameters = build_parameters(shot, scene.frame, fluid, scene.obstacles);
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];
+    if (!clear_of_obstacles(scene.obstacles, p, -shot.preroll, shot.fluid.spacing)) {
+      ++scene.inside_obstacles;
+      continue;
+    }
     start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
     start.velocity.push(float(u.x), float(u.y), float(u.z));
-    start.id.push_back(int(i));
+    start.id.push_back(int(start.id.size()));
   }
   start.memory_triangle.assign(start.id.size(), -1);
   start.memory_side.assign(start.id.size(), 1);

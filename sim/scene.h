@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
+#include "sim/obstacles.h"
 #include "sim/solver.h"
 
 namespace drench::sim {
@@ -60,13 +61,21 @@ struct Scene {
   std::vector<Sheet> sheet;
   std::vector<int> first_vertex, first_triangle;  // of each sheet, and one past the end
   ClothTopology cloth;
+  ObstacleSet obstacles;
   HostState start;
+  size_t inside_obstacles = 0;  // particles of sources that were left out
 
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
   float place(int axis, double world) const;
 };
 
-/// @throws Error as build_sheet, if nothing is to be simulated, or if fluid starts inside cloth.
-Scene build_scene(const Shot& shot);
+/// Whether fluid may start at a point: not within an obstacle or nearer to one than half a spacing,
+/// which is what a lattice has to a wall.
+bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
+
+/// @param make_level_set  see ObstacleSet.
+/// @throws Error as build_sheet and ObstacleSet, if nothing is to be simulated, or if fluid starts
+/// inside cloth.
+Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set = {});
 
 }  // namespace drench::sim

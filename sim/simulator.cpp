@@ -61,7 +61,7 @@ struct Simulator::Implementation {
   Implementation(const Shot& shot_, const SimulatorOptions& options_)
       : shot(shot_),
         options(options_),
-        scene(sim::build_scene(shot)),
+        scene(sim::build_scene(shot, options.level_set)),
         solver(make_solver(scene, options.device, device)) {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
@@ -73,7 +73,13 @@ struct Simulator::Implementation {
     solver->load(scene.start);
     limits = solver->measure();
     time = -shot.preroll;
+    scene.obstacles.place(*solver, time, time);
     solver->refresh();
+    if (scene.inside_obstacles > 0) {
+      log_info("sim", fmt::format("{} particles of the sources start inside obstacles or within "
+                                  "half a spacing of them and were left out",
+                                  scene.inside_obstacles));
+    }
   }
 
   double frame_time(int f) const { return (f - shot.timeline.first) / shot.timeline.fps; }
@@ -95,16 +101,18 @@ struct Simulator::Implementation {
         }
         limits.max_speed = std::max(limits.max_speed, float(source.speed));
         add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)),
-                  direction * source.speed);
+                  direction * source.speed, until);
       }
     }
   }
 
-  void add_layer(const sim::EmitterLayer& disc, const V3d& centre, const V3d& u) {
+  /// Less what would appear inside an obstacle.
+  void add_layer(const sim::EmitterLayer& disc, const V3d& centre, const V3d& u, double now) {
     sim::HostVec position, velocity;
     std::vector<int> id;
     for (const V3d& offset : disc.offset) {
       const V3d p = centre + offset;
+      if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
       position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
       id.push_back(next_id++);
@@ -119,16 +127,21 @@ struct Simulator::Implementation {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
       emit(time);
       sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+      const double moves = scene.obstacles.limit(time, limit.dt);
+      if (moves < limit.dt) limit = {moves, "obstacle speed"};
       if (shot.time_step > 0) limit = fixed_step(limit);
-      const double rest = end - time;
+      const double stop = scene.obstacles.stop(time, end);
+      const double rest = stop - time;
       const double parts = std::ceil(rest / limit.dt - 1e-9);
       const double dt = parts <= 1 ? rest : rest / parts;
       const int substeps =
           shot.cloth.empty()
               ? 1
               : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
+      const double then = parts <= 1 ? stop : time + dt;
+      scene.obstacles.place(*solver, time, then);
       limits = solver->step(dt, substeps);
-      time = parts <= 1 ? end : time + dt;
+      time = then;
       ++steps;
       check_state();
       report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
@@ -315,6 +328,7 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted;
   s.limits = checkpoint.state.limits;
   s.solver->load(checkpoint.state);
+  s.scene.obstacles.place(*s.solver, s.time, s.time);
   s.solver->refresh();
   s.last_checkpoint = path;
 }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "sim/passes/measure_density.h"
+#include "sim/passes/obstacle_guard.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/step_plan.h"
 
@@ -154,6 +155,45 @@ class BackendSolver : public Solver {
   }
 
   Limits measure() override { return measure_limits(state_); }
+
+  void load_level_set(int obstacle, int which, const LevelSet& set) override {
+    state_.obstacles.field.resize(size_t(2) * state_.parameters.obstacles);
+    ObstacleState::Field& field = state_.obstacles.field.at(size_t(2) * obstacle + which);
+    from_host(field.block, set.block), from_host(field.value, set.value);
+    field.shape = field_view(set);
+  }
+  void place_obstacles(const std::vector<ObstaclePlacement>& placement) override {
+    ObstacleState& o = state_.obstacles;
+    std::vector<ObstacleView> views;
+    for (size_t k = 0; k < placement.size(); ++k) {
+      ObstacleView view{placement[k], {}};
+      for (size_t s = 0; view.shape == ObstacleShape::field && s < 2; ++s) {
+        const ObstacleState::Field& field = o.field.at(2 * k + s);
+        view.field[s] = field.shape;
+        view.field[s].block = field.block.data(), view.field[s].value = field.value.data();
+      }
+      views.push_back(view);
+    }
+    o.count = int(views.size());
+    from_host(o.view, views);
+    o.stopped.resize(4 * views.size());
+    o.stopped.clear_bytes(0);
+  }
+  std::vector<ObstacleImpulse> obstacle_impulses() const override {
+    const ObstacleState& o = state_.obstacles;
+    const std::vector<long long> stopped = to_host(o.stopped, o.stopped.size());
+    std::vector<ObstacleImpulse> impulses(o.count);
+    for (int k = 0; k < o.count && state_.dt > 0; ++k) {
+      const Impulse pressure = pressure_impulse(state_, k);
+      const double push[3] = {pressure.x, pressure.y, pressure.z};
+      for (int c = 0; c < 3; ++c) {
+        impulses[k].impulse[c] = push[c] + double(stopped[4 * k + c]) / ObstacleGuard::unit *
+                                               state_.parameters.particle_mass;
+      }
+      impulses[k].stopped = stopped[4 * k + 3];
+    }
+    return impulses;
+  }
 
   std::vector<PassInfo> plan() const override {
     std::vector<PassInfo> info;

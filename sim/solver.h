@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/level_set.h"
+#include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
 
 namespace drench::sim {
@@ -42,6 +44,12 @@ struct ClothTopology {
   std::vector<int> fan_start, fan_entry, rim;
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
+};
+
+/// What an obstacle received from the fluid in one step.
+struct ObstacleImpulse {
+  double impulse[3] = {0, 0, 0};  // kg m/s, by pressure and by stopped particles
+  int64_t stopped = 0;            // particles that pressure did not stop
 };
 
 /// Columns a pass may name; only those that the plan names are allocated.
@@ -87,6 +95,13 @@ class Solver {
   virtual void refresh() = 0;
   /// Limits of a state that no step has made yet.
   virtual Limits measure() = 0;
+  /// Level set 0 or 1 of an obstacle. To be called before it is placed.
+  virtual void load_level_set(int obstacle, int which, const LevelSet& set) = 0;
+  /// Where the obstacles of Parameters::obstacles are during the next step, and at its end for
+  /// refresh().
+  virtual void place_obstacles(const std::vector<ObstaclePlacement>& placement) = 0;
+  /// Of the last step, one an obstacle. Over dt it is the mean force.
+  virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
   virtual std::vector<PassInfo> plan() const = 0;
   virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
   virtual int particles() const = 0;

@@ -7,6 +7,7 @@
 #include "sim/geometry.h"
 #include "sim/grid.h"
 #include "sim/neighbours.h"
+#include "sim/obstacle_view.h"
 #include "sim/parameters.h"
 #include "sim/sort.h"
 #include "sim/wall_table.h"
@@ -164,6 +165,20 @@ struct PressureState {
   Column<SolveControl> control;
 };
 
+/// Obstacles as the step has them (obstacle_placement.h) and the level sets they point to.
+struct ObstacleState {
+  struct Field {
+    Column<int> block;
+    Column<float> value;
+    FieldView shape{};  // without pointers
+  };
+  int count = 0;
+  Column<ObstacleView> view;
+  std::vector<Field> field;   // two an obstacle
+  Column<long long> stopped;  // 4 an obstacle: see ObstacleGuard
+  ObstacleViews views() const { return {view.data(), count}; }
+};
+
 struct State {
   Parameters parameters;
   WallTableData wall_table{};  // of the paper coupling
@@ -173,6 +188,7 @@ struct State {
   ClothState cloth;
   ClothSystem cloth_system;
   ContactState contact;
+  ObstacleState obstacles;
   SortScratch scratch;
   VecColumn swap_vector;
   Column<int> swap_int;

@@ -5,6 +5,7 @@
 #include "sim/passes/density.h"
 #include "sim/passes/incompressible.h"
 #include "sim/passes/move.h"
+#include "sim/passes/obstacle_guard.h"
 #include "sim/passes/pressure_viscosity.h"
 #include "sim/passes/sheet_filter.h"
 #include "sim/passes/sheet_side.h"
@@ -106,6 +107,12 @@ void paper_move(State& state) {
 
 bool fluid(const Parameters& p, bool) { return p.fluid; }
 bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; }
+bool free_of_obstacles(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && p.obstacles == 0;
+}
+bool around_obstacles(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && p.obstacles > 0;
+}
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
@@ -121,7 +128,8 @@ bool cloth_alone(const Parameters& p, bool cloth) { return !p.fluid && cloth; }
 constexpr unsigned moving = column_position | column_velocity;
 
 const Pass all_passes[] = {
-    {"predict_particles", projected, moving, moving, predict_particles},
+    {"predict_particles", free_of_obstacles, moving, moving, predict_particles},
+    {"predict_around_obstacles", around_obstacles, moving, moving, predict_around_obstacles},
     {"sort_particles", fluid, column_position, moving, sort_particles},
     {"polygon_grid", coupled, column_cloth, column_cloth, exact_grid},
     {"nearest_triangle", coupled, column_position | column_cloth, column_sheet, exact_nearest},
@@ -134,8 +142,10 @@ const Pass all_passes[] = {
      find_neighbours},
     {"smooth_velocities", smoothed, column_velocity | column_projection,
      column_velocity | column_projection, smooth_velocities},
-    {"project_density", projected, moving | column_density | column_projection,
+    {"project_density", free_of_obstacles, moving | column_density | column_projection,
      moving | column_density | column_projection, project_density},
+    {"project_around_obstacles", around_obstacles, moving | column_density | column_projection,
+     moving | column_density | column_projection, project_around_obstacles},
     {"apply_viscosity", viscous, column_velocity | column_projection,
      column_velocity | column_projection, apply_viscosity},
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},

@@ -36,4 +36,10 @@ struct ClothFrame {
   TriangleMesh mesh;
 };
 
+/// The surface of an obstacle at one frame.
+struct ObstacleFrame {
+  std::string name;
+  TriangleMesh mesh;  // closed, but for a plane
+};
+
 }  // namespace drench

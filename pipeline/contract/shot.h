@@ -132,6 +132,24 @@ struct Cloth {
   std::string material = "cotton";
 };
 
+enum class ObstacleType { plane, box, sphere, mesh };
+
+/// A solid that the fluid flows around. Its own frame has the origin at `position`, turned by
+/// `rotation_deg`.
+struct Obstacle {
+  ObstacleType type = ObstacleType::box;
+  std::string name = "obstacle";
+  Animated<V3d> position{V3d(0)};      // m: of the origin: a point of the plane, the centre
+  Animated<V3d> rotation_deg{V3d(0)};  // about x, then y, then z of the world
+  V3d normal{0, 1, 0};                 // plane: away from the solid half-space
+  V3d size{1, 1, 1};                   // box: edges, m
+  double radius = 0.5;                 // sphere, m
+  std::filesystem::path mesh_file;     // mesh: PLY or OBJ, or a sequence: see obstacle.h
+  double scale = 1;                    // mesh: of its coordinates, to m
+  std::string material = "ground";
+  bool visible = true;
+};
+
 enum class CouplingScheme {
   exact,
   paper
@@ -222,6 +240,7 @@ struct Shot {
   Domain domain;
   Fluid fluid;
   std::vector<Cloth> cloth;
+  std::vector<Obstacle> obstacle;
   Coupling coupling;
   SurfaceSettings surface;
   Camera camera;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/obstacle.h"
 
 namespace drench {
 
@@ -30,6 +31,7 @@ class Checker {
     check_wall_velocity();
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
+    for (size_t i = 0; i < shot_.obstacle.size(); ++i) check_obstacle(i);
     check_names();
     if (!shot_.fluid.present() && shot_.cloth.empty()) {
       fail("fluid",
@@ -137,6 +139,11 @@ class Checker {
   void check_periodic(int axis) const {
     const std::string key = fmt::format("domain.{}", "xyz"[axis]);
     const double length = shot_.domain.max[axis] - shot_.domain.min[axis];
+    if (!shot_.obstacle.empty()) {
+      fail(key, fmt::format("{} is \"periodic\" but the shot has obstacles, which end at the seam. "
+                            "Use \"walls\" or \"open\", or remove the [[obstacle]]",
+                            key));
+    }
     if (!shot_.cloth.empty()) {
       fail(key, fmt::format("{} is \"periodic\" but the shot has cloth, which cannot pass through "
                             "the seam. Use \"walls\" or \"open\"",
@@ -362,6 +369,42 @@ class Checker {
     }
   }
 
+  void check_obstacle(size_t i) const {
+    const Obstacle& obstacle = shot_.obstacle[i];
+    const std::string path = fmt::format("obstacle[{}]", i);
+    if (!shot_.cloth.empty()) {
+      fail(path,
+           "cloth with obstacles is not supported yet; remove the [[cloth]] or the "
+           "[[obstacle]]");
+    }
+    if (shot_.fluid.solver == FluidSolver::weakly_compressible) {
+      fail("fluid.solver",
+           "fluid.solver is \"weakly_compressible\" but the shot has obstacles, which only the "
+           "incompressible solver knows. Use \"incompressible\" or \"automatic\"");
+    }
+    if (obstacle.type == ObstacleType::plane) check_not_zero(path + ".normal", obstacle.normal);
+    if (obstacle.type == ObstacleType::sphere)
+      check_positive(path + ".radius", obstacle.radius, " m", "the sphere has no volume");
+    for (int k = 0; k < 3 && obstacle.type == ObstacleType::box; ++k)
+      check_positive(path + ".size", obstacle.size[k], " m", "the box has no volume");
+    if (obstacle.type == ObstacleType::mesh) check_obstacle_files(obstacle, path + ".mesh");
+  }
+
+  void check_obstacle_files(const Obstacle& obstacle, const std::string& key) const {
+    if (obstacle.mesh_file.empty())
+      fail(key, fmt::format("{} is missing; add mesh = \"file.ply\"", key));
+    if (!is_sequence(obstacle.mesh_file)) return;
+    for (int frame = shot_.timeline.first; frame <= shot_.timeline.last; ++frame) {
+      const std::filesystem::path file = sequence_file(obstacle.mesh_file, frame);
+      std::error_code code;
+      if (!std::filesystem::is_regular_file(file, code)) {
+        fail(key, fmt::format("{} has no file {} for frame {}; a sequence has one for every frame "
+                              "of shot.frames. Add it or shorten the shot",
+                              key, file.string(), frame));
+      }
+    }
+  }
+
   template <class T>
   void check_distinct(const std::vector<T>& things, const std::string& section) const {
     for (size_t i = 0; i < things.size(); ++i) {
@@ -378,6 +421,7 @@ class Checker {
 
   void check_names() const {
     check_distinct(shot_.cloth, "cloth");
+    check_distinct(shot_.obstacle, "obstacle");
     check_distinct(shot_.light, "light");
     check_distinct(shot_.material, "material");
   }
@@ -463,6 +507,10 @@ class Checker {
     for (size_t i = 0; i < shot_.cloth.size(); ++i) {
       check_use(fmt::format("cloth[{}].material", i), shot_.cloth[i].material,
                 MaterialType::dielectric, "an open sheet", "Use type cloth or diffuse");
+    }
+    for (size_t i = 0; i < shot_.obstacle.size(); ++i) {
+      check_use(fmt::format("obstacle[{}].material", i), shot_.obstacle[i].material,
+                MaterialType::dielectric, "an obstacle", "Use type diffuse");
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse");

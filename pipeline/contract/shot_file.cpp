@@ -246,6 +246,10 @@ class Reader {
       camera.target.interpolation = camera.fov_deg.interpolation = mode;
       camera.focus_distance.interpolation = camera.lens_radius.interpolation = mode;
     }
+    if (section.name == "obstacle") {
+      Obstacle& obstacle = *static_cast<Obstacle*>(object);
+      obstacle.rotation_deg.interpolation = obstacle.position.interpolation;
+    }
   }
 
   void read_key(const Section& section, const Parameter& p, void* object, const std::string& path,

@@ -129,6 +129,7 @@ constexpr Limits seeds{0, 4294967295};  // uint32_t
 constexpr Limits share{0, 1};
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
 constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
+constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;          // bits of ObstacleType
 
 std::vector<Parameter> shot_rows() {
   return {
@@ -290,6 +291,43 @@ std::vector<Parameter> cloth_rows() {
       row<&Coupling::scheme>("coupling", "scheme", "", none, simulate,
                              "exact, or paper: Harada, Koshizuka, Kawaguchi 2007 as published")
           .one_of({"exact", "paper"}),
+  };
+}
+
+std::vector<Parameter> obstacle_rows() {
+  constexpr unsigned both = simulate | render;
+  return {
+      row<&Obstacle::type>("obstacle", "type", "", none, both, "its shape")
+          .one_of({"plane", "box", "sphere", "mesh"})
+          .needed()
+          .identity(),
+      row<&Obstacle::name>("obstacle", "name", "", none, both,
+                           "obstacle, obstacle2, ... unless given")
+          .identity(),
+      row<&Obstacle::position>("obstacle", "position", "m", place, both,
+                               "a point of the plane, the centre of the box or sphere, the origin "
+                               "of the mesh; may be animated"),
+      row<&Obstacle::rotation_deg>("obstacle", "rotation_deg", "deg", {-360000, 360000}, both,
+                                   "about x, then y, then z through position; may be animated"),
+      row<&Obstacle::position>("obstacle", "interp", "", none, both,
+                               "between the keys of position and rotation_deg")
+          .as(Kind::track_mode)
+          .one_of({"linear", "smooth"}),
+      row<&Obstacle::normal>("obstacle", "normal", "", place, both,
+                             "points from the solid to the fluid; any length but 0")
+          .only(plane),
+      row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, both, "edges").only(box),
+      row<&Obstacle::radius>("obstacle", "radius", "m", {0, 1e5}, both, "radius").only(ball),
+      row<&Obstacle::mesh_file>("obstacle", "mesh", "", none, both,
+                                "closed PLY or OBJ; with %04d in the name one file for every frame "
+                                "of the shot, of the same triangles")
+          .as(Kind::mesh_files)
+          .only(mesh_type),
+      row<&Obstacle::scale>("obstacle", "scale", "", {1e-6, 1e6}, both,
+                            "metres for a unit of the file")
+          .only(mesh_type),
+      row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
+      row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
   };
 }
 
@@ -494,6 +532,8 @@ const std::vector<Section>& sections() {
       named<Cloth>(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
       repeated<&Cloth::pin>("cloth.pin", "cloth",
                             "Vertices held where they start: a list or a box."),
+      typed<Obstacle>(repeated<&Shot::obstacle>(
+          "obstacle", "", "A solid in the fluid, standing or moving as its keys say.")),
       single<&Shot::coupling>("coupling", "How fluid and cloth push each other."),
       single<&Shot::surface>("surface", "The surface built around the particles."),
       single<&Shot::camera>("camera", "A thin-lens camera that looks along -Z of its own frame."),
@@ -509,8 +549,9 @@ const std::vector<Section>& sections() {
 const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
-    for (const auto& part : {shot_rows(), fluid_rows(), cloth_rows(), surface_and_camera_rows(),
-                             light_rows(), material_rows(), picture_rows()}) {
+    for (const auto& part :
+         {shot_rows(), fluid_rows(), cloth_rows(), obstacle_rows(), surface_and_camera_rows(),
+          light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

@@ -19,6 +19,7 @@ enum class Kind {
   text,          // std::string that can be part of a file name
   name,          // std::string of letters, digits, '_' and '-'
   path,          // std::filesystem::path, empty: none
+  mesh_files,    // the same, or with one %04d in its name: a file for every frame
   choice,        // enum whose values count from 0, as `choices`
   vector,        // V3d
   colour,        // V3f, linear ACEScg, or a string srgb(r, g, b) or #rrggbb
@@ -27,7 +28,7 @@ enum class Kind {
   frames,        // Timeline::first and last
   number_track,  // Animated<double>
   vector_track,  // Animated<V3d>
-  track_mode,    // Camera: the interpolation of all its tracks
+  track_mode,    // the interpolation of all tracks of a camera or obstacle
   vertices,      // std::vector<uint32_t>
   box,           // std::optional<std::pair<V3d, V3d>>
   grid_pins,     // no field: becomes ClothPin::vertices once the grid is known

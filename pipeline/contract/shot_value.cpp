@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/colour.h"
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/obstacle.h"
 
 namespace drench::shot_table {
 
@@ -185,6 +186,13 @@ class ValueReader {
     }
     if (!fs::is_regular_file(file, code)) fail(file.string() + " is not a regular file");
     return file;
+  }
+
+  /// A path, or the pattern of a sequence, whose files are looked for once the frames are known.
+  fs::path mesh_files(const toml::node& node) const {
+    const fs::path word = text(node);
+    if (!is_sequence(word)) return path(node);
+    return fs::absolute(site_.folder / word).lexically_normal();
   }
 
   V3f colour(const toml::node& node) const {
@@ -372,6 +380,8 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
       return put<std::string>(field, reader.name(value));
     case Kind::path:
       return put<fs::path>(field, reader.path(value));
+    case Kind::mesh_files:
+      return put<fs::path>(field, reader.mesh_files(value));
     case Kind::choice:
       return put_choice(field, reader.choice(value));
     case Kind::vector:
@@ -391,7 +401,7 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::vector_track:
       reader.track(as<Animated<V3d>>(field), reader.is_keyed(), one_vector);
       break;
-    case Kind::track_mode:  // the row's field is the camera's first member, its position
+    case Kind::track_mode:  // the row's field is the position of the camera or obstacle
       as<Animated<V3d>>(field).interpolation = Interpolation(reader.choice(value));
       break;
     case Kind::vertices:
@@ -450,6 +460,7 @@ std::string value_text(const Parameter& parameter, const void* field) {
     case Kind::name:
       return quoted(as<std::string>(field));
     case Kind::path:
+    case Kind::mesh_files:
       return as<fs::path>(field).empty() ? "" : quoted(as<fs::path>(field).string());
     case Kind::choice:
       return choice_text(parameter, field);
@@ -499,6 +510,8 @@ std::string kind_text(const Parameter& parameter) {
       return "a name in quotes";
     case Kind::path:
       return "the path of a file in quotes";
+    case Kind::mesh_files:
+      return "the path of a file or of a sequence in quotes";
     case Kind::track_mode:
     case Kind::choice:
       return fmt::format("one of \"{}\"", fmt::join(parameter.choices, "\", \""));

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/contract/shot_table.h"
 #include "pipeline/contract/shot_value.h"
@@ -42,6 +43,7 @@ std::string default_text(const Parameter& parameter) {
     fresh.fluid.drops.resize(1);
     fresh.cloth.resize(1);
     fresh.cloth[0].pin.resize(1);
+    fresh.obstacle.resize(1);
     fresh.light.resize(1);
     fresh.material.resize(1);
     return fresh;
@@ -111,6 +113,13 @@ Digest stage_settings_digest(const Shot& shot, Stage stage) {
           } else if (p->kind == Kind::path) {
             const auto& file = *static_cast<const std::filesystem::path*>(p->field(object));
             if (!file.empty()) hasher.digest(hash_file(file));  // content, wherever it stands
+          } else if (p->kind == Kind::mesh_files) {
+            const auto& file = *static_cast<const std::filesystem::path*>(p->field(object));
+            // The files of a sequence belong to the keys of their frames.
+            if (is_sequence(file))
+              hasher.text(file.filename().string());
+            else if (!file.empty())
+              hasher.digest(hash_file(file));
           } else {
             hasher.text(shot_table::value_text(*p, p->field(object)));
           }
@@ -257,10 +266,24 @@ std::string described_shot(
   return text + quality_text;
 }
 
+/// Every key of an obstacle. A comment, because the reference has cloth, which goes with none yet.
+std::string commented_obstacle() {
+  const Section& section = *shot_table::find_section("obstacle");
+  std::string text = fmt::format("\n# {} Not together with cloth yet.\n# {}\n", section.description,
+                                 header_of(section));
+  for (const Parameter* p : shot_table::parameters_of(section.name)) {
+    const std::string value = default_text(*p);
+    text += fmt::format("# {} = {}  # {}{}: {}\n", p->key,
+                        value.empty() || value[0] == '*' ? "..." : value,
+                        p->required ? "required; " : "", value_column(*p), p->description);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string reference_shot(const std::string& name) {
-  return described_shot(
+  const std::string text = described_shot(
       one_of_everything(name),
       "every key that a shot may have, at its default where it has one.\n"
       "# Delete what the shot does not need; [[...]] may stand any number of times or not at all.",
@@ -270,6 +293,7 @@ std::string reference_shot(const std::string& name) {
         return fmt::format("{}  # {}{}: {}\n", line, p.required ? "required; " : "",
                            value_column(p), p.description);
       });
+  return text + commented_obstacle();
 }
 
 std::string starting_shot(const std::string& name) {

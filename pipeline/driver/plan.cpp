@@ -321,8 +321,10 @@ std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Looku
 }
 
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup) {
-  const auto inputs = digests_of(render_inputs(wanted, frame), lookup);
+  auto inputs = digests_of(render_inputs(wanted, frame), lookup);
   if (!inputs) return {};
+  // Velocities come from the frames on both sides.
+  for (auto& input : sequence_inputs(wanted, frame - 1, frame + 1)) inputs->push_back(input);
   return decide({layout::image(wanted.shot, frame)},
                 step_key(wanted.render, Step::render, frame, *inputs), lookup);
 }

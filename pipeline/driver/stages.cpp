@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/particles_file.h"
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
@@ -91,6 +93,7 @@ class ShotStages final : public Stages {
     SimulatorOptions options;
     options.device = options_.device;
     options.checkpoint_dir = folder_ / "sim/checkpoint";
+    options.level_set = make_level_set;
     return std::make_unique<ShotSimulation>(shot_, options);
   }
 
@@ -118,6 +121,10 @@ class ShotStages final : public Stages {
     if (shot_.fluid.present()) geometry.fluid = read_mesh(folder / layout::fluid_mesh(frame));
     for (const Cloth& cloth : shot_.cloth) {
       geometry.cloth.push_back({cloth.name, read_mesh(folder / layout::cloth(cloth.name, frame))});
+    }
+    for (const Obstacle& obstacle : shot_.obstacle) {
+      if (obstacle.visible)
+        geometry.obstacle.push_back({obstacle.name, obstacle_surface(shot_, obstacle, frame)});
     }
     RenderStats stats;
     const Film film = render_frame(shot_, frame, geometry, &stats, progress);

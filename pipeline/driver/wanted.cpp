@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "build_id.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
@@ -66,25 +67,49 @@ class StageKeyBuilder {
   KeyParts parts_;
 };
 
+void add_obstacle_meshes(const Shot& shot, StageKeyBuilder& builder) {
+  for (const Obstacle& obstacle : shot.obstacle)
+    if (!is_sequence(obstacle.mesh_file)) builder.file(obstacle.mesh_file);
+}
+
+std::map<int, Digest> sequence_digests(const Shot& shot) {
+  std::map<int, Digest> digests;
+  for (int frame = shot.timeline.first; frame <= shot.timeline.last; ++frame) {
+    Hasher hasher;
+    bool any = false;
+    for (const Obstacle& obstacle : shot.obstacle) {
+      if (!is_sequence(obstacle.mesh_file)) continue;
+      hasher.digest(hash_file(sequence_file(obstacle.mesh_file, frame)));
+      any = true;
+    }
+    if (any) digests[frame] = hasher.finish();
+  }
+  return digests;
+}
+
 StageKey simulate_key(const Shot& shot, const std::string& device_class) {
-  StageKeyBuilder builder("simulate", build_id::simulate,
-                          sections_of(shot, {"shot", "domain", "fluid", "cloth", "coupling"}));
+  StageKeyBuilder builder(
+      "simulate", build_id::simulate,
+      sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "coupling"}));
   builder.settings(stage_settings_digest(shot, Stage::simulate))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first)
       .device(device_class);
   for (const Cloth& cloth : shot.cloth) builder.file(cloth.mesh_file);
+  add_obstacle_meshes(shot, builder);
   return builder.finish();
 }
 
 StageKey render_key(const Shot& shot) {
-  StageKeyBuilder builder("render", build_id::render,
-                          sections_of(shot, {"camera", "light", "material", "ground", "render"}));
+  StageKeyBuilder builder(
+      "render", build_id::render,
+      sections_of(shot, {"obstacle", "camera", "light", "material", "ground", "render"}));
   builder.settings(stage_settings_digest(shot, Stage::render))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first);
   for (const Light& light : shot.light) builder.file(light.map);
   for (const Material& material : shot.material) builder.file(material.texture);
+  add_obstacle_meshes(shot, builder);
   return builder.finish();
 }
 
@@ -120,6 +145,7 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.fluid = shot.fluid.present();
   wanted.level_set = wanted.fluid && shot.surface.level_set;
   for (const Cloth& cloth : shot.cloth) wanted.cloth.push_back(cloth.name);
+  wanted.sequence = sequence_digests(shot);
   wanted.simulate = simulate_key(shot, device_class);
   wanted.mesh = StageKeyBuilder("mesh", build_id::mesh, sections_of(shot, {"surface"}))
                     .settings(stage_settings_digest(shot, Stage::mesh))
@@ -152,12 +178,23 @@ std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
   return files;
 }
 
+InputDigests sequence_inputs(const Wanted& wanted, int first, int last) {
+  InputDigests inputs;
+  for (auto at = wanted.sequence.lower_bound(first);
+       at != wanted.sequence.end() && at->first <= last; ++at)
+    inputs.emplace_back("obstacles of frame " + std::to_string(at->first), at->second);
+  return inputs;
+}
+
 std::vector<Digest> simulation_keys(const Wanted& wanted, int last) {
   std::vector<Digest> keys;
   Digest before;
   for (int frame = wanted.first; frame <= last; ++frame) {
     Hasher hasher;
     hasher.text("simulate").digest(wanted.simulate.digest).value(frame).digest(before);
+    // A checkpoint may stand between this frame and the next.
+    for (const auto& [name, digest] : sequence_inputs(wanted, frame, frame + 1))
+      hasher.digest(digest);
     before = hasher.finish();
     keys.push_back(before);
   }

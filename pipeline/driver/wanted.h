@@ -6,6 +6,7 @@
 //   mesh(f)     = H(stage, f, digest of particles)    digests, not keys: inputs that come out the
 //   render(f)   = H(stage, f, digests of meshes)      same stop a change from spreading further
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ struct Wanted {
   bool fluid = false;              // false: nothing to mesh
   bool level_set = false;          // mesh also writes a VDB
   std::vector<std::string> cloth;  // names of the sheets
+  std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
   StageKey simulate, mesh, render, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;
 
@@ -56,11 +58,15 @@ struct Key {
   KeyParts parts;
 };
 
+/// Names and digests of files, in order.
+using InputDigests = std::vector<std::pair<std::string, Digest>>;
+/// Of what Wanted::sequence has for these frames.
+InputDigests sequence_inputs(const Wanted& wanted, int first, int last);
+
 /// Keys of frames first ... last of the simulation, in order; their parts are
 /// wanted.simulate.parts.
 std::vector<Digest> simulation_keys(const Wanted& wanted, int last);
-/// Key of a step made from files: their names and digests in order.
-using InputDigests = std::vector<std::pair<std::string, Digest>>;
+/// Key of a step made from files.
 Key step_key(const StageKey& stage, Step step, int frame, const InputDigests& inputs);
 
 }  // namespace drench

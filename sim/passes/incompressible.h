@@ -9,6 +9,7 @@
 
 #include "sim/passes/image_walls.h"
 #include "sim/passes/move.h"
+#include "sim/passes/obstacle_share.h"
 #include "sim/passes/pressure_solve.h"
 #include "sim/passes/sheet_filter.h"
 #include "sim/passes/velocity_smoothing.h"
@@ -52,6 +53,7 @@ inline void find_neighbours(State& state) {
         wall[i] = {rest * share.gradient.x, rest * share.gradient.y, rest * share.gradient.z,
                    rest * share.value};
       });
+  if (p.obstacles > 0) add_obstacle_shares(state);
   const bool sheets = state.contact.near > 0;
   if (sheets) add_sheets_to_walls(state);
   const float scale = mass / (h * h * h);

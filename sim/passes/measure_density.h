@@ -2,7 +2,7 @@
 // Density of the incompressible fluid at the positions it has, for whoever looks between steps: the
 // lists of a step belong to its predicted positions. Moves nothing and changes no order.
 
-#include "sim/passes/image_walls.h"
+#include "sim/passes/obstacle_share.h"
 #include "sim/passes/sort_particles.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -15,6 +15,8 @@ struct MeasuredDensity {
   float* density;    // kg/m^3, in the order of the state
   float support_radius, scale, rest_density;
   ImageWalls walls;
+  ObstacleShare law;
+  ObstacleViews obstacles;
 
   DRENCH_HD Inputs<3> inputs() const { return {{position.x, position.y, position.z}}; }
   template <class T>
@@ -30,7 +32,8 @@ struct MeasuredDensity {
     sum.w = sum.w + WendlandC2::shape(length2(i.position - j.position), T(support_radius));
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
-    density[order[i]] = scale * sum.w + rest_density * walls.share(position[i]).value;
+    const WallShare share = law.with(walls.share(position[i]), obstacles, position[i]);
+    density[order[i]] = scale * sum.w + rest_density * share.value;
   }
 };
 
@@ -47,7 +50,8 @@ inline void measure_density(State& state) {
       "measure: density", {f.grid, f.cell_start.data()}, f.count,
       MeasuredDensity{sorted, order, f.density.data(), p.support_radius,
                       p.particle_mass / p.lattice_sum * WendlandC2::factor(p.support_radius),
-                      p.rest_density, image_walls_of(p)});
+                      p.rest_density, image_walls_of(p), obstacle_share_of(p),
+                      state.obstacles.views()});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

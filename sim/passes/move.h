@@ -26,6 +26,12 @@ struct Mover {
     v = {u[0], u[1], u[2]};
     return {p[0], p[1], p[2]};
   }
+  DRENCH_HD Vec3<float> inside(Vec3<float> x) const {
+    float p[3] = {x.x, x.y, x.z};
+    for (int k = 0; k < 3; ++k)
+      if (wall[k]) p[k] = minimum(maximum(p[k], low[k]), high[k]);
+    return {p[0], p[1], p[2]};
+  }
 };
 
 inline Mover mover_of(const Parameters& p, float dt) {

@@ -82,6 +82,10 @@ TEST_F(ShotError, NamesWrongTypes) {
 TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
   expect_messages({
       {"[domain]\nx = \"periodic\"\n[[cloth]]\n", {"scene.toml:5", "domain.x", "cloth", "seam"}},
+      {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"sphere\"\n",
+       {"scene.toml:5", "domain.x", "obstacle", "seam"}},
+      {"[fluid]\nsolver = \"incompressible\"\n[coupling]\nscheme = \"paper\"\n[[cloth]]\n",
+       {"scene.toml:5", "fluid.solver", "paper", "weakly_compressible"}},
       // 0.08 m are less than two supports of 2.15 spacings.
       {"[fluid]\nspacing = 0.02\n[domain]\nmin = [-1, 0, 0.42]\nmax = [1, 2, 0.5]\nz = "
        "\"periodic\"\n",

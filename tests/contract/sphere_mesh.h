@@ -30,7 +30,7 @@ inline TriangleMesh unit_sphere(uint32_t rings, uint32_t segments) {
       mesh.triangle.emplace_back(at(j, i), at(j + 1, i + 1), at(j, i + 1));
     }
   }
-  mesh.velocity.resize(mesh.position.size());
+  mesh.velocity.resize(mesh.position.size(), Imath::V3f(0));
   return mesh;
 }
 

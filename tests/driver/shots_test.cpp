@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/shot_file.h"
 #include "sim/scene.h"
 
@@ -53,7 +54,8 @@ TEST(Shots, AreValidInEveryQualityLockToTheSameAndStart) {
         for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::render}) {
           EXPECT_EQ(stage_settings_digest(again, stage), stage_settings_digest(shot, stage));
         }
-        const sim::Scene scene = sim::build_scene(shot);  // checks overlaps, meshes and sources
+        const sim::Scene scene =
+            sim::build_scene(shot, make_level_set);  // checks overlaps, meshes and sources
         EXPECT_EQ(scene.sheet.size(), shot.cloth.size());
         EXPECT_TRUE(!scene.start.id.empty() || !shot.fluid.emitter.empty() || !shot.cloth.empty());
       } catch (const Error& error) {

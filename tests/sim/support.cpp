@@ -43,26 +43,30 @@ void pin_edges(Cloth& sheet) {
   sheet.pin.push_back(pin);
 }
 
-Stepper::Stepper(const Shot& shot) : Stepper(sim::build_scene(shot)) {}
+Stepper::Stepper(const Shot& shot, const LevelSetMaker& make_level_set)
+    : Stepper(sim::build_scene(shot, make_level_set)) {}
 
 Stepper::Stepper(sim::Scene scene_) : scene(std::move(scene_)) {
   solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
   solver->load(scene.start);
+  scene.obstacles.place(*solver, 0, 0);
   limits = solver->measure();
 }
 
 double Stepper::stable_dt() const { return sim::stable_step(scene.parameters, limits).dt; }
+double Stepper::next_dt() { return scene.obstacles.limit(time, stable_dt()); }
 
 void Stepper::step(double dt) {
   const double parts = std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6);
+  scene.obstacles.place(*solver, time, time + dt);
   limits = solver->step(dt, scene.cloth.vertices() > 0 ? std::max(1, int(parts)) : 1);
   time += dt, ++steps;
 }
 
 void Stepper::advance(double end) {
   while (time < end - 1e-12) {
-    const double rest = end - time;
-    step(rest / std::ceil(rest / stable_dt() - 1e-9));
+    const double rest = scene.obstacles.stop(time, end) - time;
+    step(rest / std::ceil(rest / next_dt() - 1e-9));
   }
 }
 

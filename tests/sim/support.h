@@ -33,13 +33,15 @@ struct Stepper {
   double time = 0;  // s
   int steps = 0;
 
-  explicit Stepper(const Shot& shot);
+  explicit Stepper(const Shot& shot, const LevelSetMaker& make_level_set = {});
   explicit Stepper(sim::Scene scene);
   /// The largest stable step, s.
   double stable_dt() const;
+  /// The same with obstacles moving.
+  double next_dt();
   /// One step of dt seconds; cloth is sub-stepped as its own limit asks.
   void step(double dt);
-  void step() { step(stable_dt()); }
+  void step() { step(next_dt()); }
   /// Steps of the largest stable size until `end` s.
   void advance(double end);
 };

@@ -1,0 +1,227 @@
+#include "pipeline/contract/obstacle.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <regex>
+#include <stdexcept>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/mesh_file.h"
+
+namespace drench {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+using Triangle = Imath::Vec3<uint32_t>;
+
+/// Turns the axes about x, then y, then z of the world.
+void turn(V3d (&axis)[3], const V3d& degrees) {
+  for (int k = 0; k < 3; ++k) {
+    const double angle = degrees[k] * pi / 180, c = std::cos(angle), s = std::sin(angle);
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    for (V3d& a : axis) {
+      const double u = a[i], v = a[j];
+      a[i] = c * u - s * v, a[j] = s * u + c * v;
+    }
+  }
+}
+
+/// Position of the first %d or %0Nd in a file name, and its length and digits.
+struct Field {
+  size_t at = std::string::npos, length = 0;
+  int digits = 0;
+};
+Field frame_field(const std::string& name) {
+  static const std::regex field("%(?:0([1-9]))?d");
+  std::smatch match;
+  if (!std::regex_search(name, match, field)) return {};
+  return {size_t(match.position(0)), size_t(match.length(0)),
+          match[1].matched ? std::stoi(match[1]) : 0};
+}
+
+/// Every edge belongs to as many triangles one way as the other; vertices at one place are one.
+void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
+  std::map<std::array<float, 3>, uint32_t> place;
+  std::vector<uint32_t> welded;
+  for (const V3f& p : mesh.position)
+    welded.push_back(place.try_emplace({p.x, p.y, p.z}, uint32_t(place.size())).first->second);
+  std::map<std::pair<uint32_t, uint32_t>, int> edges;
+  for (const Triangle& t : mesh.triangle) {
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t a = welded[t[c]], b = welded[t[(c + 1) % 3]];
+      if (a != b) a < b ? ++edges[{a, b}] : --edges[{b, a}];
+    }
+  }
+  const auto open =
+      std::find_if(edges.begin(), edges.end(), [](const auto& e) { return e.second != 0; });
+  if (open == edges.end() && !mesh.triangle.empty()) return;
+  if (mesh.triangle.empty())
+    throw Error(file.string() + ": has no triangles; an obstacle needs some");
+  const auto corner = [&](uint32_t of) {
+    const auto found =
+        std::find_if(place.begin(), place.end(), [&](const auto& p) { return p.second == of; });
+    return fmt::format("({:.4g}, {:.4g}, {:.4g})", found->first[0], found->first[1],
+                       found->first[2]);
+  };
+  throw Error(
+      fmt::format("{}: the mesh is not closed: the edge from {} to {} has not as many "
+                  "triangles one way as the other. An obstacle needs an inside: close its "
+                  "holes and orient it in one way",
+                  file.string(), corner(open->first.first), corner(open->first.second)));
+}
+
+void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
+  const auto first = uint32_t(mesh.position.size());
+  const V3d normal = u.cross(v).normalized();
+  for (int k = 0; k < 4; ++k) {
+    const double s = k & 1, t = k >> 1;
+    mesh.position.push_back(V3f(corner + u * s + v * t));
+    mesh.normal.push_back(V3f(normal));
+    mesh.uv.emplace_back(float(s * u.length()), float(t * v.length()));
+  }
+  mesh.triangle.emplace_back(first, first + 1, first + 3);
+  mesh.triangle.emplace_back(first, first + 3, first + 2);
+}
+
+TriangleMesh box_mesh(const V3d& size) {
+  TriangleMesh mesh;
+  for (int k = 0; k < 3; ++k) {
+    V3d u(0), v(0);
+    u[(k + 1) % 3] = size[(k + 1) % 3], v[(k + 2) % 3] = size[(k + 2) % 3];
+    V3d low = size * -0.5, high = low;
+    high[k] = -low[k];
+    add_quad(mesh, high, u, v);
+    add_quad(mesh, low, v, u);
+  }
+  return mesh;
+}
+
+TriangleMesh plane_mesh(double half) {
+  TriangleMesh mesh;
+  add_quad(mesh, V3d(-half, 0, -half), V3d(0, 0, 2 * half), V3d(2 * half, 0, 0));
+  return mesh;
+}
+
+/// By latitude and longitude; half a degree of arc is 1e-5 radii off.
+TriangleMesh sphere_mesh(double radius) {
+  constexpr int rows = 96, columns = 192;
+  TriangleMesh mesh;
+  for (int j = 0; j <= rows; ++j) {
+    for (int i = 0; i <= columns; ++i) {
+      const double theta = pi * j / rows, phi = 2 * pi * i / columns;
+      const V3d n(std::sin(theta) * std::cos(phi), std::cos(theta),
+                  -std::sin(theta) * std::sin(phi));
+      mesh.position.push_back(V3f(n * radius));
+      mesh.normal.push_back(V3f(n));
+      mesh.uv.emplace_back(float(phi * radius), float((pi - theta) * radius));
+    }
+  }
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const uint32_t a = uint32_t(j * (columns + 1) + i), b = a + columns + 1;
+      if (j > 0) mesh.triangle.emplace_back(a, b, a + 1);
+      if (j + 1 < rows) mesh.triangle.emplace_back(a + 1, b, b + 1);
+    }
+  }
+  return mesh;
+}
+
+TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+  switch (obstacle.type) {
+    case ObstacleType::plane:
+      return plane_mesh((shot.domain.max - shot.domain.min).length());
+    case ObstacleType::box:
+      return box_mesh(obstacle.size);
+    case ObstacleType::sphere:
+      return sphere_mesh(obstacle.radius);
+    case ObstacleType::mesh:
+      return read_obstacle_mesh(shot, obstacle, frame);
+  }
+  throw std::logic_error("own_mesh: no such type");
+}
+
+}  // namespace
+
+Pose obstacle_pose(const Obstacle& obstacle, double frame) {
+  Pose pose{obstacle.position.at(frame), {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)}};
+  if (obstacle.type == ObstacleType::plane) {
+    const V3d n = obstacle.normal.normalized();
+    const V3d helper = std::abs(n.y) > 0.9 ? V3d(0, 0, 1) : V3d(0, 1, 0);
+    const V3d u = n.cross(helper).normalized();
+    pose.axis[0] = u, pose.axis[1] = n, pose.axis[2] = u.cross(n);
+  }
+  turn(pose.axis, obstacle.rotation_deg.at(frame));
+  return pose;
+}
+
+bool is_sequence(const std::filesystem::path& mesh_file) {
+  return frame_field(mesh_file.filename().string()).at != std::string::npos;
+}
+
+std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame) {
+  std::string name = pattern.filename().string();
+  const Field field = frame_field(name);
+  if (field.at == std::string::npos) throw std::logic_error("sequence_file: no sequence");
+  name.replace(field.at, field.length, fmt::format("{:0{}}", frame, field.digits));
+  return pattern.parent_path() / name;
+}
+
+TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+  const bool sequence = is_sequence(obstacle.mesh_file);
+  const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
+  const std::filesystem::path file =
+      sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
+  TriangleMesh mesh = read_mesh(file);
+  check_closed(mesh, file);
+  for (V3f& p : mesh.position) p *= float(obstacle.scale);
+  return mesh;
+}
+
+TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {
+  TriangleMesh mesh = own_mesh(shot, obstacle, frame);
+  const bool deforms = obstacle.type == ObstacleType::mesh && is_sequence(obstacle.mesh_file);
+  TriangleMesh before, after;
+  if (deforms) {
+    before = read_obstacle_mesh(shot, obstacle, frame - 1);
+    after = read_obstacle_mesh(shot, obstacle, frame + 1);
+    check_same_topology(mesh, before, obstacle), check_same_topology(mesh, after, obstacle);
+  }
+  const int between =
+      std::min(frame + 1, shot.timeline.last) - std::max(frame - 1, shot.timeline.first);
+  constexpr double step = 1e-3;  // frames
+  const Pose pose = obstacle_pose(obstacle, frame), earlier = obstacle_pose(obstacle, frame - step),
+             later = obstacle_pose(obstacle, frame + step);
+  mesh.velocity.clear();
+  bool moves = false;
+  for (size_t k = 0; k < mesh.position.size(); ++k) {
+    const V3d own(mesh.position[k]);
+    V3d velocity = (later.to_world(own) - earlier.to_world(own)) / (2 * step);  // m a frame
+    if (deforms && between > 0) {
+      const V3d change = V3d(after.position[k] - before.position[k]) / between;
+      velocity += pose.to_world(change) - pose.position;
+    }
+    moves |= velocity.length2() > 0;
+    mesh.velocity.push_back(V3f(velocity * shot.timeline.fps));
+    mesh.position[k] = V3f(pose.to_world(own));
+    if (!mesh.normal.empty())
+      mesh.normal[k] = V3f(pose.to_world(V3d(mesh.normal[k])) - pose.position);
+  }
+  if (!moves) mesh.velocity.clear();
+  return mesh;
+}
+
+void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
+                         const Obstacle& obstacle) {
+  if (mesh.triangle == other.triangle && mesh.position.size() == other.position.size()) return;
+  throw Error(fmt::format(
+      "obstacle \"{}\": the files of {} do not have the same triangles in every frame, so that "
+      "there is nothing to interpolate. Export the sequence with constant topology",
+      obstacle.name, obstacle.mesh_file.string()));
+}
+
+}  // namespace drench

@@ -1,0 +1,46 @@
+#pragma once
+// Obstacles over time: where they stand and the surfaces that the renderer draws.
+
+#include <filesystem>
+
+#include "pipeline/contract/frames.h"
+#include "pipeline/contract/shot.h"
+
+namespace drench {
+
+/// A rigid placement: world = position + axis[0] x + axis[1] y + axis[2] z.
+struct Pose {
+  V3d position;  // m
+  V3d axis[3];   // unit, right-handed
+
+  V3d to_world(const V3d& own) const {
+    return position + axis[0] * own.x + axis[1] * own.y + axis[2] * own.z;
+  }
+  V3d to_own(const V3d& world) const {
+    const V3d d = world - position;
+    return {axis[0].dot(d), axis[1].dot(d), axis[2].dot(d)};
+  }
+};
+
+/// @param frame  film frame, may be fractional. A plane's own y axis is its normal.
+Pose obstacle_pose(const Obstacle& obstacle, double frame);
+
+/// Whether the name holds %d or %04d: one file for every frame.
+bool is_sequence(const std::filesystem::path& mesh_file);
+/// The file of a film frame. @throws std::logic_error if the name is no sequence.
+std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame);
+
+/// The mesh of a frame in its own coordinates, m, from the file or the file of a sequence; frames
+/// beyond the shot's are those of its ends.
+/// @throws Error if the file cannot be read or is not closed.
+TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame);
+
+/// @throws Error if two meshes of a sequence differ in more than where their vertices are.
+void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
+                         const Obstacle& obstacle);
+
+/// The surface at a film frame, world coordinates; velocities in m/s where it moves, else none. A
+/// plane is a square as wide as the domain's diagonal to each side. @throws Error as above.
+TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame);
+
+}  // namespace drench

@@ -1,0 +1,20 @@
+#pragma once
+// What a step reads of one obstacle. Host and device, both builds.
+
+namespace drench::sim {
+
+enum class ObstacleShape : int { plane, box, sphere, field };
+
+/// Lengths in m, local frame of the simulation. Index 0 is the start of a step, 1 its end.
+struct ObstaclePlacement {
+  ObstacleShape shape = ObstacleShape::plane;
+  float half[3] = {0, 0, 0};        // box: half its edges; sphere: its radius
+  float clearance = 0;              // no particle ends a step nearer
+  float centre[2][3] = {};          // where its own origin stands
+  float axis[2][9] = {};            // its own axes, one after the other
+  float blend[2] = {0, 0};          // 0 the first of its level sets .. 1 the second
+  float deform = 0;                 // how far a vertex moves between these
+  float low[3] = {}, high[3] = {};  // bounds over the step
+};
+
+}  // namespace drench::sim

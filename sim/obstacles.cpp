@@ -1,0 +1,263 @@
+#include "sim/obstacles.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "pipeline/contract/error.h"
+#include "sim/obstacle_view.h"
+#include "sim/scene.h"
+
+namespace drench::sim {
+
+namespace {
+
+constexpr double voxel = 0.5, band = 2.0;  // of level sets, in spacings
+constexpr double far_off = 1e30;
+
+void bound(const TriangleMesh& mesh, V3d& low, V3d& high) {
+  for (const V3f& p : mesh.position) {
+    for (int k = 0; k < 3; ++k)
+      low[k] = std::min(low[k], double(p[k])), high[k] = std::max(high[k], double(p[k]));
+  }
+}
+
+V3d corner_of(const V3d& low, const V3d& high, int corner) {
+  return {corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y, corner & 4 ? high.z : low.z};
+}
+
+/// Speed of rigid motion is greatest at a corner of the bounds.
+double corner_travel(const Obstacle& obstacle, const V3d& low, const V3d& high, double begin,
+                     double end) {
+  const Pose from = obstacle_pose(obstacle, begin), to = obstacle_pose(obstacle, end);
+  double farthest = 0;
+  for (int c = 0; c < 8; ++c) {
+    const V3d own = corner_of(low, high, c);
+    farthest = std::max(farthest, (to.to_world(own) - from.to_world(own)).length());
+  }
+  return farthest;
+}
+
+TriangleMesh mixed(const TriangleMesh& a, const TriangleMesh& b, double share) {
+  TriangleMesh mesh = a;
+  for (size_t k = 0; k < mesh.position.size(); ++k)
+    mesh.position[k] = V3f(V3d(a.position[k]) * (1 - share) + V3d(b.position[k]) * share);
+  return mesh;
+}
+
+cpu::FieldView host_view(const LevelSet& set) {
+  cpu::FieldView view = cpu::field_view(set);
+  view.block = set.block.data(), view.value = set.value.data();
+  return view;
+}
+
+bool moves(const Obstacle& obstacle) {
+  return obstacle.position.keys.size() > 1 || obstacle.rotation_deg.keys.size() > 1;
+}
+
+}  // namespace
+
+ObstacleSet::ObstacleSet(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set)
+    : shot_(shot),
+      origin_(frame.origin[0], frame.origin[1], frame.origin[2]),
+      snap_(frame.spacing / (1 << 20)),
+      make_level_set_(std::move(make_level_set)) {
+  for (const Obstacle& obstacle : shot.obstacle) {
+    Entry entry{obstacle, false, V3d(0), V3d(0), {}, {}, {}, {}};
+    entry.high = obstacle.type == ObstacleType::box ? obstacle.size * 0.5 : V3d(obstacle.radius);
+    if (obstacle.type == ObstacleType::plane) {  // what of it the domain may hold
+      entry.high = V3d((shot.domain.max - shot.domain.min).length());
+    }
+    entry.low = -entry.high;
+    if (obstacle.type == ObstacleType::mesh) {
+      if (!make_level_set_) throw std::logic_error("ObstacleSet: a mesh, but no make_level_set");
+      entry.deforms = is_sequence(obstacle.mesh_file);
+      read_meshes(entry, shot.timeline.first);
+    }
+    obstacle_.push_back(std::move(entry));
+  }
+}
+
+void ObstacleSet::read_meshes(Entry& entry, int frame) {
+  const Obstacle& o = entry.obstacle;
+  if (entry.mesh_frame && (*entry.mesh_frame == frame || !entry.deforms)) return;
+  if (entry.mesh_frame && *entry.mesh_frame + 1 == frame) {
+    entry.before = std::move(entry.after);
+  } else {
+    entry.before = read_obstacle_mesh(shot_, o, frame);
+  }
+  if (entry.deforms) {
+    entry.after = read_obstacle_mesh(shot_, o, frame + 1);
+    check_same_topology(entry.before, entry.after, o);
+  }
+  entry.mesh_frame = frame;
+  entry.low = V3d(far_off), entry.high = V3d(-far_off);
+  bound(entry.before, entry.low, entry.high);
+  bound(entry.after, entry.low, entry.high);
+}
+
+LevelSet ObstacleSet::level_set(const Entry& entry, const TriangleMesh& mesh) const {
+  const double a = shot_.fluid.spacing;
+  const V3d size = entry.high - entry.low;
+  const double most = 8.0 * (1 << 16) * voxel * a;  // 65536 blocks
+  if (std::max({size.x, size.y, size.z}) > most) {
+    throw Error(
+        fmt::format("obstacle \"{}\": the mesh is {:.3g} m long, more than fluid.spacing "
+                    "= {} m allows ({:.3g} m). Use a smaller scale or a larger spacing",
+                    entry.obstacle.name, std::max({size.x, size.y, size.z}), a, most));
+  }
+  return make_level_set_(mesh, voxel * a, band * a);
+}
+
+const ObstacleSet::Bracket& ObstacleSet::bracket_at(Entry& entry, double frame) {
+  frame += 1e-9;  // what lands on the end of one begins the next, whatever the rounding
+  std::optional<Bracket>& now = entry.bracket;
+  if (now && (!entry.deforms || (frame >= now->begin && frame < now->end))) return *now;
+  if (!entry.deforms) {
+    now.emplace();
+    now->begin = -far_off, now->end = far_off;
+    now->set[0] = level_set(entry, entry.before);
+    return *now;
+  }
+  const int whole = int(std::floor(frame));
+  read_meshes(entry, whole);
+  double farthest = 0;
+  for (size_t k = 0; k < entry.before.position.size(); ++k) {
+    farthest =
+        std::max(farthest, double((entry.after.position[k] - entry.before.position[k]).length()));
+  }
+  const double parts = std::clamp(std::ceil(farthest / shot_.fluid.spacing), 1.0, 256.0);
+  const double part = std::min(std::floor((frame - whole) * parts), parts - 1);
+  Bracket next;
+  next.begin = whole + part / parts,
+  next.end = part + 1 < parts ? whole + (part + 1) / parts : whole + 1;
+  next.travel = farthest / parts;
+  if (now && now->end == next.begin) {
+    next.set[0] = std::move(now->set[1]);
+  } else {
+    next.set[0] = level_set(entry, mixed(entry.before, entry.after, part / parts));
+  }
+  next.set[1] = level_set(entry, mixed(entry.before, entry.after, (part + 1) / parts));
+  now = std::move(next);
+  return *now;
+}
+
+double ObstacleSet::travel(Entry& entry, double begin, double end) {
+  double farthest = 0;
+  if (entry.deforms) {
+    const Bracket& bracket = bracket_at(entry, begin);
+    farthest = bracket.travel * (end - begin) / (bracket.end - bracket.begin);
+  }
+  if (!moves(entry.obstacle)) return farthest;
+  return farthest + corner_travel(entry.obstacle, entry.low, entry.high, begin, end);
+}
+
+double ObstacleSet::stop(double time, double end) {
+  const Timeline& t = shot_.timeline;
+  for (Entry& entry : obstacle_) {
+    if (entry.deforms)
+      end = std::min(end, (bracket_at(entry, film_frame(time)).end - t.first) / t.fps);
+  }
+  return end;
+}
+
+double ObstacleSet::limit(double time, double dt) {
+  const double most = 0.4 * shot_.fluid.spacing;
+  for (Entry& entry : obstacle_) {
+    if (!entry.deforms && !moves(entry.obstacle)) continue;
+    const double begin = film_frame(time);
+    for (int tries = 0; tries < 40; ++tries) {  // a shorter step may have another mean speed
+      const double moved = travel(entry, begin, film_frame(time + dt));
+      if (moved <= most) break;
+      dt *= std::max(0.5, 0.999 * most / moved);
+    }
+  }
+  return dt;
+}
+
+double ObstacleSet::fastest() const {
+  double speed = 0;
+  for (const Entry& entry : obstacle_) {
+    if (!moves(entry.obstacle)) continue;
+    constexpr double part = 0.25;  // frames
+    for (double f = shot_.timeline.first; f < shot_.timeline.last; f += part) {
+      const double moved = corner_travel(entry.obstacle, entry.low, entry.high, f, f + part);
+      speed = std::max(speed, moved / part * shot_.timeline.fps);
+    }
+  }
+  return speed;
+}
+
+ObstaclePlacement ObstacleSet::placement(Entry& entry, double begin, double end) {
+  const Obstacle& o = entry.obstacle;
+  ObstaclePlacement p;
+  p.shape = ObstacleShape(int(o.type));
+  for (int k = 0; k < 3; ++k) p.half[k] = float(entry.high[k]);
+  // A level set has convex corners rounded off by up to half a voxel.
+  const bool field = p.shape == ObstacleShape::field;
+  p.clearance = float((field ? 0.5 * voxel : 0.1) * shot_.fluid.spacing);
+  if (entry.deforms) {
+    const Bracket& bracket = *entry.bracket;
+    const double length = bracket.end - bracket.begin;
+    p.deform = float(bracket.travel);
+    p.blend[0] = float(std::clamp((begin - bracket.begin) / length, 0.0, 1.0));
+    p.blend[1] = float(std::clamp((end - bracket.begin) / length, 0.0, 1.0));
+  }
+  V3d low(far_off), high(-far_off);
+  for (int when = 0; when < 2; ++when) {
+    const Pose pose = obstacle_pose(o, when ? end : begin);
+    for (int k = 0; k < 3; ++k) {
+      const double local = pose.position[k] - origin_[k];
+      p.centre[when][k] = float(std::round(local / snap_) * snap_);
+      for (int c = 0; c < 3; ++c) p.axis[when][3 * k + c] = float(pose.axis[k][c]);
+    }
+    for (int c = 0; c < 8; ++c) {
+      const V3d at = pose.to_world(corner_of(entry.low, entry.high, c)) - origin_;
+      for (int k = 0; k < 3; ++k)
+        low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    const bool everywhere = o.type == ObstacleType::plane;
+    p.low[k] = float(everywhere ? -far_off : low[k] - 0.01 * shot_.fluid.spacing);
+    p.high[k] = float(everywhere ? far_off : high[k] + 0.01 * shot_.fluid.spacing);
+  }
+  return p;
+}
+
+void ObstacleSet::place(Solver& solver, double start, double end) {
+  std::vector<ObstaclePlacement> all;
+  for (size_t k = 0; k < obstacle_.size(); ++k) {
+    Entry& entry = obstacle_[k];
+    const double begin = film_frame(start);
+    if (entry.obstacle.type == ObstacleType::mesh) {
+      bracket_at(entry, begin);
+      for (int s = 0; s < 2 && !entry.bracket->loaded; ++s)
+        solver.load_level_set(int(k), s, entry.bracket->set[entry.deforms ? s : 0]);
+      entry.bracket->loaded = true;
+    }
+    all.push_back(placement(entry, begin, film_frame(end)));
+  }
+  if (!all.empty()) solver.place_obstacles(all);
+}
+
+double ObstacleSet::distance(const V3d& point, double time) {
+  const double frame = film_frame(time);
+  double least = far_off;
+  for (Entry& entry : obstacle_) {
+    if (entry.obstacle.type == ObstacleType::mesh) bracket_at(entry, frame);
+    cpu::ObstacleView view{placement(entry, frame, frame), {}};
+    if (entry.bracket) {
+      view.field[0] = host_view(entry.bracket->set[0]);
+      view.field[1] = host_view(entry.bracket->set[entry.deforms ? 1 : 0]);
+    }
+    const V3d own = obstacle_pose(entry.obstacle, frame).to_own(point);
+    least = std::min(
+        least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
+  }
+  return least;
+}
+
+}  // namespace drench::sim

@@ -1,0 +1,68 @@
+#pragma once
+// The obstacles of a shot over time, for the solver: placements of a step, level sets of meshes.
+
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/obstacle.h"
+#include "sim/solver.h"
+
+namespace drench::sim {
+
+struct LocalFrame;
+
+class ObstacleSet {
+ public:
+  ObstacleSet() = default;
+  /// @param make_level_set  of drench_vdb; needed only if there are meshes.
+  /// @throws Error if a mesh cannot be read, is not closed, or is too fine.
+  ObstacleSet(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set);
+
+  int count() const { return int(obstacle_.size()); }
+  /// Tells the solver where the obstacles are from `start` to `end`, s since the first frame, and
+  /// gives it the level sets that it does not have yet. A step must not cross a stop.
+  void place(Solver& solver, double start, double end);
+  /// The first time after `time` that a step has to land on, at most `end`, s: where a deforming
+  /// mesh changes its level sets.
+  double stop(double time, double end);
+  /// The longest step from `time` on in which no surface moves farther than 0.4 spacings, at most
+  /// dt, s.
+  double limit(double time, double dt);
+  /// Signed distance of the nearest obstacle at `time`, m; 1e30 where none is near. World.
+  double distance(const V3d& point, double time);
+  /// The largest speed of a surface by its keys, m/s: what a shot is to be ready for.
+  double fastest() const;
+
+ private:
+  /// Level sets of a deforming mesh at two times between which its vertices move by less than a
+  /// spacing, both in its own frame; of a rigid one there is the first only.
+  struct Bracket {
+    double begin = 0, end = 0;  // film frames
+    LevelSet set[2];
+    double travel = 0;  // m, farthest vertex
+    bool loaded = false;
+  };
+  struct Entry {
+    Obstacle obstacle;
+    bool deforms = false;
+    V3d low, high;               // own coordinates; of a sequence as of the bracket
+    TriangleMesh before, after;  // of a sequence: frame mesh_frame and the next
+    std::optional<int> mesh_frame;
+    std::optional<Bracket> bracket;
+  };
+
+  double film_frame(double time) const { return shot_.timeline.first + time * shot_.timeline.fps; }
+  void read_meshes(Entry& entry, int frame);
+  const Bracket& bracket_at(Entry& entry, double frame);
+  LevelSet level_set(const Entry& entry, const TriangleMesh& mesh) const;
+  double travel(Entry& entry, double begin, double end);
+  ObstaclePlacement placement(Entry& entry, double begin, double end);
+
+  Shot shot_;
+  V3d origin_{0};
+  double snap_ = 1;  // m
+  LevelSetMaker make_level_set_;
+  std::vector<Entry> obstacle_;
+};
+
+}  // namespace drench::sim

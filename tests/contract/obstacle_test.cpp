@@ -1,0 +1,161 @@
+// Obstacles of a shot: where they stand, what is drawn of them, their files and level sets.
+
+#include "pipeline/contract/obstacle.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/shot_file.h"
+#include "tests/contract/sphere_mesh.h"
+#include "tests/temporary_folder.h"
+
+namespace drench {
+namespace {
+
+using test::TemporaryFolder;
+
+constexpr const char* water =
+    "[fluid]\nspacing = 0.02\n[[fluid.box]]\nmin = [0, 0, 0]\nmax = [0.1, 0.1, 0.1]\n";
+
+Shot shot_of(const std::string& text, const std::filesystem::path& folder = ".") {
+  return parse_shot(water + text, folder / "scene.toml");
+}
+
+std::string error_of(const std::string& text) {
+  try {
+    shot_of(text);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ObstacleShot, LocksToTheSame) {
+  const TemporaryFolder folder;
+  write_mesh(folder / "ball.ply", test::unit_sphere(6, 8));
+  const Shot shot = shot_of(
+      "[[obstacle]]\ntype = \"plane\"\nnormal = [1, 1, 0]\n"
+      "[[obstacle]]\ntype = \"box\"\nname = \"door\"\nsize = [1, 2, 3]\ninterp = \"smooth\"\n"
+      "position = [[1001, [0, 0, 0]], [1010.5, [1, 0, 0]]]\nrotation_deg = [[1001, [0, 0, 0]], "
+      "[1048, [0, 720, 0]]]\n"
+      "[[obstacle]]\ntype = \"sphere\"\nradius = 0.25\nvisible = false\n"
+      "[[obstacle]]\ntype = \"mesh\"\nmesh = \"ball.ply\"\nscale = 0.1\n",
+      folder.path());
+  ASSERT_EQ(shot.obstacle.size(), 4u);
+  EXPECT_EQ(shot.obstacle[2].name, "obstacle3");
+  EXPECT_EQ(shot.obstacle[1].rotation_deg.interpolation, Interpolation::smooth);
+  EXPECT_EQ(shot_lock(parse_shot(shot_lock(shot), "shot.lock.toml")), shot_lock(shot));
+}
+
+TEST(ObstacleShot, SaysWhatCannotBe) {
+  const std::string box = "[[obstacle]]\ntype = \"box\"\n";
+  EXPECT_NE(error_of(box + "[[cloth]]\n").find("cloth with obstacles is not supported yet"),
+            std::string::npos);
+  EXPECT_NE(error_of("[[obstacle]]\ntype = \"box\"\nradius = 1\n").find("type sphere"),
+            std::string::npos);
+  EXPECT_NE(error_of("[[obstacle]]\ntype = \"mesh\"\n").find("mesh is missing"), std::string::npos);
+  EXPECT_NE(error_of(box + "interp = \"step\"\n").find("one of \"linear\", \"smooth\""),
+            std::string::npos);
+  EXPECT_NE(error_of(box + "material = \"water\"\n").find("an obstacle cannot have"),
+            std::string::npos);
+  EXPECT_NE(error_of("[[obstacle]]\ntype = \"mesh\"\nmesh = \"no.%04d.ply\"\n").find("no.1001.ply"),
+            std::string::npos);
+  EXPECT_NE(error_of("[[obstacle]]\ntype = \"plane\"\nnormal = [0, 0, 0]\n").find("no direction"),
+            std::string::npos);
+}
+
+// About x first, then y, then z: the x axis turned by 90 degrees about y looks along -z, and that
+// stays when z turns; the y axis by 90 about x looks along z, then along x, then along y.
+TEST(ObstaclePose, TurnsAboutXThenYThenZ) {
+  Obstacle box;
+  box.position = V3d(1, 2, 3), box.rotation_deg = V3d(90, 90, 90);
+  const Pose pose = obstacle_pose(box, 1001);
+  EXPECT_LT((pose.axis[0] - V3d(0, 0, -1)).length(), 1e-12);
+  EXPECT_LT((pose.axis[1] - V3d(0, 1, 0)).length(), 1e-12);
+  EXPECT_LT((pose.to_own(pose.to_world(V3d(0.3, -2, 7))) - V3d(0.3, -2, 7)).length(), 1e-12);
+}
+
+// Between keys by frame, held before the first and after the last.
+TEST(ObstaclePose, FollowsItsKeys) {
+  Obstacle box;
+  box.position.keys = {{1001, V3d(0)}, {1011, V3d(1, 0, 0)}};
+  box.rotation_deg.keys = {{1001, V3d(0)}, {1011, V3d(0, 0, 720)}};
+  EXPECT_DOUBLE_EQ(obstacle_pose(box, 990).position.x, 0);
+  EXPECT_DOUBLE_EQ(obstacle_pose(box, 1003.5).position.x, 0.25);
+  EXPECT_DOUBLE_EQ(obstacle_pose(box, 1012).position.x, 1);
+  EXPECT_LT((obstacle_pose(box, 1003.5).axis[0] - V3d(-1, 0, 0)).length(), 1e-12);
+  box.position.interpolation = Interpolation::smooth;
+  EXPECT_DOUBLE_EQ(obstacle_pose(box, 1003.5).position.x, 3. / 16 - 2. / 64);
+}
+
+double volume_of(const TriangleMesh& mesh) {
+  double six = 0;
+  for (const auto& t : mesh.triangle)
+    six += V3d(mesh.position[t.x]).dot(V3d(mesh.position[t.y]).cross(V3d(mesh.position[t.z])));
+  return six / 6;
+}
+
+// What is drawn is what is simulated: volumes by the divergence theorem, velocity of a turning
+// body omega x r.
+TEST(ObstacleSurface, IsClosedOutwardAndMovesAsItsKeysSay) {
+  Shot shot = shot_of(
+      "[[obstacle]]\ntype = \"box\"\nsize = [1, 2, 3]\n"
+      "rotation_deg = [[1001, [0, 0, 0]], [1025, [0, 0, 90]]]\n"
+      "[[obstacle]]\ntype = \"sphere\"\nradius = 0.5\n");
+  const TriangleMesh box = obstacle_surface(shot, shot.obstacle[0], 1013);
+  EXPECT_NEAR(volume_of(box), 6, 1e-5);
+  const double omega = M_PI / 2;  // a quarter turn in 24 frames, one second
+  ASSERT_EQ(box.velocity.size(), box.position.size());
+  for (size_t k = 0; k < box.position.size(); ++k) {
+    const V3f p = box.position[k];
+    EXPECT_LT((box.velocity[k] - V3f(float(-omega * p.y), float(omega * p.x), 0)).length(), 1e-4);
+    EXPECT_NEAR(box.normal[k].length(), 1, 1e-6);
+  }
+  const TriangleMesh ball = obstacle_surface(shot, shot.obstacle[1], 1013);
+  EXPECT_NEAR(volume_of(ball), M_PI / 6, 1e-3 * M_PI / 6);
+  EXPECT_TRUE(ball.velocity.empty());
+}
+
+TriangleMesh moved(TriangleMesh mesh, const V3f& by) {
+  for (V3f& p : mesh.position) p += by;
+  return mesh;
+}
+
+TEST(ObstacleSequence, HasAFileForEveryFrameAndVelocityBetweenThem) {
+  const TemporaryFolder folder;
+  for (int frame = 1001; frame <= 1004; ++frame) {
+    const auto d = float(frame - 1001);
+    write_mesh(folder / ("ball." + std::to_string(frame) + ".ply"),
+               moved(test::unit_sphere(6, 8), V3f(0.1f * d * d, 0, 0)));
+  }
+  const Shot shot = shot_of(
+      "[shot]\nframes = [1001, 1004]\n[[obstacle]]\ntype = \"mesh\"\n"
+      "mesh = \"ball.%04d.ply\"\n",
+      folder.path());
+  const Obstacle& ball = shot.obstacle[0];
+  // (0.9 - 0.1) / 2 a frame at 1003, one-sided 0.1 at 1001; 24 frames a second.
+  EXPECT_NEAR(obstacle_surface(shot, ball, 1003).velocity[5].x, 0.4 * 24, 1e-3);
+  EXPECT_NEAR(obstacle_surface(shot, ball, 1001).velocity[5].x, 0.1 * 24, 1e-3);
+  write_mesh(folder / "ball.1003.ply", test::unit_sphere(6, 9));
+  EXPECT_THROW(obstacle_surface(shot, ball, 1003), Error);
+}
+
+TEST(ObstacleMesh, MustBeClosed) {
+  const TemporaryFolder folder;
+  TriangleMesh open = test::unit_sphere(6, 8);
+  open.triangle.pop_back();
+  write_mesh(folder / "open.ply", open);
+  const Shot shot = shot_of("[[obstacle]]\ntype = \"mesh\"\nmesh = \"open.ply\"\n", folder.path());
+  try {
+    read_obstacle_mesh(shot, shot.obstacle[0], 1001);
+    ADD_FAILURE() << "an open mesh was taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("not closed"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace drench

@@ -1,0 +1,38 @@
+#pragma once
+// Scenes with obstacles and what is measured in them, outside the solver and in double.
+
+#include <functional>
+
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+
+Obstacle& add_obstacle(Shot& shot, ObstacleType type, V3d position);
+void add_plane(Shot& shot, V3d point, V3d normal);
+void add_sphere(Shot& shot, V3d centre, double radius);
+
+/// Water 8 x `layers` x 8 particles that fills a walled tank of 8 x 2 layers x 8 from below.
+Shot tank_shot(int layers);
+
+/// Signed distance by the shape's definition, m; negative inside.
+double exact_distance(const Obstacle& obstacle, double frame, const V3d& world);
+/// Particles inside any obstacle or beyond a wall at `time`.
+int particles_inside(const Shot& shot, Stepper& run);
+
+struct Settled {
+  V3d centre;                // of mass, in the tank's frame, spacings
+  double kinetic = 0;        // energy over rho g h volume
+  double density_error = 0;  // mean |rho / rho_0 - 1| a support below the surface
+  int outside = 0;
+};
+Settled settle_in_tilted_gravity(double degrees, double seconds);
+Settled settle_in_tilted_tank(double degrees, double seconds);
+
+struct Lift {
+  double error = 0;     // of the mean vertical force over the displaced weight
+  double sideways = 0;  // of the mean horizontal one over it
+};
+/// A body of this radius or half edge, in spacings, held in the middle of a pool.
+Lift lift_of(ObstacleType type, double spacings);
+
+}  // namespace drench::sim_tests
