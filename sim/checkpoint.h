@@ -16,6 +16,7 @@ struct Checkpoint {
   int next_id = 0;
   std::vector<uint64_t> emitted;  // layers that left each emitter
   HostState state;
+  std::vector<double> probes;  // rows so far, ProbeSeries
   Digest layout;  // of the shot's settings and the file's layout
 };
 

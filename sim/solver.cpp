@@ -6,6 +6,7 @@
 #include <map>
 
 #include "sim/passes/measure_density.h"
+#include "sim/passes/probe.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -146,6 +147,9 @@ class BackendSolver : public Solver {
   }
 
   Limits measure() override { return measure_limits(state_); }
+  std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) override {
+    return probe_states(state_, queries);
+  }
 
   std::vector<PassInfo> plan() const override {
     std::vector<PassInfo> info;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sim/parameters.h"
+#include "sim/probe_query.h"
 
 namespace drench::sim {
 
@@ -86,6 +87,10 @@ class Solver {
   virtual void refresh() = 0;
   /// Limits of a state that no step has made yet.
   virtual Limits measure() = 0;
+  /// Answers to probes, in their order, of the state as step() has just left it; of a state that no
+  /// step has made yet only those that ask for no pressure or force. Changes no bit of a later
+  /// step. What the numbers are: sim/probe_query.h.
+  virtual std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) = 0;
   virtual std::vector<PassInfo> plan() const = 0;
   virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
   virtual int particles() const = 0;

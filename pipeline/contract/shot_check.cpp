@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/probe_check.h"
 
 namespace drench {
 
@@ -30,6 +31,7 @@ class Checker {
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
     check_names();
+    check_probes(shot_, sources_);
     if (!shot_.fluid.present() && shot_.cloth.empty()) {
       fail("fluid",
            "the shot has neither fluid nor cloth, so there is nothing to simulate; add a "
@@ -281,6 +283,7 @@ class Checker {
 
   void check_names() const {
     check_distinct(shot_.cloth, "cloth");
+    check_distinct(shot_.probe, "probe");
     check_distinct(shot_.light, "light");
     check_distinct(shot_.material, "material");
   }
