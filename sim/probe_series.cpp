@@ -121,7 +121,7 @@ void put(float (&to)[3], const V3d& from) {
 }  // namespace
 
 ProbeSeries::ProbeSeries(const Shot& shot, const Scene& scene)
-    : shot_(shot.name), frame_(scene.frame), particle_volume_(std::pow(shot.fluid.spacing, 3)) {
+    : shot_(shot.name), frame_(scene.frame), spacing_(shot.fluid.spacing) {
   for (const Probe& probe : shot.probe) add(probe, shot, scene);
 }
 
@@ -181,7 +181,7 @@ std::vector<double> ProbeSeries::values_of(const Series& series,
       values.push_back(answer[0] + answer[1] + answer[2]);
       break;
     case ProbeType::volume:
-      values = {answer[0], answer[0] * particle_volume_};
+      values = {answer[0], answer[0] * spacing_ * spacing_ * spacing_};
       for (int k = 0; k < 3; ++k) values.push_back(answer[size_t(k) + 1] + frame_.origin[k]);
       values.push_back(answer[4]);
       break;
@@ -269,17 +269,17 @@ std::string ProbeSeries::definition(const Series& series) const {
           q.kind == ProbeKind::wall_pressure
               ? "force of the fluid on the wall over area, for"
               : "stress along the normal, fluid-free parts counting as 0, in",
-          q.radius, vector(p.position), vector(p.normal.normalized()), q.rim, window());
+          std::max(p.radius, spacing_), vector(p.position), vector(p.normal.normalized()), spacing_,
+          window());
     case ProbeKind::wall_force:
       return fmt::format("force of the fluid on the domain wall {}{}", p.target, window());
     case ProbeKind::cloth_force:
       return fmt::format("force of the fluid on the sheet \"{}\"{}", p.target, window());
     case ProbeKind::vertex:
-      return fmt::format(
-          "displacement of a vertex of \"{}\" from its rest place {} m", p.cloth,
-          vector(V3d(frame_.to_world(0, float(series.rest.x)),
-                     frame_.to_world(1, float(series.rest.y)),
-                     frame_.to_world(2, float(series.rest.z)))));
+      return fmt::format("displacement of a vertex of \"{}\" from its rest place {} m", p.cloth,
+                         vector(V3d(frame_.to_world(0, float(series.rest.x)),
+                                    frame_.to_world(1, float(series.rest.y)),
+                                    frame_.to_world(2, float(series.rest.z)))));
     case ProbeKind::energy:
       return fmt::format(
           "kinetic and potential energy of fluid and cloth and energy of the cloth's springs; "

@@ -48,7 +48,7 @@ class ProbeSeries {
 
   std::string shot_;
   LocalFrame frame_;
-  double particle_volume_ = 0;  // m^3
+  double spacing_ = 0;  // m
   std::vector<Series> series_;
   std::vector<ProbeQuery> queries_;
   size_t width_ = 1;

@@ -75,7 +75,7 @@ struct Simulator::Implementation {
     next_id = int(scene.start.id.size());
     solver->load(scene.start);
     limits = solver->measure();
-    time = -shot.preroll;
+    time = 0 - shot.preroll;  // no -0
     solver->refresh();
     probes.start(time, *solver);
   }
@@ -290,7 +290,7 @@ std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps, s.next_id,
+  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps,         s.next_id,
                              s.emitted, s.solver->save(), s.probes.rows(), s.layout};
   checkpoint.state.limits = s.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);

@@ -82,10 +82,10 @@ class ProbeChecker {
     const Cloth& cloth = check_sheet("cloth", probe_.cloth, "a sheet");
     const double vertices = (cloth.cells.x + 1.0) * (cloth.cells.y + 1.0);
     if (!cloth.mesh_file.empty() || probe_.vertex < vertices) return;
-    fail("vertex", fmt::format("{}.vertex is {}, but the {} x {} grid of \"{}\" has vertices 0 to "
-                               "{:.0f}. Use one of these, or position",
-                               path_, probe_.vertex, cloth.cells.x, cloth.cells.y, cloth.name,
-                               vertices - 1));
+    fail("vertex",
+         fmt::format("{}.vertex is {}, but the {} x {} grid of \"{}\" has vertices 0 to "
+                     "{:.0f}. Use one of these, or position",
+                     path_, probe_.vertex, cloth.cells.x, cloth.cells.y, cloth.name, vertices - 1));
   }
 
   const Cloth& check_sheet(const char* key, const std::string& name, const char* wanted) const {

@@ -31,11 +31,10 @@ inline double wall_pressure(const State& state, const ProbeQuery& query) {
 /// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
 inline double inner_pressure(const State& state, const ProbeQuery& query) {
   const FluidState& f = state.fluid;
-  const Totals<1> sum = parallel_reduce("probe: pressure", f.count, Totals<1>{},
-                                        InnerSensor{step_pressure_of(state),
-                                                    soft_disc_of(query),
-                                                    {f.grid, f.cell_start.data()}},
-                                        AddTotals<1>{});
+  const Totals<1> sum = parallel_reduce(
+      "probe: pressure", f.count, Totals<1>{},
+      InnerSensor{step_pressure_of(state), soft_disc_of(query), {f.grid, f.cell_start.data()}},
+      AddTotals<1>{});
   return sum.value[0] / query.extent;
 }
 

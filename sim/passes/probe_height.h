@@ -57,7 +57,7 @@ struct HalfDensity {
   bool walls;
   float operator()(float y) const {
     if (!walls) return half;
-    if (y < low) return 1e30f;  // there is no fluid
+    if (y < low || y > high) return 1e30f;  // there is no fluid
     return half * (1.f - WendlandC2::halfspace(minimum((y - low) / h, 1.f)) -
                    WendlandC2::halfspace(minimum((high - y) / h, 1.f)));
   }
@@ -82,14 +82,13 @@ inline double surface_height(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
   const HalfDensity enough = half_density(p, query);
   const float h = p.support_radius;
-  LineDensity line{state.fluid.position.view(), query.place[0],
-                   query.place[2],              1e30f,
-                   0.25f * h,                   h,
-                   p.particle_mass / (h * h * h)};
+  LineDensity line{
+      state.fluid.position.view(),  query.place[0], query.place[2], 1e30f, 0.25f * h, h,
+      p.particle_mass / (h * h * h)};
   bool fine = false;
   while (true) {
-    const LineSamples s = parallel_reduce("probe: height", state.fluid.count, LineSamples{}, line,
-                                          AddLineSamples{});
+    const LineSamples s =
+        parallel_reduce("probe: height", state.fluid.count, LineSamples{}, line, AddLineSamples{});
     int k = 0;
     while (k < height_samples && s.density[k] < enough(line.from - float(k) * line.step)) ++k;
     if (k < height_samples && fine) {

@@ -29,9 +29,9 @@ std::vector<double> to_vector(const Totals<N>& sum) {
 
 /// What pushed the particles in the step just made, of either solver.
 struct StepPressure {
-  VecView position, velocity;
-  const float *term, *inverse_density;  // q; 1 / rho, weakly compressible only
-  const Float4 *place, *wall;           // of the incompressible solver's solve, else null
+  VecView position, velocity, acceleration;  // the last one weakly compressible only
+  const float *term, *inverse_density;       // q; 1 / rho, weakly compressible only
+  const Float4 *place, *wall;                // of the incompressible solver's solve, else null
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
   Walls walls;
 
@@ -73,6 +73,7 @@ inline StepPressure step_pressure_of(const State& state) {
   const float h = p.support_radius, h4 = h * h * h * h;
   StepPressure s{f.position.view(),
                  f.velocity.view(),
+                 f.acceleration.view(),
                  f.pressure_term.data(),
                  projected ? nullptr : f.inverse_density.data(),
                  projected ? state.pressure.place.data() : nullptr,
@@ -127,8 +128,9 @@ struct WallForce {
     return step.mass * step.wall_viscosity * share * inverse_rho * inverse_rho;
   }
   DRENCH_HD Totals<3> operator()(int i) const {
-    const Vec3<float> v = step.velocity[i];
     const float push = normal(i), pull = drag(i);
+    Vec3<float> v{0.f, 0.f, 0.f};  // that the step started with
+    if (pull > 0.f) v = step.velocity[i] - step.acceleration[i] * step.dt;
     return {{wall.axis == 0 ? push : pull * v.x, wall.axis == 1 ? push : pull * v.y,
              wall.axis == 2 ? push : pull * v.z}};
   }
