@@ -263,6 +263,11 @@ void Executor::produce(int frame) {
 void Executor::write_probes(int frame) {
   if (!decide_probes(wanted_, frame, lookup_).make) return;
   std::vector<WrittenFile> files;
+  // The records first: a kill in between leaves files that nothing trusts and the next run
+  // replaces.
+  for (const std::string& file : probe_files(wanted_)) {
+    if (manifest_.find(file)) manifest_.drop(file);
+  }
   compute(simulate_arena_, [&] { files = simulation_->write_probes(folder_); });
   commit(files, probe_step, frame,
          {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});

@@ -67,8 +67,9 @@ class StageKeyBuilder {
 };
 
 StageKey simulate_key(const Shot& shot, const std::string& device_class) {
-  StageKeyBuilder builder("simulate", build_id::simulate,
-                          sections_of(shot, {"shot", "domain", "fluid", "cloth", "coupling", "probe"}));
+  StageKeyBuilder builder(
+      "simulate", build_id::simulate,
+      sections_of(shot, {"shot", "domain", "fluid", "cloth", "coupling", "probe"}));
   builder.settings(stage_settings_digest(shot, Stage::simulate))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first)
