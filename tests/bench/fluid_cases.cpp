@@ -177,11 +177,12 @@ void lobovsky(const Emit& emit) {
     line.resolution = std::to_string(result.particles) + " particles, " + std::to_string(across) +
                       " over the column's height";
     line.threads = hardware_threads();
-    line.error = std::abs(result.plateau), line.gate = 0.15;
-    line.error_of = "relative error of the pressure after the impact";
-    line.more["impact_time"] = result.time;
+    line.error = std::abs(result.time), line.gate = 0.03;
+    line.error_of = "relative error of the time of impact";
+    line.more["impulse"] = result.impulse;
     line.more["peak"] = result.peak;
-    line.more["plateau"] = result.wall;
+    line.more["plateau"] = result.plateau;
+    line.more["plateau_P"] = result.wall;
     emit(line);
   }
 }

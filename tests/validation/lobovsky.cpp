@@ -81,7 +81,9 @@ Impact lobovsky(int across, double tolerance) {
     signal.pressure.push_back(std::isnan(p) ? 0 : p / (997 * g * depth));
   const Signal data = measured();
   Impact impact;
-  impact.time = signal.first_past(0.5) / data.first_past(0.5) - 1;
+  const double hit = signal.first_past(0.5), expected = data.first_past(0.5);
+  impact.time = hit / expected - 1;
+  impact.impulse = signal.mean(hit, hit + 0.5) / data.mean(expected, expected + 0.5) - 1;
   impact.peak = signal.peak() / data.peak() - 1;
   impact.wall = signal.mean(3.5, 5.5);
   impact.plateau = impact.wall / data.mean(3.5, 5.5) - 1;
