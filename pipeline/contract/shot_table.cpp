@@ -128,7 +128,7 @@ constexpr Limits speed{-1000, 1000};    // m/s
 constexpr Limits seeds{0, 4294967295};  // uint32_t
 constexpr Limits share{0, 1};
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
-constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;           // bits of ProbeType
+constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;         // bits of ProbeType
 constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
 
 std::vector<Parameter> shot_rows() {
@@ -516,8 +516,9 @@ const std::vector<Section>& sections() {
 const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
-    for (const auto& part : {shot_rows(), fluid_rows(), cloth_rows(), probe_rows(),
-                             surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
+    for (const auto& part :
+         {shot_rows(), fluid_rows(), cloth_rows(), probe_rows(), surface_and_camera_rows(),
+          light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;
