@@ -16,7 +16,8 @@ struct Checkpoint {
   int next_id = 0;
   std::vector<uint64_t> emitted;  // layers that left each emitter
   HostState state;
-  Digest layout;  // of the shot's settings and the file's layout
+  std::vector<double> probes;  // rows so far, ProbeSeries
+  Digest layout;               // of the shot's settings and the file's layout
 };
 
 WrittenFile write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint);

@@ -10,6 +10,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot_file.h"
 #include "sim/checkpoint.h"
+#include "sim/probe_series.h"
 #include "sim/scene.h"
 
 namespace drench {
@@ -55,6 +56,7 @@ struct Simulator::Implementation {
   uint64_t steps = 0;
   int next_id = 0;
   std::vector<uint64_t> emitted;
+  sim::ProbeSeries probes;
   sim::Limits limits;
   std::filesystem::path last_checkpoint;
 
@@ -62,7 +64,8 @@ struct Simulator::Implementation {
       : shot(shot_),
         options(options_),
         scene(sim::build_scene(shot, options.level_set)),
-        solver(make_solver(scene, options.device, device)) {
+        solver(make_solver(scene, options.device, device)),
+        probes(shot, scene) {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
@@ -72,7 +75,7 @@ struct Simulator::Implementation {
     next_id = int(scene.start.id.size());
     solver->load(scene.start);
     limits = solver->measure();
-    time = -shot.preroll;
+    time = 0 - shot.preroll;  // no -0
     scene.obstacles.place(*solver, time, time);
     solver->refresh();
     if (scene.inside_obstacles > 0) {
@@ -80,6 +83,7 @@ struct Simulator::Implementation {
                                   "half a spacing of them and were left out",
                                   scene.inside_obstacles));
     }
+    probes.start(time, *solver);
   }
 
   double frame_time(int f) const { return (f - shot.timeline.first) / shot.timeline.fps; }
@@ -144,6 +148,7 @@ struct Simulator::Implementation {
       time = then;
       ++steps;
       check_state();
+      probes.record(time, *solver);
       report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
       report.largest_dt = std::max(report.largest_dt, dt);
       report.max_speed = std::max(report.max_speed, double(limits.max_speed));
@@ -305,12 +310,13 @@ StepReport Simulator::advance_frame(const std::function<bool()>& keep_going) {
 int Simulator::frame() const { return implementation_->frame; }
 ParticleFrame Simulator::particles() const { return implementation_->particles(); }
 std::vector<ClothFrame> Simulator::cloth() const { return implementation_->cloth(); }
+std::vector<ProbeText> Simulator::probes() const { return implementation_->probes.texts(); }
 std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps, s.next_id,
-                             s.emitted, s.solver->save(), s.layout};
+  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps,         s.next_id,
+                             s.emitted, s.solver->save(), s.probes.rows(), s.layout};
   checkpoint.state.limits = s.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);
   s.last_checkpoint = path;
@@ -321,12 +327,14 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   Implementation& s = *implementation_;
   sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
   if (checkpoint.emitted.size() != s.emitted.size() ||
-      checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices())) {
+      checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices()) ||
+      !s.probes.fits(checkpoint.probes)) {
     throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
   }
   s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
   s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted;
   s.limits = checkpoint.state.limits;
+  s.probes.resume(std::move(checkpoint.probes));
   s.solver->load(checkpoint.state);
   s.scene.obstacles.place(*s.solver, s.time, s.time);
   s.solver->refresh();

@@ -41,6 +41,11 @@ struct StepReport {
   uint64_t guard_hits = 0;            // particles that the path test held back
 };
 
+/// A probe's file: CSV with its units, after lines that begin with '#' and say what it holds.
+struct ProbeText {
+  std::string name, csv;
+};
+
 class Simulator {
  public:
   /// Builds the initial state, before any pre-roll. @throws Error if fluid overlaps cloth, a cloth
@@ -63,6 +68,9 @@ class Simulator {
   int frame() const;  // film frame of the current state
   ParticleFrame particles() const;
   std::vector<ClothFrame> cloth() const;
+  /// What the shot's probes have measured from the start to now, a row for every step. It belongs
+  /// to the state: a checkpoint brings it back.
+  std::vector<ProbeText> probes() const;
 
   /// Every state the next step reads, lossless: a resumed run has the same bits.
   WrittenFile write_checkpoint(const std::filesystem::path& path) const;

@@ -7,6 +7,7 @@
 
 #include "sim/passes/measure_density.h"
 #include "sim/passes/obstacle_guard.h"
+#include "sim/passes/probe.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/step_plan.h"
 
@@ -155,6 +156,9 @@ class BackendSolver : public Solver {
   }
 
   Limits measure() override { return measure_limits(state_); }
+  std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) override {
+    return probe_states(state_, queries);
+  }
 
   void load_level_set(int obstacle, int which, const LevelSet& set) override {
     state_.obstacles.field.resize(size_t(2) * state_.parameters.obstacles);

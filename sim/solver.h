@@ -11,6 +11,7 @@
 #include "pipeline/contract/level_set.h"
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
+#include "sim/probe_query.h"
 
 namespace drench::sim {
 
@@ -102,6 +103,10 @@ class Solver {
   virtual void place_obstacles(const std::vector<ObstaclePlacement>& placement) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
+  /// Answers to probes, in their order, of the state as step() has just left it; of a state that no
+  /// step has made yet only those that ask for no pressure or force. Changes no bit of a later
+  /// step. What the numbers are: sim/probe_query.h.
+  virtual std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) = 0;
   virtual std::vector<PassInfo> plan() const = 0;
   virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
   virtual int particles() const = 0;

@@ -159,6 +159,21 @@ struct Coupling {
   CouplingScheme scheme = CouplingScheme::exact;
 };
 
+enum class ProbeType { height, pressure, force, tip, energy, volume };
+
+/// A measurement of every simulation step; sim/probe_series.h says what the columns mean.
+struct Probe {
+  ProbeType type = ProbeType::height;
+  std::string name = "probe";    // part of its file's name
+  V3d position{0, 0, 0};         // m; height: the line's x and z, pressure: centre, tip: rest place
+  V3d normal{0, 1, 0};           // pressure: of the disc
+  double radius = 0.01;          // pressure: of the disc, m
+  double window = 1e-3;          // pressure, force: the mean columns are over this time, s
+  std::string target = "y_low";  // force: a wall, x_low to z_high, or the name of a sheet
+  std::string cloth = "cloth";   // tip: name of the sheet
+  int vertex = -1;               // tip: of the sheet; -1: the one nearest to position at rest
+};
+
 struct SurfaceSettings {
   double voxel = 0.5;       // voxel edge / spacing
   double support = 2.5;     // kernel support / spacing
@@ -242,6 +257,7 @@ struct Shot {
   std::vector<Cloth> cloth;
   std::vector<Obstacle> obstacle;
   Coupling coupling;
+  std::vector<Probe> probe;
   SurfaceSettings surface;
   Camera camera;
   std::vector<Light> light;

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/probe_check.h"
 
 namespace drench {
 
@@ -33,6 +34,7 @@ class Checker {
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
     for (size_t i = 0; i < shot_.obstacle.size(); ++i) check_obstacle(i);
     check_names();
+    check_probes(shot_, sources_);
     if (!shot_.fluid.present() && shot_.cloth.empty()) {
       fail("fluid",
            "the shot has neither fluid nor cloth, so there is nothing to simulate; add a "
@@ -422,6 +424,7 @@ class Checker {
   void check_names() const {
     check_distinct(shot_.cloth, "cloth");
     check_distinct(shot_.obstacle, "obstacle");
+    check_distinct(shot_.probe, "probe");
     check_distinct(shot_.light, "light");
     check_distinct(shot_.material, "material");
   }

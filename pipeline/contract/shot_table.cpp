@@ -128,6 +128,7 @@ constexpr Limits speed{-1000, 1000};    // m/s
 constexpr Limits seeds{0, 4294967295};  // uint32_t
 constexpr Limits share{0, 1};
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
+constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;         // bits of ProbeType
 constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
 constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;          // bits of ObstacleType
 
@@ -328,6 +329,40 @@ std::vector<Parameter> obstacle_rows() {
           .only(mesh_type),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
+  };
+}
+
+std::vector<Parameter> probe_rows() {
+  return {
+      row<&Probe::type>("probe", "type", "", none, simulate, "what is measured on every step")
+          .one_of({"height", "pressure", "force", "tip", "energy", "volume"})
+          .needed()
+          .identity(),
+      row<&Probe::name>("probe", "name", "", none, simulate,
+                        "part of its file's name, sim/probe.NAME.csv; probe, probe2, ... unless "
+                        "given")
+          .identity(),
+      row<&Probe::position>("probe", "position", "m", place, simulate,
+                            "height: the vertical line through it; pressure: centre of the disc; "
+                            "tip: the vertex nearest to it at rest")
+          .only(height | pressure | tip),
+      row<&Probe::normal>("probe", "normal", "", place, simulate,
+                          "of the disc; any length but 0. A disc within half a spacing of a "
+                          "domain wall measures the wall")
+          .only(pressure),
+      row<&Probe::radius>("probe", "radius", "m", {1e-6, 1e4}, simulate,
+                          "of the disc; below a spacing it counts as one")
+          .only(pressure),
+      row<&Probe::window>("probe", "window", "s", {0, 1}, simulate,
+                          "the mean columns are means over so much time before each row")
+          .only(pressure | force),
+      row<&Probe::target>("probe", "target", "", none, simulate,
+                          "what the fluid pushes: a domain wall, x_low to z_high, or a sheet")
+          .only(force),
+      row<&Probe::cloth>("probe", "cloth", "", none, simulate, "name of the sheet").only(tip),
+      row<&Probe::vertex>("probe", "vertex", "", {-1, 2e9}, simulate,
+                          "of the sheet; -1: the one nearest to position at rest")
+          .only(tip),
   };
 }
 
@@ -535,6 +570,8 @@ const std::vector<Section>& sections() {
       typed<Obstacle>(repeated<&Shot::obstacle>(
           "obstacle", "", "A solid in the fluid, standing or moving as its keys say.")),
       single<&Shot::coupling>("coupling", "How fluid and cloth push each other."),
+      typed<Probe>(repeated<&Shot::probe>(
+          "probe", "", "A measurement, a row for every step in `sim/probe.NAME.csv`.")),
       single<&Shot::surface>("surface", "The surface built around the particles."),
       single<&Shot::camera>("camera", "A thin-lens camera that looks along -Z of its own frame."),
       typed<Light>(repeated<&Shot::light>("light", "", "A light.")),
@@ -550,8 +587,8 @@ const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
     for (const auto& part :
-         {shot_rows(), fluid_rows(), cloth_rows(), obstacle_rows(), surface_and_camera_rows(),
-          light_rows(), material_rows(), picture_rows()}) {
+         {shot_rows(), fluid_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
+          surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

@@ -44,6 +44,7 @@ std::string default_text(const Parameter& parameter) {
     fresh.cloth.resize(1);
     fresh.cloth[0].pin.resize(1);
     fresh.obstacle.resize(1);
+    fresh.probe.resize(1);
     fresh.light.resize(1);
     fresh.material.resize(1);
     return fresh;
@@ -216,6 +217,13 @@ Shot one_of_everything(const std::string& name) {
   sheet.pin[0].vertices = {0, 64};
   sheet.pin[1].box = {V3d(-0.5, 0.9, 0.4), V3d(0.5, 1.1, 0.6)};
   shot.cloth.push_back(sheet);
+  for (const ProbeType type : {ProbeType::height, ProbeType::pressure, ProbeType::force,
+                               ProbeType::tip, ProbeType::energy, ProbeType::volume}) {
+    Probe probe;
+    probe.type = type;
+    probe.name += std::to_string(shot.probe.size() + 1);
+    shot.probe.push_back(probe);
+  }
   for (const LightType type :
        {LightType::rectangle, LightType::sphere, LightType::sun, LightType::environment}) {
     Light light;

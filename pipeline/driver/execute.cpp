@@ -50,7 +50,9 @@ class Executor {
   void make_image(int frame);
   void make_dailies(Step step);
 
-  void commit(const std::vector<WrittenFile>& files, Step step, int frame, const Key& key);
+  void write_probes(int frame);
+  void commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
+              const Key& key);
   void finished(Step step, int frame, Clock::time_point start, const StageReport& report);
   void check_input(const std::string& file);
   std::optional<KnownFile> look_up(const std::string& file) const;
@@ -161,10 +163,11 @@ void Executor::compute(tbb::task_arena& arena, const Work& work) {
   slots_.release();
 }
 
-void Executor::commit(const std::vector<WrittenFile>& files, Step step, int frame, const Key& key) {
+void Executor::commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
+                      const Key& key) {
   for (const WrittenFile& written : files) {
     Record record = record_of_file(folder_, written);
-    record.step = step_name(step);
+    record.step = step;
     record.frame = frame;
     record.key = key.digest;
     record.parts = key.parts;
@@ -245,13 +248,29 @@ void Executor::produce(int frame) {
   checkpoints_.before_frame(*simulation_, frame);
   std::vector<WrittenFile> files;
   compute(simulate_arena_, [&] { files = simulation_->write_frame(folder_); });
-  commit(files, Step::simulate, frame,
+  commit(files, step_name(Step::simulate), frame,
          {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});
   committed_ = frame;
   has_committed_ = true;
+  const bool now_and_then = (frame - wanted_.first) % options_.checkpoint_every == 0;
+  if (now_and_then || frame == wanted_.frames.back()) write_probes(frame);
   if (frame == wanted_.first || frame == plan_.simulation.from) {
     progress_.not_needed(Step::simulate, frame);  // a state that was there costs no time
   }
+}
+
+/// Whole every time, and so only with the checkpoints and at the end.
+void Executor::write_probes(int frame) {
+  if (!decide_probes(wanted_, frame, lookup_).make) return;
+  std::vector<WrittenFile> files;
+  // The records first: a kill in between leaves files that nothing trusts and the next run
+  // replaces.
+  for (const std::string& file : probe_files(wanted_)) {
+    if (manifest_.find(file)) manifest_.drop(file);
+  }
+  compute(simulate_arena_, [&] { files = simulation_->write_probes(folder_); });
+  commit(files, probe_step, frame,
+         {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});
 }
 
 void Executor::simulate_frames() {
@@ -287,7 +306,7 @@ void Executor::make_mesh(int frame) {
   check_input(layout::particles(frame));
   StageReport report;
   compute(mesh_arena_, [&] { report = stages_.mesh(folder_, frame); });
-  commit(report.files, Step::mesh, frame, decision->key);
+  commit(report.files, step_name(Step::mesh), frame, decision->key);
   finished(Step::mesh, frame, start, report);
 }
 
@@ -327,7 +346,7 @@ void Executor::make_image(int frame) {
   compute(render_arena_, [&] {
     report = stages_.render(folder_, frame, attributes_of(frame, decision->key), share);
   });
-  commit(report.files, Step::render, frame, decision->key);
+  commit(report.files, step_name(Step::render), frame, decision->key);
   finished(Step::render, frame, start, report);
 }
 
@@ -353,7 +372,7 @@ void Executor::make_dailies(Step step) {
                  ? stages_.movie(folder_, wanted_.frames, [this] { return !stopping(); })
                  : stages_.contact_sheet(folder_, wanted_.frames);
   });
-  commit(report.files, step, 0, decision->key);
+  commit(report.files, step_name(step), 0, decision->key);
   finished(step, 0, start, report);
 }
 

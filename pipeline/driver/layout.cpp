@@ -8,6 +8,7 @@ std::string particles(int frame) { return fmt::format("sim/particles.{:04d}.vdb"
 std::string cloth(const std::string& name, int frame) {
   return fmt::format("sim/cloth.{}.{:04d}.ply", name, frame);
 }
+std::string probe(const std::string& name) { return fmt::format("sim/probe.{}.csv", name); }
 std::string checkpoint(int frame) { return fmt::format("sim/checkpoint/frame.{:04d}.ckpt", frame); }
 std::string fluid_mesh(int frame) { return fmt::format("mesh/fluid.{:04d}.ply", frame); }
 std::string level_set(int frame) { return fmt::format("mesh/fluid.{:04d}.vdb", frame); }

@@ -15,6 +15,7 @@ inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
 
 std::string particles(int frame);                       // sim/particles.1001.vdb
 std::string cloth(const std::string& name, int frame);  // sim/cloth.flag.1001.ply
+std::string probe(const std::string& name);             // sim/probe.gauge.csv
 std::string checkpoint(int frame);                      // sim/checkpoint/frame.1011.ckpt
 std::string fluid_mesh(int frame);                      // mesh/fluid.1001.ply
 std::string level_set(int frame);                       // mesh/fluid.1001.vdb

@@ -129,6 +129,7 @@ void Planner::plan_simulation() {
   for (int frame = wanted_.first; frame <= last; ++frame) {
     key.digest = keys[size_t(frame - wanted_.first)];
     Decision decision = decide(simulated_files(wanted_, frame), key, lookup_);
+    if (frame == last && !decision.make) decision = decide_probes(wanted_, frame, lookup_);
     reasons.push_back(decision.make ? std::move(decision.reason) : "");
     if (!decision.make) continue;
     first_missing = std::min(first_missing, frame);
@@ -266,7 +267,11 @@ void Planner::plan_dailies(Step step) {
 
 Plan Planner::finish(const Snapshot& snapshot, int timeline_last) {
   const int last = std::max(timeline_last, wanted_.frames.back());
+  const std::vector<std::string> probes = probe_files(wanted_);
   for (const auto& [file, known] : snapshot) {
+    const bool of_probe = known.record.step == probe_step;
+    if (of_probe && std::find(probes.begin(), probes.end(), file) == probes.end())
+      plan_.beyond.push_back(file);
     const bool framed = known.record.step == "simulate" || known.record.step == "mesh" ||
                         known.record.step == "render";
     if (!framed) continue;
@@ -311,6 +316,19 @@ Decision decide(const std::vector<std::string>& files, const Key& key, const Loo
     if (known->state == FileState::changed) return {true, key, "file was damaged or changed"};
   }
   return {false, key, unchanged};
+}
+
+Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup) {
+  Decision latest{false, {{}, wanted.simulate.parts}, unchanged};
+  for (const std::string& file : probe_files(wanted)) {
+    const std::optional<KnownFile> known = lookup(file);
+    const int until = known ? std::max(known->record.frame, frame) : frame;
+    latest = decide({file}, {simulation_keys(wanted, until).back(), wanted.simulate.parts}, lookup);
+    if (!latest.make) continue;
+    if (known && known->record.frame < frame) latest.reason = "ends before this frame";
+    return latest;
+  }
+  return latest;
 }
 
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup) {

@@ -58,6 +58,12 @@ struct Decision {
 Decision decide(const std::vector<std::string>& files, const Key& key, const Lookup& lookup);
 
 /// Decisions of one frame. Empty if an input is missing or damaged.
+/// The step that the records of probes' files name.
+inline constexpr const char* probe_step = "probe";
+
+/// Whether the probes' files must be written when the simulation stands at `frame`: they hold every
+/// frame up to the one they are recorded with, which may be a later one.
+Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup);
 /// Contact sheet or movie of all wanted frames.

@@ -70,6 +70,12 @@ class ShotSimulation final : public Simulation {
     }
     return files;
   }
+  std::vector<WrittenFile> write_probes(const fs::path& folder) const override {
+    std::vector<WrittenFile> files;
+    for (const ProbeText& probe : simulator_.probes())
+      files.push_back(write_file_whole(folder / layout::probe(probe.name), probe.csv));
+    return files;
+  }
   WrittenFile write_checkpoint(const fs::path& file) const override {
     return simulator_.write_checkpoint(file);
   }

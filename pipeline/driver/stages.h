@@ -33,6 +33,8 @@ class Simulation {
   /// To the next frame. @throws Stopped when keep_going says so; Error on blow-up.
   virtual StageReport advance(const std::function<bool()>& keep_going) = 0;
   virtual std::vector<WrittenFile> write_frame(const std::filesystem::path& folder) const = 0;
+  /// The probes' files, whole, with every step so far; a shot without probes has none.
+  virtual std::vector<WrittenFile> write_probes(const std::filesystem::path&) const { return {}; }
   virtual WrittenFile write_checkpoint(const std::filesystem::path& file) const = 0;
   virtual void read_checkpoint(const std::filesystem::path& file) = 0;
 };

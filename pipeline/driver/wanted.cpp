@@ -90,7 +90,7 @@ std::map<int, Digest> sequence_digests(const Shot& shot) {
 StageKey simulate_key(const Shot& shot, const std::string& device_class) {
   StageKeyBuilder builder(
       "simulate", build_id::simulate,
-      sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "coupling"}));
+      sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "coupling", "probe"}));
   builder.settings(stage_settings_digest(shot, Stage::simulate))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first)
@@ -146,6 +146,7 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.level_set = wanted.fluid && shot.surface.level_set;
   for (const Cloth& cloth : shot.cloth) wanted.cloth.push_back(cloth.name);
   wanted.sequence = sequence_digests(shot);
+  for (const Probe& probe : shot.probe) wanted.probe.push_back(probe.name);
   wanted.simulate = simulate_key(shot, device_class);
   wanted.mesh = StageKeyBuilder("mesh", build_id::mesh, sections_of(shot, {"surface"}))
                     .settings(stage_settings_digest(shot, Stage::mesh))
@@ -161,6 +162,12 @@ std::vector<std::string> simulated_files(const Wanted& wanted, int frame) {
   std::vector<std::string> files;
   if (wanted.fluid) files.push_back(layout::particles(frame));
   for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
+  return files;
+}
+
+std::vector<std::string> probe_files(const Wanted& wanted) {
+  std::vector<std::string> files;
+  for (const std::string& name : wanted.probe) files.push_back(layout::probe(name));
   return files;
 }
 

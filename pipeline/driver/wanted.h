@@ -34,6 +34,7 @@ struct Wanted {
   bool level_set = false;          // mesh also writes a VDB
   std::vector<std::string> cloth;  // names of the sheets
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
+  std::vector<std::string> probe;  // names of the probes: one file each for all frames
   StageKey simulate, mesh, render, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;
 
@@ -48,6 +49,8 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
 
 /// Files a frame of the simulation consists of: particles if there is fluid, one for each sheet.
 std::vector<std::string> simulated_files(const Wanted& wanted, int frame);
+/// Files of the probes, which hold every frame up to the one they are recorded with.
+std::vector<std::string> probe_files(const Wanted& wanted);
 std::vector<std::string> mesh_files(const Wanted& wanted, int frame);
 /// Files that rendering a frame reads.
 std::vector<std::string> render_inputs(const Wanted& wanted, int frame);

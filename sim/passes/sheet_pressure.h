@@ -131,12 +131,12 @@ inline void sum_loads(State& state, Base base) {
   const NearView near = near_list(state);
   const VecView impulse = state.contact.impulse.view(), right = state.cloth_system.right.view(),
                 own = state.cloth_system.base.view();
-  const float *inverse_mass = state.cloth.inverse_mass.data(), *share = state.cloth.share.data();
+  const float* share = state.cloth.share.data();
   const bool add = base == Base::own;
   parallel_for(
       "sheets: loads", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         Vec3<float> sum = add ? own[v] : Vec3<float>{0.f, 0.f, 0.f};
-        if (inverse_mass[v] > 0.f && share[v] > 0.f) sum = sum + near.sum_on_vertex(impulse, v);
+        if (share[v] > 0.f) sum = sum + near.sum_on_vertex(impulse, v);
         right.set(v, sum);
       });
 }
@@ -245,12 +245,15 @@ inline void subtract_sheet_rate(State& state) {
       });
 }
 
-/// Where the sheets end the step if nothing stops them.
+/// Where the sheets end the step if nothing stops them, and the fluid's force on them for whoever
+/// asks: the loads are it times dt^2.
 inline void finish_sheets(State& state) {
   ClothState& c = state.cloth;
   const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
                 next_velocity = c.next_velocity.view(), predicted = c.predicted.view(),
-                change = state.cloth_system.change.view();
+                change = state.cloth_system.change.view(), force = c.force.view(),
+                right = state.cloth_system.right.view(), base = state.cloth_system.base.view();
+  const bool near = state.contact.near > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);
   for_each_lane(
@@ -260,6 +263,7 @@ inline void finish_sheets(State& state) {
         walls.stop(to, velocity);
         const auto free = load(inverse_mass, i) > T(0.f);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
+        if (near) force.put(i, (right.at(i) - base.at(i)) * T(inverse_dt * inverse_dt));
         velocity = select(free, velocity, none);
         next.put(i, select(free, to, x.at(i)));
         next_velocity.put(i, velocity);

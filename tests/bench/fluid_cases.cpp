@@ -1,4 +1,5 @@
-// Cases fluid_martin_moyce and fluid_rest: flows with a known answer (tests/validation/fluid.h).
+// Cases fluid_martin_moyce, fluid_rest and fluid_lobovsky: flows with a known answer
+// (tests/validation).
 //
 // Cases fluid_dam_64k and fluid_dam_250k: a cube of water of 1 m collapses in a tank of 3 x 2 x 1
 // m, with the time step 0.4 a / v, capped. Time against the mean of max(rho / rho_0 - 1, 0) over
@@ -16,6 +17,7 @@
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
 #include "tests/validation/fluid.h"
+#include "tests/validation/lobovsky.h"
 
 namespace drench::bench {
 namespace {
@@ -166,6 +168,27 @@ void resting_column(const Emit& emit) {
   }
 }
 
+void lobovsky(const Emit& emit) {
+  for (const int across : {20, 30, 40}) {
+    validation::Impact result;
+    Line line;
+    line.cost = measure([&] { result = validation::lobovsky(across, 1e-4); });
+    line.method = "incompressible, tolerance 0.01 %";
+    line.resolution = std::to_string(result.particles) + " particles, " + std::to_string(across) +
+                      " over the column's height";
+    line.threads = hardware_threads();
+    line.error = std::abs(result.time), line.gate = 0.03;
+    line.error_of = "relative error of the time of impact";
+    line.more["impulse"] = result.impulse;
+    line.more["peak"] = result.peak;
+    line.more["plateau"] = result.plateau;
+    line.more["plateau_P"] = result.wall;
+    emit(line);
+  }
+}
+
+const Registration impact{"fluid_lobovsky", "a collapsing column hits a wall with a pressure probe",
+                          lobovsky};
 const Registration collapse{"fluid_martin_moyce", "a collapsing column against the experiment",
                             martin_moyce};
 const Registration rest{"fluid_rest", "a column at rest for 5 s", resting_column};

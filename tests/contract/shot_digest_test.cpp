@@ -144,7 +144,7 @@ TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
   const std::set<std::string_view> looks{"camera", "light", "material", "ground", "render"};
   const std::set<std::string_view> physics{"domain",        "fluid.box",   "fluid.sphere",
                                            "fluid.emitter", "fluid.drops", "cloth.pin",
-                                           "coupling"};
+                                           "coupling",      "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     if (looks.contains(p.section)) {
       EXPECT_EQ(p.stages, shot_table::render) << p.key;

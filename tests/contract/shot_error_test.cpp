@@ -183,6 +183,38 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
   });
 }
 
+// Box and domain have walls at -1 and 1 m, a floor at 0 m.
+TEST_F(ShotError, NamesBadProbes) {
+  expect_messages({
+      {"[[probe]]\nposition = [0, 0, 0]\n", {"scene.toml:4", "probe[0] has no type"}},
+      {"[[probe]]\ntype = \"depth\"\n", {"scene.toml:5", "\"height\", \"pressure\""}},
+      {"[[probe]]\ntype = \"height\"\nradius = 1\n",
+       {"scene.toml:6", "radius", "type pressure", "Remove it"}},
+      {"[[probe]]\ntype = \"height\"\nposition = [1.2, 0, 0]\n",
+       {"scene.toml:6", "\"probe\"", "1.2", "in x", "beyond the domain's walls"}},
+      {"[[probe]]\ntype = \"pressure\"\nposition = [0.95, 0, 0]\nradius = 0.1\n",
+       {"scene.toml:6", "1.05", "in x", "Move it"}},
+      {"[[probe]]\ntype = \"pressure\"\nnormal = [0, 0, 0]\n",
+       {"scene.toml:6", "normal", "no direction"}},
+      {"[[probe]]\ntype = \"pressure\"\nwindow = -1\n", {"scene.toml:6", "window", "0 and 1"}},
+      {"[[probe]]\ntype = \"force\"\ntarget = \"left\"\n",
+       {"scene.toml:6", "\"left\"", "x_low", "sheets of this shot: none"}},
+      {"[domain]\ny = \"open\"\n[[probe]]\ntype = \"force\"\n",
+       {"scene.toml:6", "\"y_low\"", "domain.y is \"open\""}},
+      {"[[cloth]]\nname = \"flag\"\n[[probe]]\ntype = \"tip\"\n",
+       {"scene.toml:6", "\"cloth\"", "flag"}},
+      {"[[cloth]]\ncells = [2, 2]\n[[probe]]\ntype = \"tip\"\nvertex = 9\n",
+       {"scene.toml:8", "vertex is 9", "0 to 8"}},
+      {"[[probe]]\ntype = \"volume\"\nname = \"a\"\n[[probe]]\ntype = \"energy\"\n"
+       "name = \"a\"\n",
+       {"scene.toml:9", "[[probe]]", "\"a\"", "its own name"}},
+  });
+  const std::string dry = error_of(
+      [&] { parse_shot("[[cloth]]\n[[probe]]\ntype = \"height\"\n", folder_ / "scene.toml"); });
+  EXPECT_NE(dry.find("scene.toml:3"), std::string::npos) << dry;
+  EXPECT_NE(dry.find("measures fluid"), std::string::npos) << dry;
+}
+
 TEST_F(ShotError, NamesAShotWithoutAnythingToSimulate) {
   const std::string text =
       error_of([&] { parse_shot("[render]\nwidth = 64\n", folder_ / "scene.toml"); });

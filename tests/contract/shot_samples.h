@@ -67,6 +67,22 @@ mesh = "flag.obj"
 [[cloth.pin]]
 vertices = [0]
 
+[[probe]]
+type = "height"
+
+[[probe]]
+type = "pressure"
+name = "floor"
+radius = 0.05
+
+[[probe]]
+type = "force"
+target = "sheet"
+
+[[probe]]
+type = "tip"
+cloth = "sheet"
+
 [camera]
 position = [[1001, [0, 1, 3]], [1024, [1, 1, 3]]]
 fov_deg = [[1001, 40], [1024, 35.5]]

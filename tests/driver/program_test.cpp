@@ -150,7 +150,9 @@ TEST(Program, NamesWhatAPlanSkipsAndWhy) {
   EXPECT_TRUE(has(shot.run("plan", {"--set", "surface.smoothing=3"}).out, "surface changed"));
   std::string text = text_of(shot.file());
   const size_t from = text.find("[fluid]"), to = text.find("[[cloth]]");
-  put_text(shot.file(), text.erase(from, to - from));
+  text.erase(from, to - from);
+  const size_t probes = text.find("[[probe]]"), rest = text.find("[surface]");
+  put_text(shot.file(), text.erase(probes, rest - probes));
   EXPECT_TRUE(has(shot.run("plan").out, "no fluid"));
 }
 
@@ -193,8 +195,9 @@ TEST(Program, MakesOneMissingFileAlone) {
 
 // A quietly flipped bit: verify finds it by digest and the next run makes the file again.
 TEST(Program, DetectsAndRebuildsADamagedCache) {
-  for (const std::string& file : {layout::particles(1007), layout::cloth("flag", 1003),
-                                  layout::fluid_mesh(1004), layout::image("tiny", 1009)}) {
+  for (const std::string& file :
+       {layout::particles(1007), layout::cloth("flag", 1003), layout::fluid_mesh(1004),
+        layout::image("tiny", 1009), layout::probe("gauge")}) {
     const TinyShot shot;
     ASSERT_EQ(shot.run("run").code, done);
     flip_bit_quietly(shot.out() / file);

@@ -26,6 +26,13 @@ u = [0.3, 0, 0]
 v = [0, 0, 0.3]
 cells = [6, 6]
 pins = "corners"
+[[probe]]
+type = "force"
+name = "flag"
+target = "flag"
+[[probe]]
+type = "height"
+name = "gauge"
 [surface]
 smoothing = 2
 [camera]

@@ -128,6 +128,40 @@ TEST_P(Cuda, KeepsMeanHeightsOfCpuAfterHundredSteps) {
   EXPECT_NEAR(height(cpu.cloth_position), height(gpu.cloth_position), 0.01 * spacing);
 }
 
+/// What probes of every kind read after ten steps.
+std::vector<double> probed(const sim::Scene& scene, std::unique_ptr<sim::Solver> solver) {
+  std::vector<sim::ProbeQuery> queries(6);
+  queries[0].kind = sim::ProbeKind::height;
+  queries[1].kind = sim::ProbeKind::wall_force, queries[1].axis = 1;
+  queries[2].kind = sim::ProbeKind::inner_pressure;
+  queries[2].place[1] = float(0.255 - scene.parameters.origin[1]);
+  queries[2].radius = 0.03f, queries[2].rim = 0.01f, queries[2].extent = 1e-4f;
+  queries[3].kind = sim::ProbeKind::energy;
+  queries[4].kind = sim::ProbeKind::volume;
+  queries[5].kind = sim::ProbeKind::cloth_force, queries[5].end = scene.cloth.vertices();
+  solver->load(scene.start);
+  const double dt = step_of(scene.parameters);
+  const int substeps = std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit)));
+  for (int s = 0; s < 10; ++s) solver->step(dt, substeps);
+  std::vector<double> all;
+  for (const auto& answer : solver->probe(queries))
+    all.insert(all.end(), answer.begin(), answer.end());
+  return all;
+}
+
+TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
+  const auto cuda = [&] {
+    return probed(scene, sim::cuda::make_solver(scene.parameters, scene.cloth));
+  };
+  const std::vector<double> cpu =
+                                probed(scene, sim::cpu::make_solver(scene.parameters, scene.cloth)),
+                            gpu = cuda();
+  ASSERT_EQ(cpu.size(), gpu.size());
+  for (size_t k = 0; k < cpu.size(); ++k)
+    EXPECT_NEAR(cpu[k], gpu[k], 1e-3 * std::abs(cpu[k]) + 1e-3) << k;
+  EXPECT_EQ(gpu, cuda());
+}
+
 // No float atomics and fixed trees: nothing may depend on how blocks are scheduled.
 TEST_P(Cuda, GivesTheSameBitsInEveryRun) {
   scene.parameters.tolerance = 1e-4f, scene.parameters.most_iterations = 100;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sim/probe_series.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -80,6 +81,54 @@ TEST(Skip, ClothFarAwayChangesNoBitOfTheFluid) {
   EXPECT_EQ(without.velocity.x, with.velocity.x);
   EXPECT_EQ(without.velocity.y, with.velocity.y);
   EXPECT_EQ(without.velocity.z, with.velocity.z);
+}
+
+/// A block that falls onto a sheet and a floor, measured by one probe of every kind or by none.
+sim::HostState probed_splash(FluidSolver solver, bool probed, std::vector<std::string>& plan,
+                             unsigned& allocated) {
+  Shot shot = empty_shot();
+  shot.fluid.solver = solver;
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.domain.axis[1] = Axis::walls;
+  add_box(shot, V3d(0, -0.98, 0), {8, 8, 8});
+  if (solver == FluidSolver::weakly_compressible) pin_edges(add_sheet(shot, 0.2, -0.99, 8));
+  Probe probe;
+  probe.position = V3d(0.04, -1, 0.04), probe.radius = 0.03;
+  for (const ProbeType type : {ProbeType::volume, ProbeType::height, ProbeType::pressure,
+                               ProbeType::force, ProbeType::energy}) {
+    probe.type = type;
+    if (probed) shot.probe.push_back(probe);
+  }
+  probe.type = ProbeType::pressure, probe.position.y = -0.96;
+  if (probed) shot.probe.push_back(probe);
+  Stepper run(shot);
+  sim::ProbeSeries series(shot, run.scene);
+  series.start(0, *run.solver);
+  for (int k = 0; k < 200; ++k) {
+    run.step(5e-4);
+    series.record(run.time, *run.solver);
+  }
+  EXPECT_EQ(series.rows().empty(), !probed);
+  for (const sim::PassInfo& pass : run.solver->plan()) plan.push_back(pass.name);
+  allocated = run.solver->allocated();
+  return run.solver->save();
+}
+
+TEST(Skip, ProbesAddNoPassAndNoColumnAndChangeNoBit) {
+  for (const auto solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
+    std::vector<std::string> plan, probed_plan;
+    unsigned columns = 0, probed_columns = 0;
+    const sim::HostState a = probed_splash(solver, false, plan, columns),
+                         b = probed_splash(solver, true, probed_plan, probed_columns);
+    EXPECT_EQ(plan, probed_plan);
+    EXPECT_EQ(columns, probed_columns);
+    EXPECT_EQ(a.id, b.id);
+    EXPECT_EQ(a.position.x, b.position.x);
+    EXPECT_EQ(a.position.y, b.position.y);
+    EXPECT_EQ(a.velocity.y, b.velocity.y);
+    EXPECT_EQ(a.pressure_term, b.pressure_term);
+    EXPECT_EQ(a.cloth_position.y, b.cloth_position.y);
+  }
 }
 
 // refresh() between steps, as every frame's end makes it, changes nothing either.

@@ -1,0 +1,178 @@
+#pragma once
+// Probes: reductions over the columns that a step has left, so that no state is read back. They
+// write to no column that a later step reads.
+
+#include <limits>
+
+#include "sim/passes/measure_density.h"
+#include "sim/passes/probe_height.h"
+#include "sim/passes/probe_pressure.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// Force of the fluid on a domain wall, N: what the step took from the fluid's momentum through the
+/// wall's pressure and viscosity, over dt. A particle that the pressure fails to stop and the last
+/// tenth of a spacing does (move.h) is not in it.
+inline std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
+  return to_vector(parallel_reduce("probe: wall force", state.fluid.count, Totals<3>{},
+                                   WallForce{step_pressure_of(state), {query.axis, query.side}},
+                                   AddTotals<3>{}));
+}
+
+/// The same with the weights of a sensor, over their area, along the wall's normal, Pa.
+inline double wall_pressure(const State& state, const ProbeQuery& query) {
+  const Totals<1> sum = parallel_reduce(
+      "probe: wall pressure", state.fluid.count, Totals<1>{},
+      WallSensor{{step_pressure_of(state), {query.axis, query.side}}, soft_disc_of(query)},
+      AddTotals<1>{});
+  return sum.value[0] / query.extent;
+}
+
+/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
+inline double inner_pressure(const State& state, const ProbeQuery& query) {
+  const FluidState& f = state.fluid;
+  const Totals<1> sum = parallel_reduce(
+      "probe: pressure", f.count, Totals<1>{},
+      InnerSensor{step_pressure_of(state), soft_disc_of(query), {f.grid, f.cell_start.data()}},
+      AddTotals<1>{});
+  return sum.value[0] / query.extent;
+}
+
+struct VertexForce {
+  VecView force;
+  int begin;
+  DRENCH_HD Totals<3> operator()(int k) const {
+    const Vec3<float> f = force[begin + k];
+    return {{f.x, f.y, f.z}};
+  }
+};
+
+/// Force of the fluid on a range of vertices, N: the impulses they were given in the step, over dt.
+inline std::vector<double> cloth_force(const State& state, const ProbeQuery& query) {
+  return to_vector(parallel_reduce("probe: cloth force", query.end - query.begin, Totals<3>{},
+                                   VertexForce{state.cloth.force.view(), query.begin},
+                                   AddTotals<3>{}));
+}
+
+/// Kinetic and potential energy of points, J.
+struct PointEnergy {
+  VecView position, velocity;
+  const float* masses;  // kg, or null: all have `mass`
+  float mass;
+  Vec3<float> gravity, zero;
+  DRENCH_HD Totals<3> operator()(int i) const {
+    const double m = masses ? masses[i] : mass;
+    const Vec3<double> v = to_double(velocity[i]);
+    const Vec3<double> x = to_double(position[i]) - to_double(zero);
+    return {{0.5 * m * dot(v, v), -m * dot(to_double(gravity), x), 0}};
+  }
+};
+
+/// Energy of the springs, J: each stands in the slots of both its ends.
+struct SpringEnergy {
+  VecView position;
+  const int* end;
+  const float *rest_length, *stiffness;
+  int slots, stride;
+  DRENCH_HD Totals<3> operator()(int i) const {
+    double sum = 0;
+    for (int s = 0; s < slots; ++s) {
+      const int at = s * stride + i;
+      const Vec3<double> d = to_double(position[end[at]]) - to_double(position[i]);
+      const double longer = length(d) - rest_length[at];
+      sum += 0.25 * stiffness[at] * longer * longer;
+    }
+    return {{0, 0, sum}};
+  }
+};
+
+inline std::vector<double> energy(const State& state, const ProbeQuery& query) {
+  const Parameters& p = state.parameters;
+  const FluidState& f = state.fluid;
+  const ClothState& c = state.cloth;
+  const Vec3<float> gravity{p.gravity[0], p.gravity[1], p.gravity[2]};
+  const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
+  const AddTotals<3> add;
+  const Totals<3> fluid = parallel_reduce(
+      "probe: fluid energy", f.count, Totals<3>{},
+      PointEnergy{f.position.view(), f.velocity.view(), nullptr, p.particle_mass, gravity, zero},
+      add);
+  const Totals<3> cloth = parallel_reduce(
+      "probe: cloth energy", c.vertices, Totals<3>{},
+      PointEnergy{c.position.view(), c.velocity.view(), c.mass.data(), 0.f, gravity, zero}, add);
+  const Totals<3> springs =
+      parallel_reduce("probe: spring energy", c.vertices, Totals<3>{},
+                      SpringEnergy{c.position.view(), c.spring_end.data(), c.rest_length.data(),
+                                   c.stiffness.data(), c.spring_slots, c.padded},
+                      add);
+  return to_vector(add(add(fluid, cloth), springs));
+}
+
+struct PlaceAndDensity {
+  VecView position;
+  const float* density;
+  float inverse_rest;
+  DRENCH_HD Totals<4> operator()(int i) const {
+    const Vec3<float> x = position[i];
+    const double over = double(density[i]) * inverse_rest - 1;
+    return {{x.x, x.y, x.z, over > 0 ? over : 0}};
+  }
+};
+
+/// Measures the incompressible fluid's density anew; that of the weakly compressible one is of the
+/// step's start.
+inline std::vector<double> volume(State& state) {
+  const int n = state.fluid.count;
+  if (n > 0 && state.parameters.incompressible) measure_density(state);
+  const Totals<4> sum =
+      parallel_reduce("probe: volume", n, Totals<4>{},
+                      PlaceAndDensity{state.fluid.position.view(), state.fluid.density.data(),
+                                      1.f / state.parameters.rest_density},
+                      AddTotals<4>{});
+  std::vector<double> all{double(n)};
+  for (const double value : sum.value)
+    all.push_back(n > 0 ? value / n : std::numeric_limits<double>::quiet_NaN());
+  return all;
+}
+
+inline std::vector<double> vertex(const State& state, int v) {
+  const VecColumn& x = state.cloth.position;
+  return {value_at(x.x, v), value_at(x.y, v), value_at(x.z, v)};
+}
+
+inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
+  switch (query.kind) {
+    case ProbeKind::height:
+      return {surface_height(state, query)};
+    case ProbeKind::wall_pressure:
+      return {wall_pressure(state, query)};
+    case ProbeKind::inner_pressure:
+      return {inner_pressure(state, query)};
+    case ProbeKind::wall_force:
+      return wall_force(state, query);
+    case ProbeKind::cloth_force:
+      return cloth_force(state, query);
+    case ProbeKind::vertex:
+      return vertex(state, query.begin);
+    case ProbeKind::energy:
+      return energy(state, query);
+    case ProbeKind::volume:
+      return volume(state);
+  }
+  return {};
+}
+
+/// Answers in the order of the queries. Volumes go last: measuring density makes another grid.
+inline std::vector<std::vector<double>> probe_states(State& state,
+                                                     const std::vector<ProbeQuery>& queries) {
+  std::vector<std::vector<double>> answers(queries.size());
+  for (const bool last : {false, true}) {
+    for (size_t k = 0; k < queries.size(); ++k) {
+      if ((queries[k].kind == ProbeKind::volume) == last)
+        answers[k] = probe_state(state, queries[k]);
+    }
+  }
+  return answers;
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
