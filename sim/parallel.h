@@ -142,6 +142,55 @@ struct AddDoubles {
   DRENCH_HD double operator()(double a, double b) const { return a + b; }
 };
 
+/// Two sums at once, of floats or packs.
+template <class T>
+struct Two {
+  T a, b;
+};
+struct AddPairs {
+  DRENCH_HD Two<double> operator()(const Two<double>& x, const Two<double>& y) const {
+    return {x.a + y.a, x.b + y.b};
+  }
+};
+
+#if defined(__CUDACC__)
+
+/// f of all lanes returns Two; their sums go to then(a, b) where the data are.
+template <class F, class Then>
+void sum_lanes_then(const char* name, int n, const F& f, const Then& then) {
+  reduce_then(
+      name, n, Two<double>{0., 0.},
+      [=] __device__(int i) {
+        const Two<float> one = f(i);
+        return Two<double>{one.a, one.b};
+      },
+      AddPairs{}, [=] __device__(const Two<double>& sum) { then(sum.a, sum.b); });
+}
+
+#else
+
+/// f of all lanes returns Two; their sums, in float within fixed chunks, in double over these, go
+/// to then(a, b) where the data are. Columns are padded to a multiple of eight, with zeros.
+template <class F, class Then>
+void sum_lanes_then(const char*, int n, const F& f, const Then& then) {
+  constexpr int chunk = 64;
+  const int packs = (n + 7) / 8, chunks = (packs + chunk - 1) / chunk;
+  std::vector<Two<double>> partial(chunks);
+  ::tbb::parallel_for(0, chunks, [&](int c) {
+    Two<Pack> sum{Pack(0.f), Pack(0.f)};
+    for (int k = c * chunk; k < std::min(packs, (c + 1) * chunk); ++k) {
+      const Two<Pack> one = f(Lanes{8 * k});
+      sum.a = sum.a + one.a, sum.b = sum.b + one.b;
+    }
+    partial[c] = {sum_of_lanes(sum.a), sum_of_lanes(sum.b)};
+  });
+  Two<double> total{0., 0.};
+  for (const Two<double>& part : partial) total = AddPairs{}(total, part);
+  then(total.a, total.b);
+}
+
+#endif
+
 /// Integer sums do not depend on order: the only atomics there are.
 DRENCH_HD void add_atomic(long long* sum, long long value) {
 #if defined(__CUDA_ARCH__)

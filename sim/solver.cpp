@@ -289,8 +289,8 @@ class BackendSolver : public Solver {
     const size_t springs = size_t(c.spring_slots) * c.padded;
     s.tension.resize(springs), s.axis.resize(springs);
     s.inertia.resize(c.padded), s.factor.resize(size_t(6) * c.padded);
-    for (VecColumn* v :
-         {&s.base, &s.right, &s.free, &s.change, &s.answer, &s.residual, &s.direction, &s.image})
+    for (VecColumn* v : {&s.base, &s.right, &s.free, &s.change, &s.answer, &s.residual, &s.scaled,
+                         &s.image, &s.direction, &s.direction_image})
       v->resize(c.padded);
     s.control.resize(1);
   }

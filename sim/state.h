@@ -96,7 +96,7 @@ struct ClothState {
 /// Scalars of the conjugate gradients of the sheets, in the memory of the backend.
 struct ClothControl {
   int done = 0, sweeps = 0;
-  double reference = 0, energy = 0, step = 0, turn = 0;  // r . z of the loads, of the residual
+  double reference = 0, energy = 0, step = 1, turn = 0;  // r . z of the loads, of the residual
 };
 
 /// Columns of the implicit step of the sheets (passes/cloth_implicit.h), rebuilt every step.
@@ -110,7 +110,7 @@ struct ClothSystem {
   VecColumn free;    // 1 along axes that a vertex may move on, 0 where a pin or a wall holds it
   VecColumn change;  // m, off the place where its velocity takes it: the unknown
   VecColumn answer;  // m, to the same pressure all over the sheets
-  VecColumn residual, direction, image;
+  VecColumn residual, scaled, image, direction, direction_image;
   Column<ClothControl> control;
 };
 

@@ -160,37 +160,38 @@ DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
   return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
 }
 
-/// What a sweep of conjugate gradients reads and writes.
+/// What a sweep of conjugate gradients reads and writes: z is the scaled residual, p the direction,
+/// s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
 struct ClothSweep {
   BlockInverse block;
-  VecView w, free, residual, direction, image;
+  VecView w, free, residual, scaled, image, direction, direction_image;
   ClothControl* control;
   float tolerance;  // of r . z, over the reference
 
-  DRENCH_HD void decide_step(double curvature) const {
-    ClothControl& c = *control;
-    c.step = curvature > 0 ? c.energy / curvature : 0;
-    if (curvature <= 0) c.done = 1;
-  }
-  DRENCH_HD double update(int i) const {
-    if (control->done) return 0;
-    const float step = float(control->step);
-    w.set(i, w[i] + direction[i] * step);
-    const Vec3<float> r = residual[i] - image[i] * step;
-    residual.set(i, r);
-    return dot_double(r, block.times(i, r));
-  }
-  DRENCH_HD void decide_turn(double energy) const {
+  /// After r . z and z . A z: how far to go and what is kept of the last direction.
+  DRENCH_HD void decide(double energy, double curvature) const {
     ClothControl& c = *control;
     if (c.done) return;
+    c.done = !(energy > double(tolerance) * c.reference);
+    c.turn = c.energy > 0 ? energy / c.energy : 0;
+    const double bend = c.energy > 0 ? curvature - c.turn * energy / c.step : curvature;
+    if (!(bend > 0)) c.done = 1;
+    if (c.done) return;
     ++c.sweeps;
-    c.turn = energy / c.energy, c.energy = energy;
-    if (!(energy > double(tolerance) * c.reference)) c.done = 1;
+    c.step = energy / bend, c.energy = energy;
   }
-  DRENCH_HD void turn(int i) const {
+  template <class Index>
+  DRENCH_HD void move(Index i) const {
     if (control->done) return;
-    direction.set(
-        i, along(free[i], block.times(i, residual[i])) + direction[i] * float(control->turn));
+    const auto r = residual.at(i);
+    using T = decltype(r.x);
+    const T step(float(control->step)), turn(float(control->turn));
+    const Vec3<T> p = scaled.at(i) + direction.at(i) * turn,
+                  s = image.at(i) + direction_image.at(i) * turn, left = r - s * step;
+    direction.put(i, p), direction_image.put(i, s);
+    w.put(i, w.at(i) + p * step);
+    residual.put(i, left);
+    scaled.put(i, along(free.at(i), block.times(i, left)));
   }
 };
 
@@ -214,35 +215,39 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
   const ClothMatrix matrix = cloth_matrix(state);
   const BlockInverse block = block_inverse(state);
   ClothControl* control = s.control.data();
-  const VecView residual = s.residual.view(), image = s.image.view(),
-                direction = s.direction.view(), free = s.free.view();
-  const ClothSweep sweep{block,     w,     free,    residual,
-                         direction, image, control, tolerance * tolerance};
+  const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view(),
+                free = s.free.view();
+  const ClothSweep sweep{block,
+                         w,
+                         free,
+                         residual,
+                         scaled,
+                         image,
+                         s.direction.view(),
+                         s.direction_image.view(),
+                         control,
+                         tolerance * tolerance};
+  s.direction.clear(), s.direction_image.clear();
+  parallel_for(
+      "cloth: start", 1, DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
   for_each_lane(
       "cloth: residual", n, DRENCH_LAMBDA(auto i) {
         const auto r = along(free.at(i), right.at(i)) - matrix.times(w, i);
         residual.put(i, r);
-        direction.put(i, along(free.at(i), block.times(i, r)));
+        scaled.put(i, along(free.at(i), block.times(i, r)));
       });
-  reduce_then(
-      "cloth: energy", n, 0.,
-      DRENCH_LAMBDA(int i) { return dot_double(residual[i], direction[i]); }, AddDoubles{},
-      DRENCH_LAMBDA(double energy) {
-        control->energy = energy;
-        control->done = !(energy > double(sweep.tolerance) * control->reference);
-      });
-  for (int k = 0; k < sweeps && !cloth_ended(state); ++k) {
+  for (int k = 0;; ++k) {
+    sum_lanes_then(
+        "cloth: image", n,
+        DRENCH_LAMBDA(auto i) {
+          const auto z = scaled.at(i), image_of_z = matrix.times(scaled, i);
+          image.put(i, image_of_z);
+          return Two<decltype(z.x)>{dot(residual.at(i), z), dot(z, image_of_z)};
+        },
+        DRENCH_LAMBDA(double energy, double curvature) { sweep.decide(energy, curvature); });
+    if (k == sweeps || cloth_ended(state)) break;
     for_each_lane(
-        "cloth: image", n, DRENCH_LAMBDA(auto i) { image.put(i, matrix.times(direction, i)); });
-    reduce_then(
-        "cloth: curvature", n, 0.,
-        DRENCH_LAMBDA(int i) { return dot_double(direction[i], image[i]); }, AddDoubles{},
-        DRENCH_LAMBDA(double curvature) { sweep.decide_step(curvature); });
-    reduce_then(
-        "cloth: update", n, 0., DRENCH_LAMBDA(int i) { return sweep.update(i); }, AddDoubles{},
-        DRENCH_LAMBDA(double energy) { sweep.decide_turn(energy); });
-    parallel_for(
-        "cloth: turn", n, DRENCH_LAMBDA(int i) { sweep.turn(i); });
+        "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
   }
 }
 
