@@ -269,7 +269,8 @@ struct Shot {
 /// What `automatic` and 0 stand for.
 inline bool is_incompressible(const Shot& shot) {
   return shot.fluid.solver == FluidSolver::incompressible ||
-         (shot.fluid.solver == FluidSolver::automatic && shot.cloth.empty());
+         (shot.fluid.solver == FluidSolver::automatic &&
+          (shot.cloth.empty() || shot.coupling.scheme == CouplingScheme::exact));
 }
 inline double support_ratio(const Shot& shot) {
   if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;

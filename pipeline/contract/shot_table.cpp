@@ -191,7 +191,7 @@ std::vector<Parameter> fluid_rows() {
       row<&Fluid::solver>("fluid", "solver", "", none, simulate,
                           "incompressible solves for the pressure that keeps the density, in large "
                           "steps; weakly_compressible follows sound, in small ones. automatic is "
-                          "incompressible without cloth and weakly_compressible with it")
+                          "incompressible but for coupling.scheme \"paper\"")
           .one_of({"automatic", "incompressible", "weakly_compressible"}),
       row<&Fluid::tolerance>("fluid", "tolerance", "", {1e-7, 0.1}, simulate,
                              "of the incompressible solver: mean error of the density over rest "

@@ -61,6 +61,7 @@ Shot seed_shot(SeedScene scene, int particles, CouplingScheme scheme) {
   shot.name = "seed_table1", shot.file = "seed_table1";
   shot.domain.min = V3d(-0.36, 0, -0.36), shot.domain.max = V3d(0.36, 1.6, 0.36);
   shot.coupling.scheme = scheme;
+  shot.fluid.solver = FluidSolver::weakly_compressible;
   const double a = shot.fluid.spacing;
   shot.cloth.push_back(sheet_at(0.5, density));
   if (scene == SeedScene::one_sheet) shot.fluid.box = {block_on(0.5, side, 16, a)};
