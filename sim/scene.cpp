@@ -171,7 +171,8 @@ double largest_eigenvalue(const double (&m)[6]) {
 
 double damping_of(const Sheet& sheet, const Sheet::Spring& s, const Cloth& cloth) {  // N s/m
   const double reduced = sheet.mass[s.a] * sheet.mass[s.b] / (sheet.mass[s.a] + sheet.mass[s.b]);
-  return cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced);
+  return cloth.spring_damping * 2 * std::sqrt(s.stiffness * reduced) +
+         cloth.retardation_time * s.stiffness;
 }
 
 /// Largest over the free vertices of the eigenvalue of sum_j 2 k e e^T over m, for stiffness or

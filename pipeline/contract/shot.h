@@ -128,6 +128,7 @@ struct Cloth {
   double diagonal_stiffness = 200;  // N/m, k_diag; isotropic when k_adj = 2 k_diag
   double damping = 0.5;             // 1/s, rate of eq (3): d = exp(-damping dt)
   double spring_damping = 0.1;      // fraction of critical, along each spring; momentum is kept
+  double retardation_time = 0;      // s, viscosity over stiffness of each spring (Kelvin-Voigt)
   double thickness = 0.001;         // m
   std::string material = "cotton";
 };

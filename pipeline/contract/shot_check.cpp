@@ -350,6 +350,12 @@ class Checker {
                       "hold the sheet together. Set one above 0",
                       path));
     }
+    if (cloth.retardation_time > 0 && !(shot_.fluid.present() && is_incompressible(shot_))) {
+      fail(path + ".retardation_time",
+           fmt::format("{}.retardation_time is {} s, but only sheets beside incompressible fluid "
+                       "take implicit steps; explicit ones would be too short to end. Use 0",
+                       path, cloth.retardation_time));
+    }
     for (size_t k = 0; k < cloth.pin.size(); ++k) {
       check_pin(cloth, fmt::format("{}.pin[{}]", path, k), cloth.pin[k], vertices);
     }

@@ -280,6 +280,11 @@ std::vector<Parameter> cloth_rows() {
                            "rate at which velocity is lost"),
       row<&Cloth::spring_damping>("cloth", "spring_damping", "", {0, 1}, simulate,
                                   "along each spring, fraction of critical; keeps momentum"),
+      row<&Cloth::retardation_time>("cloth", "retardation_time", "s", {0, 1}, simulate,
+                                    "inner friction, viscosity over stiffness of every spring: a "
+                                    "swing of period T loses 1 - exp(-2 pi^2 t / T) of its height "
+                                    "with this t; cotton about 0.005. Beside incompressible fluid "
+                                    "only"),
       row<&Cloth::thickness>("cloth", "thickness", "m", {1e-6, 1}, simulate, "thickness"),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
 

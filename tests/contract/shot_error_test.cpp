@@ -84,6 +84,8 @@ TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
       {"[domain]\nx = \"periodic\"\n[[cloth]]\n", {"scene.toml:5", "domain.x", "cloth", "seam"}},
       {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"sphere\"\n",
        {"scene.toml:5", "domain.x", "obstacle", "seam"}},
+      {"[fluid]\nsolver = \"weakly_compressible\"\n[[cloth]]\nretardation_time = 0.01\n",
+       {"scene.toml", "cloth[0].retardation_time", "Use 0"}},
       {"[fluid]\nsolver = \"incompressible\"\n[coupling]\nscheme = \"paper\"\n[[cloth]]\n",
        {"scene.toml:5", "fluid.solver", "paper", "weakly_compressible"}},
       // 0.08 m are less than two supports of 2.15 spacings.

@@ -87,6 +87,40 @@ TEST(StrongCoupling, AHangingSheetStretchesByItsWeight) {
   EXPECT_NEAR(length / 0.4 - 1, 2 * 9.81 * 0.4 / (2 * 8. / 3 * 200), 2e-4);
 }
 
+// Kelvin and Voigt: a mode of frequency omega dies at the rate omega^2 tau / 2, and implicit Euler
+// adds omega^2 dt / 2. A hanging strip of two vertices a side is one mode: omega^2 = k / m with the
+// masses of the lower row, k of its upright springs.
+TEST(StrongCoupling, InnerFrictionDampsAsKelvinAndVoigtSay) {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.fluid.solver = FluidSolver::incompressible;
+  FluidEmitter late;
+  late.center = V3d(0.5, 0, 0), late.radius = 0.03, late.speed = 1, late.start = 100,
+  late.stop = 101;
+  shot.fluid.emitter.push_back(late);
+  Cloth& sheet = add_sheet(shot, 0.1, 0, 1);
+  sheet.corner = V3d(0, 0, 0), sheet.u = V3d(0.1, 0, 0), sheet.v = V3d(0, -0.1, 0);
+  sheet.areal_density = 20, sheet.damping = 0, sheet.spring_damping = 0;
+  sheet.adjacent_stiffness = 400, sheet.diagonal_stiffness = 0, sheet.retardation_time = 0.01;
+  ClothPin pin;
+  pin.vertices = {0, 1};
+  sheet.pin.push_back(pin);
+  Stepper run(shot);
+  const double dt = 5e-4, omega2 = 200 / 0.05;  // half a spring, a quarter of 0.2 kg
+  const double rest = -0.1 - 9.81 / omega2, pinned = run.scene.start.cloth_position.y[0];
+  std::vector<double> turn;  // m, how far from rest the strip turns
+  for (double last = 0, before = 0; turn.size() < 3 && run.steps < 2000;) {
+    run.step(dt);
+    const double y = run.solver->save().cloth_position.y[2] - pinned - rest;
+    if (run.steps > 2 && (last - before) * (y - last) < 0) turn.push_back(std::abs(last));
+    before = last, last = y;
+  }
+  ASSERT_EQ(turn.size(), 3u);
+  const double rate = omega2 * (0.01 + dt) / 2, omega = std::sqrt(omega2 - rate * rate);
+  for (size_t k = 0; k + 1 < turn.size(); ++k)
+    EXPECT_NEAR(std::log(turn[k] / turn[k + 1]), rate * M_PI / omega, 0.03 * rate * M_PI / omega);
+}
+
 // A sheet that lies on the floor bears its water: held by the floor it answers as the floor does.
 TEST(StrongCoupling, ASheetOnTheFloorBearsItsWater) {
   Shot shot = fall_on_sheet(50);
