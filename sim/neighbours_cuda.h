@@ -18,7 +18,11 @@ __device__ void for_each_within(const GridView& grid, const VecView& position, i
                  const Vec3<float> seen = p - shift;  // from where they are
                  for (int j = begin; j < end; ++j) {
                    const float r2 = length2(position[j] - seen);
-                   if (r2 < h * h) visit(j, r2);
+                   if (r2 >= h * h) continue;
+                   if constexpr (Filter::columns > 0) {
+                     if (tested && filter.hides(i, j)) continue;
+                   }
+                   visit(j, r2);
                  }
                });
 }

@@ -55,6 +55,7 @@ struct Limits {
   float residual = 0;          // mean density error that the pressure solve left, over rest
   int iterations = 0;          // of the pressure solve
   int sheet_sweeps = 0;        // of the conjugate gradients of the sheets
+  int sheets_cut_short = 0;    // 1: these were too few for their tolerance at the end of the step
   float viscous_residual = 0;  // RMS that a viscous solve cut short left, over that of the velocity
   int viscous_iterations = 0;  // of the viscous solve
   float step = 0;              // s, of the step that was made

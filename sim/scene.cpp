@@ -124,7 +124,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.rest_density = float(shot.fluid.rest_density);
   p.particle_mass = float(shot.fluid.rest_density * a * a * a);
   const bool poly6 = shot.coupling.scheme == CouplingScheme::paper && !shot.cloth.empty();
-  p.incompressible = is_incompressible(shot);
+  p.incompressible = p.fluid && is_incompressible(shot);
   p.tolerance = float(shot.fluid.tolerance), p.xsph = float(shot.fluid.xsph);
   p.incompressible ? calibrate<cpu::WendlandC2>(a, h, p)
   : poly6          ? calibrate<cpu::Poly6>(a, h, p)

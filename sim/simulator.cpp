@@ -157,6 +157,7 @@ struct Simulator::Implementation {
       report.worst_residual = std::max(report.worst_residual, double(limits.residual));
       report.viscous_iterations += limits.viscous_iterations;
       report.viscous_unconverged += limits.viscous_residual > 0;
+      report.sheets_cut_short += limits.sheets_cut_short;
       report.worst_viscous_residual =
           std::max(report.worst_viscous_residual, double(limits.viscous_residual));
       ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
@@ -216,6 +217,12 @@ struct Simulator::Implementation {
                               frame, report.viscous_unconverged, report.steps,
                               scene.parameters.most_viscous_iterations,
                               scene.parameters.viscous_tolerance, report.worst_viscous_residual));
+    }
+    if (report.sheets_cut_short > 0) {
+      log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
+                                     "they lack some of the water's momentum. Shorter steps "
+                                     "(shot.time_step) or softer cloth ask for less",
+                                     frame, report.sheets_cut_short, report.steps));
     }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();

@@ -131,8 +131,10 @@ class BackendSolver : public Solver {
       const SolveControl solve = value_at(state_.pressure.control, 0);
       limits.residual = solve.residual, limits.iterations = solve.iterations;
       limits.step = float(dt);
-      if (allocated_ & column_cloth_system)
-        limits.sheet_sweeps = value_at(state_.cloth_system.control, 0).sweeps;
+      if (allocated_ & column_cloth_system) {
+        const ClothControl sheets = value_at(state_.cloth_system.control, 0);
+        limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
+      }
     }
     if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
       const ViscousControl solve = value_at(state_.viscosity.control, 0);

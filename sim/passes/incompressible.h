@@ -98,6 +98,7 @@ inline void move_with_sheets(State& state) {
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
                 drift = f.drift.view();
   finish_sheets(state);
+  if (state.contact.near > 0) take_sheets_off_walls(state);
   parallel_for(
       "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> from = start[i];

@@ -101,7 +101,7 @@ inline void add_sheets_to_walls(State& state) {
         const float open = 1.f - w.value, left = max0(1.f - share.value);
         const Vec3<float> g = n * (rest * open * share.slope), all = w.gradient * (rest * left) + g;
         c.gradient.set(row, g);
-        c.way[row] = max0(nearer + recovery);
+        c.way[row] = maximum(nearer + recovery, 0.1f * recovery);
         c.compliance[row] = squeeze * max0(-rest * left * dot(g, w.gradient));
         wall[i] = {all.x, all.y, all.z, rest * (1.f - open * (1.f - share.value))};
       });
@@ -245,14 +245,28 @@ inline void subtract_sheet_rate(State& state) {
       });
 }
 
+/// Leaves the domain's walls alone in the column, for whoever asks for their force.
+inline void take_sheets_off_walls(State& state) {
+  const SheetRows c = sheet_rows(state);
+  Float4* wall = state.pressure.wall.data();
+  parallel_for(
+      "sheets: walls", c.rows, DRENCH_LAMBDA(int row) {
+        const int i = c.particle[row];
+        if (i < 0) return;
+        const Vec3<float> g = c.gradient[row];
+        wall[i] = {wall[i].x - g.x, wall[i].y - g.y, wall[i].z - g.z, wall[i].w};
+      });
+}
+
 /// Where the sheets end the step if nothing stops them, and the fluid's force on them for whoever
-/// asks: the loads are it times dt^2.
+/// asks: the loads over dt^2, beside what the path test owed.
 inline void finish_sheets(State& state) {
   ClothState& c = state.cloth;
   const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
                 next_velocity = c.next_velocity.view(), predicted = c.predicted.view(),
                 change = state.cloth_system.change.view(), force = c.force.view(),
-                right = state.cloth_system.right.view(), base = state.cloth_system.base.view();
+                right = state.cloth_system.right.view(), base = state.cloth_system.base.view(),
+                free_axes = state.cloth_system.free.view();
   const bool near = state.contact.near > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);
@@ -263,7 +277,11 @@ inline void finish_sheets(State& state) {
         walls.stop(to, velocity);
         const auto free = load(inverse_mass, i) > T(0.f);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-        if (near) force.put(i, (right.at(i) - base.at(i)) * T(inverse_dt * inverse_dt));
+        // What walls hold does not slide freely: half a step's way, as where they stop it.
+        const Vec3<T> may = free_axes.at(i), held{T(1.f) - may.x, T(1.f) - may.y, T(1.f) - may.z};
+        velocity = select(length2(held) > T(0.f), along(may, velocity) * T(0.5f), velocity);
+        if (near)
+          force.put(i, force.at(i) + (right.at(i) - base.at(i)) * T(inverse_dt * inverse_dt));
         velocity = select(free, velocity, none);
         next.put(i, select(free, to, x.at(i)));
         next_velocity.put(i, velocity);

@@ -23,6 +23,19 @@ struct SheetTopology {
            (beyond(p.y, q.y, low.y, high.y) && normal.y * normal.y < across) ||
            (beyond(p.z, q.z, low.z, high.z) && normal.z * normal.z < across);
   }
+  /// Are all free edges that meet in a vertex?
+  DRENCH_HD bool closed_at(int vertex) const {
+    for (int k = fan_start[vertex]; k < fan_start[vertex + 1]; ++k) {
+      const int t = fan_entry[k] / 3, c = fan_entry[k] % 3;
+      for (int side = 0; side < 2; ++side) {  // the two edges of the triangle at its corner c
+        const int e = (c + 2 * side) % 3;
+        if (neighbour[3 * t + e] >= 0) continue;
+        const int a = polygons.corner[3 * t + e], b = polygons.corner[3 * t + (e + 1) % 3];
+        if (!closed_by_wall(area_normal(t), a, b)) return false;
+      }
+    }
+    return true;
+  }
   DRENCH_HD static bool beyond(float p, float q, float low, float high) {
     return (p < low && q < low) || (p > high && q > high);
   }
@@ -86,8 +99,7 @@ DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, fl
   if (!(za || zb || zc)) return {sheet.unit_normal(t), false};
   if ((za && zb) || (zb && zc) || (za && zc)) {
     const int vertex = corner[!za ? 0 : !zb ? 1 : 2];
-    return {sheet.vertex_normal(vertex),
-            sheet.rim[vertex] != 0 && !sheet.closed_by_wall(sheet.unit_normal(t), vertex, vertex)};
+    return {sheet.vertex_normal(vertex), sheet.rim[vertex] != 0 && !sheet.closed_at(vertex)};
   }
   const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
   const int other = sheet.neighbour[3 * t + edge];

@@ -143,6 +143,21 @@ TEST(StrongCoupling, ASheetOnTheFloorBearsItsWater) {
   EXPECT_LT(run.limits.max_speed, 0.3);
 }
 
+// What walls hold does not slide on them for ever.
+TEST(StrongCoupling, ASheetThatSlidesOnTheFloorComesToRest) {
+  Shot shot = fall_on_sheet(50);
+  shot.domain.min.y = 0;
+  Cloth& sheet = shot.cloth[0];
+  sheet.pin.clear();
+  sheet.corner = V3d(-0.1, 0.006, -0.1), sheet.u.x = sheet.v.z = 0.2, sheet.cells = V2i(8, 8);
+  sheet.velocity = V3d(1, 0, 0), sheet.damping = 0;
+  shot.fluid.box.clear();
+  add_box(shot, V3d(-0.02, 0.4, -0.02), {2, 2, 2});
+  Stepper run(shot);
+  run.advance(0.1);
+  EXPECT_LT(at(run.solver->save().cloth_velocity, 40).length(), 0.01);
+}
+
 // A free edge has no force: drops that fall past it do not feel it.
 TEST(StrongCoupling, DropsThatFallPastAFreeEdgeDoNotFeelIt) {
   Shot shot = empty_shot();
