@@ -157,6 +157,7 @@ struct Simulator::Implementation {
       report.worst_residual = std::max(report.worst_residual, double(limits.residual));
       report.viscous_iterations += limits.viscous_iterations;
       report.viscous_unconverged += limits.viscous_residual > 0;
+      report.sheet_sweeps += limits.sheet_sweeps;
       report.sheets_cut_short += limits.sheets_cut_short;
       report.worst_viscous_residual =
           std::max(report.worst_viscous_residual, double(limits.viscous_residual));

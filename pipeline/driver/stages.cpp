@@ -40,6 +40,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"iterations", step.iterations},
                      {"unconverged", step.unconverged},
                      {"viscous_iterations", step.viscous_iterations},
+                     {"sheet_sweeps", step.sheet_sweeps},
                      {"sheets_cut_short", step.sheets_cut_short},
                      {"viscous_unconverged", step.viscous_unconverged},
                      {"guard_hits", step.guard_hits}}

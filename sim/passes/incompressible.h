@@ -16,23 +16,25 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Symplectic Euler as if there were no pressure.
-inline void predict_particles(State& state) {
+/// Symplectic Euler as if there were no pressure; `move(x, v)` is where a particle ends up.
+template <class Move>
+void predict_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   const float dt = float(state.dt);
-  const VecView x = f.position.view(), v = f.velocity.view();
+  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view();
   const Vec3<float> kick{dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]};
-  const Mover mover = mover_of(p, dt);
-  const VecView start = f.start.view();
   const bool keep = f.start.x.size() > 0;  // sheets stand where they stood
   parallel_for(
       "predict", f.count, DRENCH_LAMBDA(int i) {
         Vec3<float> velocity = v[i] + kick;
         if (keep) start.set(i, x[i]);
-        x.set(i, mover(x[i], velocity));
+        x.set(i, move(x[i], velocity));
         v.set(i, velocity);
       });
+}
+inline void predict_particles(State& state) {
+  predict_with(state, mover_of(state.parameters, float(state.dt)));
 }
 
 /// Neighbour lists, density, walls and the diagonal of the pressure matrix.
@@ -73,7 +75,8 @@ inline void find_neighbours(State& state) {
 }
 
 /// Pressures, and what they do to positions and velocities.
-inline void project_density(State& state) {
+template <class Move>
+void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   solve_pressure(state, p.tolerance, p.most_iterations);
@@ -81,14 +84,16 @@ inline void project_density(State& state) {
   const VecView x = f.position.view(), v = f.velocity.view();
   const Float4* displacement = state.pressure.vector.data();
   const float inverse_dt = float(1 / state.dt);
-  const Mover mover = mover_of(p, float(state.dt));
   parallel_for(
       "project", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> d{displacement[i].x, displacement[i].y, displacement[i].z};
         Vec3<float> change = d * inverse_dt;
-        x.set(i, mover(x[i], change));
+        x.set(i, move(x[i], change));
         v.set(i, v[i] + change);
       });
+}
+inline void project_density(State& state) {
+  project_with(state, mover_of(state.parameters, float(state.dt)));
 }
 
 /// Fluid and sheets go to their new places, each path tested against the moving triangles.

@@ -94,6 +94,12 @@ struct ObstacleGuard {
     return least;
   }
 
+  /// As a Mover, within the domain's walls too.
+  DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
+    const Vec3<float> to = walls(x, v);
+    return (*this)(x, to, v);
+  }
+
   /// Where a particle ends that would go from x0 to x1, and what becomes of its velocity.
   DRENCH_HD Vec3<float> operator()(Vec3<float> x0, Vec3<float> x1, Vec3<float>& v) const {
     bool met = true;
@@ -134,38 +140,12 @@ inline ObstacleGuard obstacle_guard_of(const State& state, int start) {
 
 /// predict_particles with obstacles that move at the same time.
 inline void predict_around_obstacles(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  const float dt = float(state.dt);
-  const VecView x = f.position.view(), v = f.velocity.view();
-  const Vec3<float> kick{dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]};
-  const ObstacleGuard guard = obstacle_guard_of(state, 0);
-  parallel_for(
-      "predict around obstacles", f.count, DRENCH_LAMBDA(int i) {
-        Vec3<float> velocity = v[i] + kick;
-        const Vec3<float> from = x[i], to = guard.walls(from, velocity);
-        x.set(i, guard(from, to, velocity));
-        v.set(i, velocity);
-      });
+  predict_with(state, obstacle_guard_of(state, 0));
 }
 
 /// project_density with obstacles where the step ends.
 inline void project_around_obstacles(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  solve_pressure(state, p.tolerance, p.most_iterations);
-  const VecView x = f.position.view(), v = f.velocity.view();
-  const Float4* displacement = state.pressure.vector.data();
-  const float inverse_dt = float(1 / state.dt);
-  const ObstacleGuard guard = obstacle_guard_of(state, 1);
-  parallel_for(
-      "project around obstacles", f.count, DRENCH_LAMBDA(int i) {
-        const Vec3<float> d{displacement[i].x, displacement[i].y, displacement[i].z};
-        Vec3<float> change = d * inverse_dt;
-        const Vec3<float> from = x[i], to = guard.walls(from, change);
-        x.set(i, guard(from, to, change));
-        v.set(i, v[i] + change);
-      });
+  project_with(state, obstacle_guard_of(state, 1));
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

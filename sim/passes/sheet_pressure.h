@@ -169,8 +169,8 @@ inline void load_by_pressures(State& state) {
 }
 
 /// Adds to the solve's diagonal the row sums of C A^-1 C^T, which bound every mode: the sheets'
-/// answer to the same pressure all along one side. Their mass alone would bound them too, a
-/// thousand times too high where a light sheet is taut.
+/// answer to the same pressure all along one side. Their mass alone would bound them too, far
+/// too high where a light sheet is taut.
 inline void add_sheets_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const SheetRows c = sheet_rows(state);

@@ -61,10 +61,8 @@ TEST_P(MassRatio, NeitherBlowsUpNorLeaks) {
   EXPECT_LT(*std::min_element(state.cloth_position.y.begin(), state.cloth_position.y.end()), pins);
 }
 
-// A hanging sheet in a shot whose fluid has not started: the implicit step alone. Elongation
-// w L / (2 E h_t) with w = sigma g and E h_t = 8/3 k_diag, narrow enough for Poisson's ratio not to
-// matter; damped, so that it stands after 3 s (tests/validation/README.md).
-TEST(StrongCoupling, AHangingSheetStretchesByItsWeight) {
+/// Fluid that starts later than any test ends: sheets take implicit steps by themselves.
+Shot before_its_fluid() {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -9.81, 0);
   shot.fluid.solver = FluidSolver::incompressible;
@@ -72,6 +70,14 @@ TEST(StrongCoupling, AHangingSheetStretchesByItsWeight) {
   late.center = V3d(0.5, 0, 0), late.radius = 0.03, late.speed = 1, late.start = 100,
   late.stop = 101;
   shot.fluid.emitter.push_back(late);
+  return shot;
+}
+
+// A hanging sheet in a shot whose fluid has not started: the implicit step alone. Elongation
+// w L / (2 E h_t) with w = sigma g and E h_t = 8/3 k_diag, narrow enough for Poisson's ratio not to
+// matter; damped, so that it stands after 3 s (tests/validation/README.md).
+TEST(StrongCoupling, AHangingSheetStretchesByItsWeight) {
+  Shot shot = before_its_fluid();
   Cloth& sheet = add_sheet(shot, 0.4, 0, 16);
   sheet.corner = V3d(0, 0, 0), sheet.u = V3d(0.1, 0, 0), sheet.v = V3d(0, -0.4, 0);
   sheet.cells = V2i(4, 16), sheet.areal_density = 2, sheet.damping = 20;
@@ -91,13 +97,7 @@ TEST(StrongCoupling, AHangingSheetStretchesByItsWeight) {
 // adds omega^2 dt / 2. A hanging strip of two vertices a side is one mode: omega^2 = k / m with the
 // masses of the lower row, k of its upright springs.
 TEST(StrongCoupling, InnerFrictionDampsAsKelvinAndVoigtSay) {
-  Shot shot = empty_shot();
-  shot.gravity = V3d(0, -9.81, 0);
-  shot.fluid.solver = FluidSolver::incompressible;
-  FluidEmitter late;
-  late.center = V3d(0.5, 0, 0), late.radius = 0.03, late.speed = 1, late.start = 100,
-  late.stop = 101;
-  shot.fluid.emitter.push_back(late);
+  Shot shot = before_its_fluid();
   Cloth& sheet = add_sheet(shot, 0.1, 0, 1);
   sheet.corner = V3d(0, 0, 0), sheet.u = V3d(0.1, 0, 0), sheet.v = V3d(0, -0.1, 0);
   sheet.areal_density = 20, sheet.damping = 0, sheet.spring_damping = 0;
