@@ -42,6 +42,8 @@ DRENCH_HD Quad splat_sum(Quad a) {
 }
 /// y, z, x, w.
 DRENCH_HD Quad rotate(Quad a) { return {a.y, a.z, a.x, a.w}; }
+/// z, x, y, w.
+DRENCH_HD Quad rotate_back(Quad a) { return {a.z, a.x, a.y, a.w}; }
 DRENCH_HD Quad both(const Float4& a) { return {a.x, a.y, a.z, a.w}; }
 DRENCH_HD Quad nearest_integer(Quad a) { return {rintf(a.x), rintf(a.y), rintf(a.z), rintf(a.w)}; }
 
@@ -66,6 +68,7 @@ DRENCH_HD Quad splat_sum(Quad a) {
   return pairs + Quad(Quad::Native(_mm256_permute_ps(pairs.v, 0x4e)));
 }
 DRENCH_HD Quad rotate(Quad a) { return Quad(Quad::Native(_mm256_permute_ps(a.v, 0xc9))); }
+DRENCH_HD Quad rotate_back(Quad a) { return Quad(Quad::Native(_mm256_permute_ps(a.v, 0xd2))); }
 DRENCH_HD Quad nearest_integer(Quad a) {
   return Quad(Quad::Native(_mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)));
 }

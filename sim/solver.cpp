@@ -219,13 +219,7 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.density, &f.pressure_term}) c->resize(n);
       if (!state_.parameters.incompressible) f.inverse_density.resize(n);
     }
-    if (allocated_ & column_projection) {
-      PressureState& s = state_.pressure;
-      for (Column<Float4>* c : {&s.place, &s.vector, &s.wall}) c->resize(n);
-      for (Column<float>* c : {&s.inverse_diagonal, &s.source, &s.before, &s.next, &s.product})
-        c->resize(n);
-      s.control.resize(1);
-    }
+    if (allocated_ & column_projection) state_.pressure.resize(n);
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,
                                &f.edge, &f.cloth_share}) {

@@ -161,8 +161,17 @@ struct PressureState {
   Column<Float4> place;   // m, position; w: a pressure
   Column<Float4> vector;  // a vector field; w: 0
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
+  Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
+  Column<Float4> push;  // m^4/(kg s^2) a unit of q of the particle itself: acceleration
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
+
+  void resize(size_t n) {
+    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push})
+      c->resize(n);
+    for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
+    control.resize(1);
+  }
 };
 
 /// Obstacles as the step has them (obstacle_placement.h) and the level sets they point to.

@@ -70,6 +70,7 @@ inline void find_neighbours(State& state) {
   } else {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
   }
+  correct_gradients(state);
   invert_diagonal(state);
   if (sheets) limit_recovery(state);
 }

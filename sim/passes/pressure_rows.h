@@ -1,31 +1,37 @@
 #pragma once
 // The rows of the incompressible solve (as DFSPH: Bender and Koschier 2017, eqs 7 to 9). With D the
 // rate of density that velocities make,
-//   (D v)_i = sum_j m (v_i - v_j) . grad W_ij + rho_0 grad S_i . v_i,    S: share of the walls,
+//   (D v)_i = sum_j m (v_i - v_j) . L_i grad W_ij + rho_0 grad S_i . v_i,   S: share of the walls,
+//                                                   L: gradient_correction.h,
 // pressures p_i = rho_i^2 q_i accelerate particles by -D^T q, so that momentum is kept and D D^T is
 // symmetric and not negative. Its diagonal is what DFSPH divides by.
 
-#include "sim/kernels.h"
-#include "sim/periodic.h"
-#include "sim/state.h"
+#include "sim/passes/gradient_correction.h"
 
 namespace drench::sim::DRENCH_BACKEND {
+
+/// L v of a symmetric L: its diagonal, and its xy, yz, zx.
+DRENCH_HD Float4 multiply_symmetric(const Float4& d, const Float4& c, const Float4& v) {
+  return {d.x * v.x + c.x * v.y + c.z * v.z, c.x * v.x + d.y * v.y + c.y * v.z,
+          c.z * v.x + c.y * v.y + d.z * v.z, 0.f};
+}
 
 /// vector = -D^T q.
 template <class Separation>
 struct PressureAcceleration {
-  static constexpr int columns = 1;
-  const Float4 *place, *wall;  // position and q; rho_0 grad S, kg/m^4
+  static constexpr int columns = 3;
+  const Float4 *place, *correction, *correction_cross;  // position and q; L
+  const Float4* push;                                   // by q = 1 of the particle itself
   Float4* vector;
   const int* done;
   float scale;  // m / h^5 over the lattice sum, kg/m^5
   Separation separation;
 
   DRENCH_HD bool idle() const { return *done; }
-  DRENCH_HD Columns<1> inputs() const { return {{place}}; }
+  DRENCH_HD Columns<3> inputs() const { return {{place, correction, correction_cross}}; }
   template <class Q>
   struct Particle {
-    Q place;
+    Q place, diagonal, cross;
   };
   template <class Q>
   struct Sum {
@@ -35,15 +41,17 @@ struct PressureAcceleration {
   DRENCH_HD T weight(T u) const {
     return WendlandC2::slope(u);
   }
+  /// + L_j r w q_j
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.push =
-        multiply_add(separation(i.place, j.place), weight * splat_w(i.place + j.place), sum.push);
+    const Q r = weight * splat_w(j.place) * separation(i.place, j.place);
+    sum.push = multiply_add(j.diagonal, r, multiply_add(j.cross, rotate(r), sum.push)) +
+               rotate_back(j.cross * r);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const float q = place[i].w;
-    const Float4 g = wall[i], p = sum.push;
-    vector[i] = {scale * p.x - q * g.x, scale * p.y - q * g.y, scale * p.z - q * g.z, 0.f};
+    const Float4 own = push[i], p = sum.push;
+    vector[i] = {scale * p.x + q * own.x, scale * p.y + q * own.y, scale * p.z + q * own.z, 0.f};
   }
 };
 
@@ -51,7 +59,7 @@ struct PressureAcceleration {
 template <class Separation>
 struct DensityRate {
   static constexpr int columns = 2;
-  const Float4 *place, *vector, *wall;
+  const Float4 *place, *vector, *correction, *correction_cross, *wall;
   float* rate;
   const int* done;
   float scale;
@@ -65,7 +73,7 @@ struct DensityRate {
   };
   template <class Q>
   struct Sum {
-    Q product;
+    Q diagonal, cross;  // of the products of separation and velocity, made symmetric
   };
   template <class T>
   DRENCH_HD T weight(T u) const {
@@ -73,20 +81,25 @@ struct DensityRate {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.product =
-        multiply_add(weight * separation(i.place, j.place), i.vector - j.vector, sum.product);
+    const Q r = weight * separation(i.place, j.place), v = i.vector - j.vector;
+    sum.diagonal = multiply_add(r, v, sum.diagonal);
+    sum.cross = multiply_add(r, rotate(v), multiply_add(rotate(r), v, sum.cross));
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
-    const Float4 g = wall[i], v = vector[i], p = sum.product;  // p.w is 0, as all vectors' w
-    rate[i] = g.x * v.x + g.y * v.y + g.z * v.z - scale * (p.x + p.y + p.z);
+    const Float4 g = wall[i], v = vector[i], d = correction[i], c = correction_cross[i];
+    const Float4 p = sum.diagonal, t = sum.cross;
+    const float product = d.x * p.x + d.y * p.y + d.z * p.z + c.x * t.x + c.y * t.y + c.z * t.z;
+    rate[i] = g.x * v.x + g.y * v.y + g.z * v.z - scale * product;
   }
 };
 
-/// 1 / (D D^T)_ii; 0 for a particle that nothing pushes.
+/// 1 / (D D^T)_ii, 0 for a particle that nothing pushes; and what q = 1 of a particle does to
+/// itself.
 template <class Separation>
 struct InverseDiagonal {
   static constexpr int columns = 1;
-  const Float4 *place, *wall;
+  const Float4 *place, *correction, *correction_cross, *wall;
+  Float4* push;
   float* inverse;
   float scale;
   Separation separation;
@@ -99,7 +112,7 @@ struct InverseDiagonal {
   };
   template <class Q>
   struct Sum {
-    Q gradient, square;
+    Q gradient, square, square_cross;
   };
   template <class T>
   DRENCH_HD T weight(T u) const {
@@ -110,11 +123,21 @@ struct InverseDiagonal {
     const Q gradient = weight * separation(i.place, j.place);
     sum.gradient = sum.gradient + gradient;
     sum.square = multiply_add(gradient, gradient, sum.square);
+    sum.square_cross = multiply_add(gradient, rotate(gradient), sum.square_cross);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
-    const Float4 g = wall[i], d = sum.gradient, s = sum.square;
-    const float x = scale * d.x - g.x, y = scale * d.y - g.y, z = scale * d.z - g.z;
-    const float diagonal = x * x + y * y + z * z + scale * scale * (s.x + s.y + s.z);
+    const Float4 g = wall[i], d = correction[i], c = correction_cross[i];
+    const Float4 own = multiply_symmetric(d, c, sum.gradient);
+    const Float4 p{scale * own.x - g.x, scale * own.y - g.y, scale * own.z - g.z, 0.f};
+    // the sum of |L grad W|^2 is the trace of L S L, S the sum of the products of grad W
+    const Float4 s = sum.square, t = sum.square_cross;
+    const Float4 x = multiply_symmetric(d, c, {s.x, t.x, t.z, 0.f}),
+                 y = multiply_symmetric(d, c, {t.x, s.y, t.y, 0.f}),
+                 z = multiply_symmetric(d, c, {t.z, t.y, s.z, 0.f});
+    const float square = d.x * x.x + c.x * x.y + c.z * x.z + c.x * y.x + d.y * y.y + c.y * y.z +
+                         c.z * z.x + c.y * z.y + d.z * z.z;
+    const float diagonal = p.x * p.x + p.y * p.y + p.z * p.z + scale * scale * square;
+    push[i] = p;
     inverse[i] = diagonal > 0.f ? 1.f / diagonal : 0.f;
   }
 };
@@ -131,7 +154,8 @@ inline void accelerate_by_pressure(State& state) {
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour("pressure: acceleration", s.lists, state.fluid.count,
                        PressureAcceleration<decltype(separation)>{
-                           s.place.data(), s.wall.data(), s.vector.data(), &s.control.data()->done,
+                           s.place.data(), s.correction.data(), s.correction_cross.data(),
+                           s.push.data(), s.vector.data(), &s.control.data()->done,
                            gradient_scale(state.parameters), separation});
   });
 }
@@ -142,18 +166,20 @@ inline void density_rate(State& state) {
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
                        DensityRate<decltype(separation)>{
-                           s.place.data(), s.vector.data(), s.wall.data(), s.product.data(),
+                           s.place.data(), s.vector.data(), s.correction.data(),
+                           s.correction_cross.data(), s.wall.data(), s.product.data(),
                            &s.control.data()->done, gradient_scale(state.parameters), separation});
   });
 }
 
-/// Of D D^T.
+/// Of D D^T, and PressureState::push.
 inline void invert_diagonal(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
                        InverseDiagonal<decltype(separation)>{
-                           s.place.data(), s.wall.data(), s.inverse_diagonal.data(),
+                           s.place.data(), s.correction.data(), s.correction_cross.data(),
+                           s.wall.data(), s.push.data(), s.inverse_diagonal.data(),
                            gradient_scale(state.parameters), separation});
   });
 }

@@ -6,6 +6,7 @@
 #include "sim/kernels.h"
 #include "sim/parallel.h"
 #include "sim/passes/density.h"
+#include "sim/passes/pressure_rows.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"
 
@@ -32,6 +33,7 @@ struct StepPressure {
   VecView position, velocity, acceleration;  // the last one weakly compressible only
   const float *term, *inverse_density;       // q; 1 / rho, weakly compressible only
   const Float4 *place, *wall;                // of the incompressible solver's solve, else null
+  const Float4 *correction, *correction_cross;
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
   Walls walls;
 
@@ -58,6 +60,13 @@ struct StepPressure {
             slope[2] * open[0] * open[1]};
   }
 
+  /// L n, see gradient_correction.h.
+  DRENCH_HD Vec3<float> corrected(int i, Vec3<float> n) const {
+    if (!place) return n;
+    const Float4 v = multiply_symmetric(correction[i], correction_cross[i], {n.x, n.y, n.z, 0.f});
+    return {v.x, v.y, v.z};
+  }
+
   /// -W'(r) / r times m over rho_0 for a distance r, 1/m^2.
   DRENCH_HD float pair_weight(float r) const {
     const float u = max0(1.f - r / h);
@@ -78,6 +87,8 @@ inline StepPressure step_pressure_of(const State& state) {
                  projected ? nullptr : f.inverse_density.data(),
                  projected ? state.pressure.place.data() : nullptr,
                  projected ? state.pressure.wall.data() : nullptr,
+                 projected ? state.pressure.correction.data() : nullptr,
+                 projected ? state.pressure.correction_cross.data() : nullptr,
                  float(state.dt),
                  h,
                  p.particle_mass,
@@ -170,8 +181,8 @@ struct WallSensor {
 };
 
 /// The stress along the disc's normal n, times volumes: by virtual work a pressure p_i gives
-/// p_i (m / rho_0) sum_j m / rho_0 (-W'/r) (x_ij . n)^2, what particle i has of the pair forces
-/// through planes across n; 1 times p_i V_i in a continuum, 0.91 to 0.98 as packings are.
+/// p_i (m / rho_0) sum_j m / rho_0 (-W'/r) (x_ij . L n) (x_ij . n), what particle i has of the pair
+/// forces through planes across n; 1 times p_i V_i in a continuum.
 struct InnerSensor {
   StepPressure step;
   SoftDisc disc;
@@ -179,7 +190,7 @@ struct InnerSensor {
 
   DRENCH_HD float response(int i) const {
     const Vec3<float> x = step.at(i);
-    const Vec3<float> n = disc.normal;
+    const Vec3<float> n = disc.normal, corrected = step.corrected(i, n);
     const GridShape& g = grid.shape;
     const int cx = g.cell_x(x.x), cy = g.cell_y(x.y), cz = g.cell_z(x.z);
     float sum = 0.f;
@@ -189,8 +200,7 @@ struct InnerSensor {
         const int last = g.index(cx + 1 < g.nx ? cx + 1 : cx, y, z);
         for (int j = grid.cell_start[first]; j < grid.cell_start[last + 1]; ++j) {
           const Vec3<float> d = step.at(j) - x;
-          const float across = dot(d, n);
-          sum += step.pair_weight(length(d)) * across * across;
+          sum += step.pair_weight(length(d)) * dot(d, corrected) * dot(d, n);
         }
       }
     }

@@ -161,7 +161,6 @@ void resting_column(const Emit& emit) {
     line.error_of = "RMS of the pressure's error over rho g H, by slabs";
     if (layers == 40) line.gate = 0.02;
     line.more["density_error"] = result.density;
-    line.more["response"] = result.response;
     line.more["drift"] = result.drift;
     line.more["volume"] = result.volume;
     emit(line);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "sim/passes/measure_density.h"
@@ -81,10 +82,12 @@ TEST(PressureRows, DensityOfTheStepAndOfTheMeasureAreTheSum) {
                 1e-4 * expected[size_t(i)]);
 }
 
-// The rate of density against a central difference of the sum in double, walls among it. The walls'
-// own share is in float: its difference quotient is good to a few parts in a thousand.
+// The rate of density, gradients not corrected, against a central difference of the sum in double,
+// walls among it. The walls' own share is in float: its difference quotient is good to a few parts
+// in a thousand.
 TEST(PressureRows, RateIsTheDerivativeOfTheDensity) {
   Listed listed(500, 0.07);
+  remove_correction(listed.state);
   Random random(3);
   sim::cpu::PressureState& s = listed.state.pressure;
   std::vector<V3d> ahead, behind;
@@ -103,6 +106,51 @@ TEST(PressureRows, RateIsTheDerivativeOfTheDensity) {
     difference += std::pow(rate - s.product.data()[i], 2), scale += rate * rate;
   }
   EXPECT_LT(std::sqrt(difference / scale), 5e-3);
+}
+
+/// Rates of the density over rest in the middle of a lattice that was sheared by 0.3, in a flow
+/// (y, 0, 0) that shears it on and in one (x, y, z) that expands it.
+struct Rates {
+  double sheared = 0, expanded = 0;
+};
+Rates rates_in_a_sheared_lattice(const std::function<void(Listed&)>& change) {
+  std::vector<V3d> places;
+  const double a = 0.01;
+  for (int k = 0; k < 14 * 14 * 14; ++k) {
+    const double y = a * (k / 14 % 14 + 1);
+    places.push_back(V3d(a * (k % 14 + 1) + 0.3 * y, y, a * (k / 196 + 1)));
+  }
+  Listed listed(places, 0.3, {Axis::open, Axis::open, Axis::open});
+  change(listed);
+  sim::cpu::PressureState& s = listed.state.pressure;
+  int middle = 0;
+  const V3d centre(7 * a + 0.3 * 7 * a, 7 * a, 7 * a);
+  for (int i = 0; i < listed.count(); ++i) {
+    if ((listed.place(i) - centre).length() < (listed.place(middle) - centre).length()) middle = i;
+  }
+  enum class Flow { shear, expansion };
+  const auto rate = [&](Flow flow) {
+    for (int i = 0; i < listed.count(); ++i) {
+      const V3d p = listed.place(i);
+      s.vector.data()[i] = flow == Flow::shear
+                               ? sim::cpu::Float4{float(p.y), 0, 0, 0}
+                               : sim::cpu::Float4{float(p.x), float(p.y), float(p.z), 0};
+    }
+    sim::cpu::density_rate(listed.state);
+    return s.product.data()[middle] / 1000.;
+  };
+  return {rate(Flow::shear), rate(Flow::expansion)};
+}
+
+// A shear changes no volume, an expansion by (x, y, z) changes it by 3; what the kernel's sum makes
+// of them depends on the arrangement. L corrects both.
+TEST(PressureRows, CorrectedGradientsAreExactInLinearFlows) {
+  const Rates corrected = rates_in_a_sheared_lattice([](Listed&) {});
+  EXPECT_NEAR(corrected.sheared, 0, 1e-4);
+  EXPECT_NEAR(corrected.expanded, -3, 1e-3);
+  const Rates plain = rates_in_a_sheared_lattice([](Listed& l) { remove_correction(l.state); });
+  EXPECT_GT(std::abs(plain.sheared), 0.004);
+  EXPECT_GT(std::abs(plain.expanded + 3), 0.02);
 }
 
 // x . (D v) = (D^T x) . v, and the diagonal is that of D D^T.
@@ -184,12 +232,13 @@ Fall collapse(double tolerance) {
 
 class Collapse : public testing::TestWithParam<double> {};
 
-// What a step leaves of density above rest is what was asked for and a second-order rest, and no
+// What a step leaves of density above rest is what was asked for and a rest: second order in the
+// displacement, and that corrected rows are not quite the density's derivative (5 % at 1e-4). No
 // energy comes from nowhere.
 TEST_P(Collapse, KeepsTheDensityThatWasAskedFor) {
   const Fall fall = collapse(GetParam());
   RecordProperty("residual", std::to_string(fall.residual));
-  EXPECT_LT(fall.residual, GetParam());
+  EXPECT_LT(fall.residual, 1.1 * GetParam());
   EXPECT_LT(fall.energy_gain, 0.01);
   EXPECT_EQ(fall.hit_cap, 0);
   EXPECT_GT(fall.iterations, 0);

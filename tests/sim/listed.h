@@ -13,31 +13,40 @@ inline Shot water() {
   return shot;
 }
 
+/// L = 1: rows that are the derivative of the kernel's sum.
+inline void remove_correction(sim::cpu::State& state) {
+  sim::cpu::PressureState& s = state.pressure;
+  for (int i = 0; i < state.fluid.count; ++i)
+    s.correction.data()[i] = {1, 1, 1, 0}, s.correction_cross.data()[i] = {0, 0, 0, 0};
+}
+
 /// `count` particles at random in a cube of `side` m inside walls, as a state that a step would
 /// predict: sorted, with lists.
 struct Listed {
   sim::cpu::State state;
 
-  Listed(int count, double side) {
+  Listed(int count, double side)
+      : Listed(at_random(count, side), side, {Axis::walls, Axis::open, Axis::walls}) {}
+  /// Particles at the given places, m, in a cube of `side` m.
+  Listed(const std::vector<V3d>& places, double side, std::array<Axis, 3> axis) {
     Shot shot = water();
     shot.domain.min = V3d(0), shot.domain.max = V3d(side);
-    shot.domain.axis = {Axis::walls, Axis::open, Axis::walls};
+    shot.domain.axis = axis;
     add_box(shot, V3d(0), {1, 1, 1});
+    const int count = int(places.size());
     state.parameters = sim::build_scene(shot).parameters;
     sim::cpu::FluidState& f = state.fluid;
     f.count = count;
-    Random random(11);
     for (sim::cpu::VecColumn* c : {&f.position, &f.velocity, &state.swap_vector}) c->resize(count);
     for (sim::cpu::Column<int>* c : {&f.id, &f.cell, &f.order, &state.swap_int}) c->resize(count);
     for (sim::cpu::Column<float>* c : {&f.density, &f.pressure_term}) c->resize(count);
     const sim::cpu::VecView x = f.position.view();
-    for (int i = 0; i < count; ++i)
-      x.set(i, {float(side * random()), float(side * random()), float(side * random())});
+    for (int i = 0; i < count; ++i) {
+      const V3d& p = places[size_t(i)];
+      x.set(i, {float(p.x), float(p.y), float(p.z)});
+    }
     sim::cpu::PressureState& s = state.pressure;
-    for (auto* c : {&s.place, &s.vector, &s.wall}) c->resize(count);
-    for (auto* c : {&s.inverse_diagonal, &s.source, &s.before, &s.next, &s.product})
-      c->resize(count);
-    s.control.resize(1);
+    s.resize(count);
     sim::cpu::sort_particles(state);
     sim::cpu::find_neighbours(state);
     s.control.data()->done = 0;
@@ -46,6 +55,17 @@ struct Listed {
   V3d place(int i) const {
     const sim::cpu::Vec3<float> p = state.fluid.position.view()[i];
     return V3d(p.x, p.y, p.z);
+  }
+
+ private:
+  static std::vector<V3d> at_random(int count, double side) {
+    Random random(11);
+    std::vector<V3d> places;
+    for (int i = 0; i < count; ++i) {
+      const double x = side * random(), y = side * random(), z = side * random();
+      places.push_back(V3d(x, y, z));
+    }
+    return places;
   }
 };
 

@@ -81,7 +81,8 @@ int behind_plate(double thickness, double speed, double plate_speed, double dt) 
   const double a = shot.fluid.spacing;
   add_box(shot, V3d(-4 * a, -4 * a, 6 * a), {8, 8, 8}, V3d(0, 0, -speed));
   Obstacle& plate = add_obstacle(shot, ObstacleType::box, V3d(0));
-  plate.size = V3d(60 * a, 60 * a, thickness * a);
+  // Wider than what an impact at 5 spacings a step throws aside gets in the time.
+  plate.size = V3d(200 * a, 200 * a, thickness * a);
   const double end = 1001 + shot.timeline.fps;  // a second
   plate.position.keys = {{1001, V3d(0)}, {end, V3d(0, 0, plate_speed)}};
   Stepper run(shot);

@@ -10,7 +10,7 @@
 #include "sim/passes/incompressible.h"
 #include "sim/passes/measure_density.h"
 #include "sim/simulator.h"
-#include "tests/sim/support.h"
+#include "tests/sim/listed.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::sim_tests {
@@ -176,15 +176,14 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   for (auto* c : {&f.id, &f.cell, &f.order, &state.swap_int}) c->resize(size_t(n));
   for (auto* c : {&f.density, &f.pressure_term}) c->resize(size_t(n));
   sim::cpu::PressureState& s = state.pressure;
-  for (auto* c : {&s.place, &s.vector, &s.wall}) c->resize(size_t(n));
-  for (auto* c : {&s.inverse_diagonal, &s.source, &s.product}) c->resize(size_t(n));
-  s.control.resize(1);
+  s.resize(size_t(n));
   for (int i = 0; i < n; ++i) {
     const V3d p = at(scene.start.position, size_t(i));
     f.position.view().set(i, {float(p.x), float(p.y), float(p.z)}), f.id.data()[i] = i;
   }
   sim::cpu::sort_particles(state);
   sim::cpu::find_neighbours(state);
+  remove_correction(state);
   s.control.data()->done = 0;
   const sim::cpu::NeighbourView list = view_of(s.lists);
   const auto place = [&](int i) { return at(scene.start.position, size_t(f.id.data()[i])); };

@@ -19,11 +19,9 @@ Collapse martin_moyce(int across, double tolerance);
 /// A column of 0.2 m at rest between walls, `layers` deep, averaged over the last tenth of the
 /// time.
 struct Rest {
-  double pressure = 0;  // RMS of the error of the mean pressure of slabs, over rho g H
+  double pressure = 0;  // RMS over the height of the error of the mean pressure, over rho g H
   double density = 0;   // mean of |rho / rho_0 - 1| a support below the surface
   double drift = 0;     // RMS speed at the end over sqrt(g H)
-  double response =
-      0;              // mean of vertical_response a support off floor and surface; 1 in a continuum
   double volume = 0;  // twice the centre of mass' height over that of the start, less 1
   int particles = 0;
 };
