@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace drench::sim_tests {
 
@@ -72,13 +73,23 @@ int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& befor
       box[t].add(at(after.cloth_position, cloth.corner[3 * t + k]));
     }
   }
+  // In the order of their lower x, so that a path looks at those alone that may begin before it
+  // ends.
+  std::vector<int> order(box.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return box[a].low.x < box[b].low.x; });
+  double widest = 0;
+  for (const Box& b : box) widest = std::max(widest, b.high.x - b.low.x);
   const std::vector<int> place = place_of_id(before);
   int count = 0;
   for (size_t i = 0; i < after.id.size(); ++i) {
     const V3d from = at(before.position, place[after.id[i]]), to = at(after.position, i);
     Box path;
     path.add(from), path.add(to);
-    for (int t = 0; t < cloth.triangles(); ++t) {
+    const auto first = std::lower_bound(order.begin(), order.end(), path.low.x - widest,
+                                        [&](int t, double x) { return box[t].low.x < x; });
+    for (auto k = first; k != order.end() && box[*k].low.x <= path.high.x; ++k) {
+      const int t = *k;
       if (!path.meets(box[t])) continue;
       Tetrahedron m;
       for (int k = 0; k < 3; ++k) {
