@@ -209,9 +209,10 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
       });
 }
 
-/// Chooses the near particles that could meet a sheet within the step, with room for cloth to move
-/// twice as far as the contact solve predicts. All others make their whole step now: nothing to
-/// test.
+/// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice
+/// as far as the contact solve predicts. All others make their whole step now: nothing to test. No
+/// step of the solvers' own choice takes a particle that is not near as far as a sheet; should one,
+/// all paths are tested.
 inline void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
@@ -235,22 +236,31 @@ inline void move_unguarded_particles(State& state) {
   float* far_by = f.far_by.data();
   const Mover mover = mover_of(state.parameters, dt);
   const Drift drift = drift_of(state);
-  const float room = reach + 2.f * path_clearance * spacing;
-  parallel_for(
-      "guard: move", f.count, DRENCH_LAMBDA(int i) {
+  const float room = reach + 2.f * path_clearance * spacing,
+              support = state.parameters.support_radius;
+  const int far_ones = parallel_reduce(
+      "guard: move", f.count, 0,
+      DRENCH_LAMBDA(int i) {
         Vec3<float> velocity = v[i];
         start.set(i, x[i]);
-        const float d = distance[i] < 0.f ? -distance[i] : distance[i];
+        const bool near = triangle[i] >= 0;
+        const float d = distance[i] < 0.f ? -distance[i] : distance[i],
+                    least = near ? d : support + max0(far_by[i]),
+                    path = dt * length(velocity) + length(drift[i]);
         // Beyond a free edge the distance is not kept.
-        const bool guard =
-            triangle[i] >= 0 &&
-            (length2(normal[i]) == 0.f || d <= dt * length(velocity) + length(drift[i]) + room);
+        const bool guard = (near && length2(normal[i]) == 0.f) || least <= path + room;
         moved[i] = !guard;
-        if (guard) return;
+        if (guard) {
+          if (!near) far_by[i] -= path;
+          return near ? 0 : 1;
+        }
         x.set(i, mover(x[i] + drift[i], velocity));
         v.set(i, velocity);
         far_by[i] -= length(x[i] - start[i]);
-      });
+        return 0;
+      },
+      Larger{});
+  if (far_ones > 0) state.contact.cloth_reach = -1.f;  // see Tested
   parallel_for(
       "guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
   stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded,

@@ -116,16 +116,31 @@ TEST_P(Crossing, NoneByAGrazingJet) {
   expect_no_crossing(jet_at_sheet(V3d(9.8, -2, 0), GetParam()), 600, GetParam(), 300);
 }
 
-class StrongCrossing : public testing::TestWithParam<V3d> {};
+class StrongJets : public testing::TestWithParam<V3d> {};
 // Falls, normal jets and grazing ones.
-INSTANTIATE_TEST_SUITE_P(Velocities, StrongCrossing,
+INSTANTIATE_TEST_SUITE_P(Velocities, StrongJets,
                          testing::Values(V3d(0, -1, 0), V3d(0, -10, 0), V3d(9.8, -2, 0),
                                          V3d(0, -50, 0), V3d(0, -100, 0), V3d(99.6, -8.7, 0)));
 
-TEST_P(StrongCrossing, NoneInTheIncompressibleFluid) {
+TEST_P(StrongJets, NoneCrossesInTheIncompressibleFluid) {
   Shot shot = block_over_sheet(GetParam());
   shot.fluid.solver = FluidSolver::incompressible;
   expect_no_crossing(shot, 150, 1, 20);
+}
+
+// A step of many spacings, which the solver never chooses: particles come from farther than their
+// support and would pass in one step.
+TEST(StrongCrossing, NoneInStepsLongerThanTheSupport) {
+  for (const double speed : {3., 10.}) {
+    Shot shot = block_over_sheet(V3d(0, -speed, 0));
+    shot.fluid.solver = FluidSolver::incompressible;
+    Stepper run(shot);
+    PathCount count(run);
+    for (int k = 0; k < 8; ++k) count.step(3 * shot.fluid.spacing / speed);
+    EXPECT_EQ(count.crossings, 0) << speed;
+    EXPECT_LT(run.limits.bad_particle + run.limits.bad_vertex, 0) << speed;
+    EXPECT_GT(count.last().guard_hits, 100u) << speed;
+  }
 }
 
 // What is counted is what the solver went through: the last substep of a step is the state after
