@@ -220,14 +220,21 @@ void to_rows(const std::vector<std::vector<T>>& rows, std::vector<int>& start,
   }
 }
 
-void append_springs(const Sheet& sheet, const Cloth& cloth, ClothTopology& t, int base) {
+/// Lengths are those of the snapped places: differences of world coordinates would depend on where
+/// the shot stands.
+void append_springs(const Sheet& sheet, const Cloth& cloth, const LocalFrame& frame,
+                    ClothTopology& t, int base) {
   struct End {
     int vertex;
     float length, stiffness, damping;
   };
   std::vector<std::vector<End>> rows(sheet.position.size());
+  const auto local = [&](int v) {
+    const V3d& p = sheet.rest[v];
+    return V3d(frame.to_local(0, p.x), frame.to_local(1, p.y), frame.to_local(2, p.z));
+  };
   for (const Sheet::Spring& s : sheet.spring) {
-    const double length = (sheet.rest[s.b] - sheet.rest[s.a]).length();
+    const double length = (local(s.b) - local(s.a)).length();
     const double damping = damping_of(sheet, s, cloth);
     rows[s.a].push_back({s.b + base, float(length), float(s.stiffness), float(damping)});
     rows[s.b].push_back({s.a + base, float(length), float(s.stiffness), float(damping)});
@@ -267,7 +274,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
                   Scene& scene) {
   ClothTopology& t = scene.cloth;
   const int base = t.vertices(), base_triangle = t.triangles();
-  append_springs(sheet, cloth, t, base);
+  append_springs(sheet, cloth, frame, t, base);
   append_neighbours(sheet, t, base_triangle);
   std::vector<std::vector<int>> fan(sheet.position.size());
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
