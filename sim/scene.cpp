@@ -74,6 +74,7 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double
   for (size_t i = 0; i < fluid.position.size(); ++i)
     see(fluid.position[i], fluid.velocity[i].length());
   for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
+  for (const Cloth& c : shot.cloth) speed2 = std::max(speed2, c.velocity.length2());
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
     if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] != Axis::walls) continue;
     bottom = std::min(bottom, down[k] < 0 ? shot.domain.min[k] : -shot.domain.max[k]);

@@ -403,5 +403,15 @@ TEST(Incompressible, WithoutXsphNothingIsSmoothed) {
   EXPECT_EQ(Stepper(shot).solver->allocated() & sim::column_acceleration, 0u);
 }
 
+// A sheet that is thrown at still water is as fast as the water may become: blow-ups are told by
+// it.
+TEST(Incompressible, ExpectsTheSpeedOfThrownSheets) {
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible;
+  add_box(shot, V3d(0), {4, 4, 4});
+  add_sheet(shot, 0.2, -0.1, 4).velocity = V3d(0, 10, 0);
+  EXPECT_GE(sim::build_scene(shot).parameters.sound_speed, 10 * 10 / std::sqrt(2.) - 1e-3);
+}
+
 }  // namespace
 }  // namespace drench::sim_tests
