@@ -17,8 +17,9 @@ namespace {
 constexpr double pi = 3.14159265358979323846;
 constexpr double most_particles = 2e8;  // about 20 GB of state
 constexpr double most_frames = 1e6;
-constexpr double most_cells = 1e6;     // grid cells along one axis
-constexpr double most_vertices = 4e6;  // of one sheet
+constexpr double shortest_step = 1e-9;  // s; a day of them is a few ms
+constexpr double most_cells = 1e6;      // grid cells along one axis
+constexpr double most_vertices = 4e6;   // of one sheet
 
 std::string text_of(const V3d& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
 
@@ -64,6 +65,12 @@ class Checker {
       fail("shot.frames", fmt::format("shot.frames is [{}, {}], {:.0f} frames; at most {:.0f} are "
                                       "allowed. Split the shot",
                                       time.first, time.last, count, most_frames));
+    }
+    if (shot_.time_step > 0 && shot_.time_step < shortest_step) {
+      fail("shot.time_step",
+           fmt::format("shot.time_step is {} s; a frame would not end: at least {} s. Use 0 for "
+                       "the largest stable step",
+                       shot_.time_step, shortest_step));
     }
   }
 

@@ -129,6 +129,7 @@ TEST_F(ShotError, NamesImpossibleValues) {
        {"scene.toml:6", "0.004 m", "0.005 m", "no neighbours", "support_ratio = 2"}},
       {"[shot]\nframes = [1048, 1001]\n", {"scene.toml:5", "[1048, 1001]", "Write [1001, 1048]"}},
       {"[shot]\nframes = [0, 2147483647]\n", {"scene.toml:5", "9999999"}},
+      {"[shot]\ntime_step = 1e-18\n", {"scene.toml:5", "time_step is 1e-18", "would not end"}},
       {"[shot]\nframes = [0, 5000000]\n", {"scene.toml:5", "at most 1000000"}},
       {"[camera]\nshutter_open = 0.5\nshutter_close = 0.1\n",
        {"scene.toml:5", "0.5", "0.1", "close before"}},
