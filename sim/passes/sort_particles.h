@@ -34,18 +34,25 @@ inline void sort_by_cell(State& state) {
   const Parameters& p = state.parameters;
   const int n = f.count;
   const VecView x = f.position.view();
+  // Past an open side of the domain by more than a support a particle is lost: it sorts behind all,
+  // and the grid ends there, however far it flies.
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k)
+    low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
+  const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
   Bounds box = bounds_of_points("fluid bounds", x, n);
+  const auto clamped = [&](Vec3<float> q) {
+    return Vec3<float>{minimum(maximum(q.x, low[0]), high[0]),
+                       minimum(maximum(q.y, low[1]), high[1]),
+                       minimum(maximum(q.z, low[2]), high[2])};
+  };
+  box = {clamped(box.low), clamped(box.high)};
   const Vec3<float> period = periods_of(p);
   if (period.x > 0.f) box.low.x = p.low[0];
   if (period.y > 0.f) box.low.y = p.low[1];
   if (period.z > 0.f) box.low.z = p.low[2];
   f.grid = make_grid_shape(box.low, box.high, p.support_radius, period);
   const GridShape grid = f.grid;
-  // Past an open side of the domain by more than a support a particle is lost: it sorts behind all.
-  float low[3], high[3];
-  for (int k = 0; k < 3; ++k)
-    low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
-  const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
   const int lost = grid.cells();
   int* cell = f.cell.data();
   parallel_for(
