@@ -126,30 +126,47 @@ INSTANTIATE_TEST_SUITE_P(Right, Pools, testing::Values(0., 0.5, 1.), [](const au
   return std::to_string(int(100 * p.param)) + "percent";
 });
 
+/// Of a curtain from the plane of its pins, m, towards the second pool.
+struct Deflection {
+  double most = 0, mean = 0, ripple = 0;  // of any vertex; over all; RMS
+};
+Deflection deflection_of(const std::vector<float>& x, double plane) {
+  Deflection d;
+  for (const float at : x) {
+    const double off = at - plane;
+    d.most = std::max(d.most, std::abs(off)), d.mean += off / double(x.size());
+    d.ripple += off * off / double(x.size());
+  }
+  d.ripple = std::sqrt(d.ripple);
+  return d;
+}
+
 TEST_P(Pools, DeflectTheCurtainAsTheirPressuresSay) {
   const int layers = long_form() ? 16 : 8;
   const Shot shot = curtain(layers, GetParam());
   Watch watch(shot);
   const double whole = length * length * width;
   const double wanted = StaticCurtain(watch.run.scene, whole, GetParam() * whole).deflection();
-  const double seconds = long_form() ? 2 : 1;
-  const float plane = watch.state().cloth_position.x[0];
-  double sum = 0, samples = 0;
+  const double seconds = long_form() ? 2 : 1, plane = watch.state().cloth_position.x[0];
+  Deflection found;
+  double samples = 0;
   while (watch.run.time < seconds && watch.step()) {
     if (watch.run.time < 0.75 * seconds) continue;
-    double most = 0;
-    for (const float x : watch.state().cloth_position.x)
-      most = std::max(most, double(std::abs(x - plane)));
-    sum += most, ++samples;
+    const Deflection now = deflection_of(watch.state().cloth_position.x, plane);
+    found.most += now.most, found.mean += now.mean, found.ripple += now.ripple, ++samples;
   }
-  const double found = sum / std::max(samples, 1.);
-  // Equal pools leave the curtain where it is, to a twentieth of a spacing.
-  const double tolerance = GetParam() < 1 ? 0.05 * wanted : 0.05 * shot.fluid.spacing;
-  EXPECT_NEAR(found, wanted, tolerance);
-  Gates gates;
-  report("two-sided pools", fmt::format("{} and {} m", length, GetParam() * length), watch, gates,
-         fmt::format("deflection {:.1f} mm, springs {:.1f} mm ({:+.1f} %)", 1e3 * found,
-                     1e3 * wanted, wanted > 1e-3 ? 100 * (found / wanted - 1) : 0.));
+  found.most /= samples, found.mean /= samples, found.ripple /= samples;
+  const double a = shot.fluid.spacing;
+  if (GetParam() < 1) {
+    EXPECT_NEAR(found.most, wanted, 0.05 * wanted);
+  } else {
+    // Without tension single particles dent it: a twentieth of a spacing at 8 and at 12 layers.
+    EXPECT_NEAR(found.mean, 0, 0.02 * a);
+    EXPECT_LT(found.ripple, 0.1 * a);
+  }
+  report("two-sided pools", fmt::format("{} and {} m", length, GetParam() * length), watch, {},
+         fmt::format("deflection {:.1f} mm, springs {:.1f} mm; mean {:.2f} mm, RMS {:.3f} spacings",
+                     1e3 * found.most, 1e3 * wanted, 1e3 * found.mean, found.ripple / a));
 }
 
 }  // namespace

@@ -12,6 +12,9 @@ namespace drench::stress_tests {
 /// seconds.
 bool long_form();
 
+/// In place of a gate where the rule has no meaning.
+constexpr double not_gated = 1e30;
+
 /// What all stress tests are to hold. A test that must ask for less says why.
 struct Gates {
   double speed = 1;                              // over Figures::speed_bound
@@ -19,6 +22,7 @@ struct Gates {
   double mean = 1e-3, p999 = 0.03, worst = 0.2;  // compression
   double drift = 1e-5;                           // of momentum
   int crossings = 0;
+  int blow_ups = 0;  // 1 where the run may end in one that the solver tells
 };
 /// Compression is reported alone where fluid is squeezed between closing sheets.
 Gates squeezed();

@@ -58,6 +58,55 @@ class Cells {
   std::vector<std::pair<int64_t, int>> entry_;
 };
 
+/// Which triangles may stand between two particles.
+class Screens {
+ public:
+  Screens(const sim::ClothTopology& cloth, const sim::HostState& state, double h)
+      : cloth_(cloth), state_(state), h_(h) {
+    for (int t = 0; t < cloth.triangles(); ++t) {
+      double low = 1e30, high = -1e30;
+      for (int k = 0; k < 3; ++k)
+        low = std::min(low, corner(t, k).x), high = std::max(high, corner(t, k).x);
+      by_low_x_.push_back({low, t}), widest_ = std::max(widest_, high - low);
+    }
+    std::sort(by_low_x_.begin(), by_low_x_.end());
+  }
+  /// Those whose box a support around the point meets.
+  const std::vector<int>& near(const V3d& x) {
+    near_.clear();
+    auto e =
+        std::lower_bound(by_low_x_.begin(), by_low_x_.end(), std::pair(x.x - h_ - widest_, -1));
+    for (; e != by_low_x_.end() && e->first <= x.x + h_; ++e) {
+      V3d low(1e30), high(-1e30);
+      for (int k = 0; k < 3; ++k) {
+        for (int c = 0; c < 3; ++c) {
+          low[c] = std::min(low[c], corner(e->second, k)[c]);
+          high[c] = std::max(high[c], corner(e->second, k)[c]);
+        }
+      }
+      bool meets = true;
+      for (int c = 0; c < 3; ++c) meets = meets && low[c] < x[c] + h_ && high[c] > x[c] - h_;
+      if (meets) near_.push_back(e->second);
+    }
+    return near_;
+  }
+  bool hides(int t, const V3d& p, const V3d& q) const {
+    const V3d a = corner(t, 0) - p, b = corner(t, 1) - p, c = corner(t, 2) - p, d = q - p;
+    const V3d n = (b - a).cross(c - a);
+    if ((n.dot(a) > 0) == (n.dot(a - d) > 0)) return false;
+    const double u = d.dot(a.cross(b)), v = d.dot(b.cross(c)), w = d.dot(c.cross(a));
+    return (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+  }
+
+ private:
+  V3d corner(int t, int k) const { return at(state_.cloth_position, cloth_.corner[3 * t + k]); }
+  const sim::ClothTopology& cloth_;
+  const sim::HostState& state_;
+  double h_, widest_ = 0;
+  std::vector<std::pair<double, int>> by_low_x_;
+  std::vector<int> near_;
+};
+
 bool is_finite(const sim::HostVec& v) {
   for (const auto* c : {&v.x, &v.y, &v.z}) {
     for (const float value : *c)
@@ -103,13 +152,19 @@ std::vector<double> densities(const sim::Scene& scene, const sim::HostState& sta
   const double h = p.support_radius, a = p.spacing;
   const double unit = a * a * a / (h * h * h) / p.lattice_sum;
   const Cells cells(state, h);
+  Screens screens(scene.cloth, state, h);
   std::vector<double> density(state.id.size());
   for (size_t i = 0; i < density.size(); ++i) {
     const V3d x = at(state.position, i);
+    const std::vector<int>& near = screens.near(x);
     double sum = 0;
     cells.around(x, [&](int j) {
-      const double r = (at(state.position, j) - x).length();
-      if (r < h) sum += wendland(1 - r / h);
+      const V3d y = at(state.position, j);
+      const double r = (y - x).length();
+      if (r >= h) return;
+      for (const int t : near)
+        if (screens.hides(t, x, y)) return;
+      sum += wendland(1 - r / h);
     });
     density[i] = unit * sum + wall_share(p, x);
   }

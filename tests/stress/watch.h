@@ -13,7 +13,8 @@ namespace drench::stress_tests {
 using namespace sim_tests;
 
 /// What a run did. Compressions are max(rho / rho_0 - 1, 0) from the 10th step on, rho the
-/// Wendland sum over all particles, whatever sheet lies between, and the walls' closed form.
+/// Wendland sum over the particles that no sheet hides, and the walls' closed form. A sheet's own
+/// share is not in it: what is pressed against one shows where particles come near each other.
 struct Figures {
   int particles = 0, steps = 0;
   double time = 0;         // s simulated
