@@ -79,13 +79,16 @@ int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& befor
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](int a, int b) { return box[a].low.x < box[b].low.x; });
   double widest = 0;
-  for (const Box& b : box) widest = std::max(widest, b.high.x - b.low.x);
+  Box all;
+  for (const Box& b : box)
+    widest = std::max(widest, b.high.x - b.low.x), all.add(b.low), all.add(b.high);
   const std::vector<int> place = place_of_id(before);
   int count = 0;
   for (size_t i = 0; i < after.id.size(); ++i) {
     const V3d from = at(before.position, place[after.id[i]]), to = at(after.position, i);
     Box path;
     path.add(from), path.add(to);
+    if (!path.meets(all)) continue;
     const auto first = std::lower_bound(order.begin(), order.end(), path.low.x - widest,
                                         [&](int t, double x) { return box[t].low.x < x; });
     for (auto k = first; k != order.end() && box[*k].low.x <= path.high.x; ++k) {

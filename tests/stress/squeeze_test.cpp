@@ -38,7 +38,7 @@ TEST_P(Squeeze, LetsTheWaterOutSidewaysOnly) {
     sheet.name = side < 0 ? "low" : "high";
     sheet.areal_density = 200, sheet.damping = 0, sheet.velocity.y = -side * speed / 2;
   }
-  Watch watch(shot);
+  Watch watch(shot, 1);
   const double reach = 0.5 * (a + thickness);  // epsilon
   double gap = 1;
   double fastest = 0;  // while there are two layers
