@@ -158,8 +158,11 @@ TEST(Overlap, OfTheSolverComesApartSlowly) {
     const double after = watch.last_speed();
     EXPECT_LT(after, 1) << beside;
     watch.steps(long_form() ? 200 : 50);
+    Gates gates;
+    // A twentieth of a spacing off the sheet it is pushed off for long: 2.4 % after 200 steps.
+    if (beside > 0.4) gates.energy = 0.03;
     report("overlap at start",
-           fmt::format("sheet {} spacings off the middle of two layers", beside), watch, {},
+           fmt::format("sheet {} spacings off the middle of two layers", beside), watch, gates,
            fmt::format("{:.2f} m/s after 10 steps", after));
   }
 }

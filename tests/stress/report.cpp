@@ -10,24 +10,19 @@ namespace drench::stress_tests {
 
 namespace {
 
-std::vector<std::string>& rows() {
-  static std::vector<std::string> rows;
-  return rows;
-}
-
-class Table : public testing::Environment {
- public:
-  void TearDown() override {
-    if (rows().empty()) return;
-    std::cout << "\n| stress | setting | particles | steps | CPU ms | speed, of bound % | energy % "
-                 "| compression mean / 99.9 / worst % | crossings | momentum | capped | measured | "
-                 "verdict |\n"
-                 "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- "
-                 "|\n";
-    for (const std::string& row : rows()) std::cout << row << "\n";
+/// At once, so that what a long run has measured is there when it is stopped.
+void print(const std::string& row) {
+  static bool first = true;
+  if (first) {
+    std::cout
+        << "| stress | setting | particles | steps | CPU ms | speed, of bound % | energy % "
+           "| compression mean / 99.9 / worst % | crossings | momentum | capped | measured | "
+           "verdict |\n"
+           "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
   }
-};
-[[maybe_unused]] testing::Environment* const table = testing::AddGlobalTestEnvironment(new Table);
+  first = false;
+  std::cout << row << std::endl;
+}
 
 /// The gates that do not hold, by name.
 std::string broken(const Figures& f, const Gates& g) {
@@ -73,7 +68,7 @@ void report(const std::string& stress, const std::string& setting, const Watch& 
   const Figures f = watch.figures();
   EXPECT_EQ(broken(f, gates), "") << stress << ", " << setting;
   const std::string fails = broken(f, common_of(gates));
-  rows().push_back(fmt::format(
+  print(fmt::format(
       "| {} | {} | {} | {} | {:.2f} | {:.0f} | {:.2f} | {:.3f} / {:.2f} / {:.1f} | {} | {:.0e} | "
       "{} | {} | {} |",
       stress, setting, f.particles, f.steps, f.cpu_ms, 100 * f.max_speed / f.speed_bound,
@@ -84,8 +79,8 @@ void report(const std::string& stress, const std::string& setting, const Watch& 
 void report(const std::string& stress, const std::string& setting, bool passed,
             const std::string& measured) {
   EXPECT_TRUE(passed) << stress << ", " << setting << ": " << measured;
-  rows().push_back(fmt::format("| {} | {} | | | | | | | | | | {} | {} |", stress, setting, measured,
-                               passed ? "pass" : "FAIL"));
+  print(fmt::format("| {} | {} | | | | | | | | | | {} | {} |", stress, setting, measured,
+                    passed ? "pass" : "FAIL"));
 }
 
 }  // namespace drench::stress_tests

@@ -1,6 +1,6 @@
 #pragma once
-// The table of docs/benchmarks.md, section Stress: a line for every row of a test, printed when the
-// program ends, and the gates of the research notes.
+// The table of docs/benchmarks.md, section Stress: a line for every row of a test, printed as it
+// is measured, and the gates of the research notes.
 
 #include <string>
 
