@@ -1,9 +1,11 @@
 #pragma once
 // Corrected gradients (Randles and Libersky 1996; Bonet and Lok 1999): L_i grad W_ij in place of
-// grad W_ij makes the rate of density exact for velocities that are linear in space,
-//   L_i^-1 = M_i = sum_j m / rho_0 (x_j - x_i) (grad W_ij)^T.
-// Without it a flow that shears the arrangement of neighbours without changing any volume changes
-// the sum all the same, and pressures resist it: waves died and vortices slowed.
+// grad W_ij makes the rate of density that of the volume for velocities linear in space,
+//   L_i = M_i^-1 tr M_i / 3,   M_i = sum_j m / rho_0 (x_j - x_i) (grad W_ij)^T.
+// The factor leaves an even expansion to count as the kernel's sum counts it, so that a solve still
+// finds the density it is asked for. Without L a flow that shears the arrangement of neighbours
+// without changing any volume changes the sum all the same, and pressures resist it: waves died and
+// vortices slowed.
 //
 // M is averaged over the neighbours. Its own value, one particle at a time, keeps more of a wave
 // but makes packings under weight boil (rms 0.02 to 0.05 sqrt(g H) for ever, with averages as
@@ -60,7 +62,7 @@ struct GradientMoments {
   }
 };
 
-/// L, the inverse of the mean of M.
+/// L of the mean of M.
 struct GradientCorrection {
   static constexpr int columns = 2;
   const Float4 *moment, *moment_cross, *wall;
@@ -94,7 +96,7 @@ struct GradientCorrection {
     const float xx = y * z - yz * yz, xxy = yz * zx - xy * z, xzx = xy * yz - y * zx;  // cofactors
     const float determinant = x * xx + xy * xxy + zx * xzx;
     if (determinant < 0.5f) return;  // flattened by an impact
-    const float f = 1.f / determinant;
+    const float f = (x + y + z) / (3.f * determinant);
     diagonal[i] = {f * xx, f * (x * z - zx * zx), f * (x * y - xy * xy), 0.f};
     cross[i] = {f * xxy, f * (xy * zx - x * yz), f * xzx, 0.f};
   }
