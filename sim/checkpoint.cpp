@@ -8,7 +8,7 @@ namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '3'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '4'};
 
 /// The same list of members writes and reads: Archive is a Writer or a Reader.
 template <class Archive, class C>
@@ -20,6 +20,7 @@ void transfer(Archive& archive, C& c) {
   }
   archive(s.id), archive(s.memory_triangle), archive(s.memory_side), archive(s.pressure_term);
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
+  archive(s.removed);
   archive(c.probes);
 }
 

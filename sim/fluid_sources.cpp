@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <unordered_map>
 
+#include <fmt/format.h>
+
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/source_check.h"
 #include "sim/scene.h"
 
 namespace drench::sim {
@@ -14,10 +18,11 @@ namespace {
 struct Source {
   std::vector<V3d> position;
   V3d velocity;
+  std::string name;
 };
 
 Source lattice_box(const FluidBox& box, double a) {
-  Source source{{}, box.velocity};
+  Source source{{}, box.velocity, {}};
   int n[3];
   // Whole cells only: a layer that reached out of the box could stand in a wall.
   for (int k = 0; k < 3; ++k) n[k] = std::max(1, int((box.max[k] - box.min[k]) / a + 1e-6));
@@ -51,7 +56,7 @@ size_t points_within(const std::vector<V3d>& points, double radius) {
 }
 
 Source lattice_ball(const FluidSphere& sphere, double a) {
-  Source source{ball_points(sphere.radius, a), sphere.velocity};
+  Source source{ball_points(sphere.radius, a), sphere.velocity, {}};
   source.position.resize(std::max<size_t>(1, points_within(source.position, sphere.radius)));
   for (V3d& p : source.position) p += sphere.center;
   return source;
@@ -103,7 +108,7 @@ std::vector<V3d> drop_centres(const FluidDrops& drops, const Domain& domain, dou
 }
 
 Source lattice_drops(const FluidDrops& drops, const Domain& domain, double a, uint32_t seed) {
-  Source source{{}, drops.velocity};
+  Source source{{}, drops.velocity, {}};
   if (drops.count <= 0) return source;
   const std::vector<V3d> ball = ball_points(std::max(drops.radius, a), a);
   size_t each = std::max<size_t>(1, points_within(ball, drops.radius)), larger = 0;
@@ -123,7 +128,7 @@ Source lattice_drops(const FluidDrops& drops, const Domain& domain, double a, ui
   return source;
 }
 
-/// Cells of one spacing: finds an earlier particle closer than half a spacing.
+/// Cells of one spacing: finds an earlier particle closer than 0.9 spacings.
 class Occupancy {
  public:
   Occupancy(double a, const Domain& domain) : a_(a), domain_(domain) {}
@@ -158,7 +163,7 @@ class Occupancy {
         for (int dx = -1; dx <= 1; ++dx) {
           const auto [begin, end] = cells_.equal_range(key(c[0] + dx, c[1] + dy, c[2] + dz));
           for (auto it = begin; it != end; ++it) {
-            if ((points[it->second] - p).length2() < 0.25 * a_ * a_) return true;
+            if ((points[it->second] - p).length2() < 0.81 * a_ * a_) return true;
           }
         }
       }
@@ -180,37 +185,96 @@ class Occupancy {
 }  // namespace
 
 EmitterLayer emitter_layer(const FluidEmitter& emitter, double a) {
-  const V3d d = emitter.direction.normalized();
-  const V3d helper = std::abs(d.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
-  const V3d u = d.cross(helper).normalized(), v = d.cross(u);
+  const double area = inlet_area(emitter), eps = 1e-6;
   EmitterLayer layer;
-  const int reach = int(std::ceil(emitter.radius / a));
-  for (int j = -reach; j <= reach; ++j) {
-    for (int i = -reach; i <= reach; ++i) {
-      if ((i * i + j * j) * a * a <= emitter.radius * emitter.radius)
-        layer.offset.push_back((u * i + v * j) * a);
+  if (emitter.type == EmitterType::disc) {  // the lattice points nearest to the centre
+    const int reach = int(std::ceil(emitter.radius / a)) + 1;
+    for (int j = -reach; j <= reach; ++j) {
+      for (int i = -reach; i <= reach; ++i) layer.place.push_back({i * a, j * a});
+    }
+    const auto far2 = [](const std::array<double, 2>& p) { return p[0] * p[0] + p[1] * p[1]; };
+    std::stable_sort(layer.place.begin(), layer.place.end(),
+                     [&](const auto& p, const auto& q) { return far2(p) < far2(q); });
+    layer.place.resize(std::max<size_t>(1, size_t(std::ceil(area / (a * a) - eps))));
+  } else {
+    const auto cells = [&](const V3d& half) {
+      return std::max(1, int(std::ceil(2 * half.length() / a - eps)));
+    };
+    const int n[2] = {cells(emitter.u), cells(emitter.v)};
+    for (int j = 0; j < n[1]; ++j) {
+      for (int i = 0; i < n[0]; ++i)
+        layer.place.push_back({(i + 0.5 - 0.5 * n[0]) * a, (j + 0.5 - 0.5 * n[1]) * a});
     }
   }
+  layer.interval = double(layer.place.size()) * a * a * a / (area * emitter.speed);
   return layer;
 }
 
-InitialFluid initial_fluid(const Shot& shot) {
+Inlet inlet_at(const FluidEmitter& emitter, const Timeline& time, double frame) {
+  constexpr double step = 1e-3;  // frames
+  Inlet inlet;
+  inlet.center = emitter.center.at(frame);
+  V3d d;
+  if (emitter.type == EmitterType::disc) {
+    d = emitter.direction.at(frame).normalized();
+    const V3d helper = std::abs(d.x) < 0.6 ? V3d(1, 0, 0) : V3d(0, 1, 0);
+    inlet.axis[0] = d.cross(helper).normalized(), inlet.axis[1] = d.cross(inlet.axis[0]);
+  } else {
+    inlet.axis[0] = emitter.u.normalized(), inlet.axis[1] = emitter.v.normalized();
+    d = inlet.axis[0].cross(inlet.axis[1]);
+  }
+  const V3d carried =
+      (emitter.center.at(frame + step) - emitter.center.at(frame - step)) * (time.fps / (2 * step));
+  inlet.velocity = d * emitter.speed + carried;
+  return inlet;
+}
+
+namespace {
+
+/// All sources in the order in which they fill space.
+std::vector<Source> all_sources(const Shot& shot, const LevelSetMaker& make_level_set) {
   const double a = shot.fluid.spacing;
   std::vector<Source> sources;
-  for (const FluidBox& box : shot.fluid.box) sources.push_back(lattice_box(box, a));
-  for (const FluidSphere& sphere : shot.fluid.sphere) sources.push_back(lattice_ball(sphere, a));
-  for (size_t k = 0; k < shot.fluid.drops.size(); ++k) {
-    sources.push_back(lattice_drops(shot.fluid.drops[k], shot.domain, a, shot.seed + uint32_t(k)));
+  const auto add = [&](Source source, const char* section, size_t index) {
+    source.name = fmt::format("fluid.{}[{}]", section, index);
+    sources.push_back(std::move(source));
+  };
+  const Fluid& fluid = shot.fluid;
+  for (size_t k = 0; k < fluid.box.size(); ++k) add(lattice_box(fluid.box[k], a), "box", k);
+  for (size_t k = 0; k < fluid.sphere.size(); ++k)
+    add(lattice_ball(fluid.sphere[k], a), "sphere", k);
+  for (size_t k = 0; k < fluid.drops.size(); ++k)
+    add(lattice_drops(fluid.drops[k], shot.domain, a, shot.seed + uint32_t(k)), "drops", k);
+  for (size_t k = 0; k < fluid.volume.size(); ++k) {
+    const FluidVolume& volume = fluid.volume[k];
+    const std::string name = fmt::format("fluid.volume[{}]", k);
+    add({fill_volume(shot, volume, name, make_level_set), volume.velocity, {}}, "volume", k);
   }
+  return sources;
+}
+
+}  // namespace
+
+InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set) {
+  const std::vector<Source> sources = all_sources(shot, make_level_set);
   InitialFluid fluid;
-  Occupancy occupied(a, shot.domain);
+  Occupancy occupied(shot.fluid.spacing, shot.domain);
   for (const Source& source : sources) {
     const size_t before = fluid.position.size();
     for (const V3d& place : source.position) {
       const V3d p = inside(shot.domain, place);
-      if (before > 0 && occupied.taken(p, fluid.position)) continue;
+      if (before > 0 && occupied.taken(p, fluid.position)) {
+        ++fluid.overlapping;
+        continue;
+      }
       fluid.position.push_back(p);
       fluid.velocity.push_back(source.velocity);
+    }
+    if (fluid.position.size() == before && !source.position.empty()) {
+      throw Error(fmt::format(
+          "{}: {} lies wholly in the fluid of other sources: boxes fill space first, then spheres, "
+          "drops and volumes, each in the order of the shot. Move it, remove it, or make room",
+          shot.file.string(), source.name));
     }
     if (sources.size() > 1) {
       for (size_t i = before; i < fluid.position.size(); ++i) occupied.add(fluid.position[i], i);

@@ -60,11 +60,18 @@ bool moves(const Obstacle& obstacle) {
 }  // namespace
 
 ObstacleSet::ObstacleSet(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set)
-    : shot_(shot),
+    : ObstacleSet(Solids::obstacles, shot, shot.obstacle, {}, frame, std::move(make_level_set)) {}
+
+ObstacleSet::ObstacleSet(Solids role, const Shot& shot, const std::vector<Obstacle>& solids,
+                         std::vector<Window> window, const LocalFrame& frame,
+                         LevelSetMaker make_level_set)
+    : role_(role),
+      window_(std::move(window)),
+      shot_(shot),
       origin_(frame.origin[0], frame.origin[1], frame.origin[2]),
       snap_(frame.spacing / (1 << 20)),
       make_level_set_(std::move(make_level_set)) {
-  for (const Obstacle& obstacle : shot.obstacle) {
+  for (const Obstacle& obstacle : solids) {
     Entry entry{obstacle, false, V3d(0), V3d(0), {}, {}, {}, {}};
     entry.high = obstacle.type == ObstacleType::box ? obstacle.size * 0.5 : V3d(obstacle.radius);
     if (obstacle.type == ObstacleType::plane) {  // what of it the domain may hold
@@ -235,12 +242,15 @@ void ObstacleSet::place(Solver& solver, double start, double end) {
     if (entry.obstacle.type == ObstacleType::mesh) {
       bracket_at(entry, begin);
       for (int s = 0; s < 2 && !entry.bracket->loaded; ++s)
-        solver.load_level_set(int(k), s, entry.bracket->set[entry.deforms ? s : 0]);
+        solver.load_level_set(role_, int(k), s, entry.bracket->set[entry.deforms ? s : 0]);
       entry.bracket->loaded = true;
     }
     all.push_back(placement(entry, begin, film_frame(end)));
+    const double middle = 0.5 * (start + end);
+    const bool there = window_.empty() || (middle >= window_[k].start && middle < window_[k].stop);
+    for (int c = 0; c < 3 && !there; ++c) all[k].low[c] = float(far_off), all[k].high[c] = -far_off;
   }
-  if (!all.empty()) solver.place_obstacles(all);
+  if (!all.empty()) solver.place(role_, all);
 }
 
 double ObstacleSet::distance(const V3d& point, double time) {
@@ -258,6 +268,16 @@ double ObstacleSet::distance(const V3d& point, double time) {
         least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
   }
   return least;
+}
+
+ObstacleSet sinks_of(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set) {
+  std::vector<Obstacle> shapes;
+  std::vector<ObstacleSet::Window> windows;
+  for (const Sink& sink : shot.sink) {
+    shapes.push_back(sink.shape);
+    windows.push_back({sink.start - shot.preroll, sink.stop - shot.preroll});
+  }
+  return {Solids::sinks, shot, shapes, windows, frame, std::move(make_level_set)};
 }
 
 }  // namespace drench::sim

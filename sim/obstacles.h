@@ -1,5 +1,6 @@
 #pragma once
-// The obstacles of a shot over time, for the solver: placements of a step, level sets of meshes.
+// The obstacles or sinks of a shot over time, for the solver: placements of a step, level sets of
+// meshes.
 
 #include <optional>
 #include <vector>
@@ -17,6 +18,14 @@ class ObstacleSet {
   /// @param make_level_set  of drench_vdb; needed only if there are meshes.
   /// @throws Error if a mesh cannot be read, is not closed, or is too fine.
   ObstacleSet(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set);
+
+  /// Sinks are there within their times alone.
+  /// @param solids  as obstacles; window[k] is the time of solids[k], s since the first frame.
+  struct Window {
+    double start = -1e30, stop = 1e30;
+  };
+  ObstacleSet(Solids role, const Shot& shot, const std::vector<Obstacle>& solids,
+              std::vector<Window> window, const LocalFrame& frame, LevelSetMaker make_level_set);
 
   int count() const { return int(obstacle_.size()); }
   /// Tells the solver where the obstacles are from `start` to `end`, s since the first frame, and
@@ -58,11 +67,16 @@ class ObstacleSet {
   double travel(Entry& entry, double begin, double end);
   ObstaclePlacement placement(Entry& entry, double begin, double end);
 
+  Solids role_ = Solids::obstacles;
+  std::vector<Window> window_;  // of sinks
   Shot shot_;
   V3d origin_{0};
   double snap_ = 1;  // m
   LevelSetMaker make_level_set_;
   std::vector<Entry> obstacle_;
 };
+
+/// The sinks of a shot. @throws Error as ObstacleSet.
+ObstacleSet sinks_of(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set);
 
 }  // namespace drench::sim

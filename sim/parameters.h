@@ -30,7 +30,7 @@ struct Parameters {
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
   bool wall[3] = {true, true, true}, periodic[3] = {false, false, false};  // neither is open
-  int obstacles = 0;
+  int obstacles = 0, sinks = 0;
   // cloth
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex

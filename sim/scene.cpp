@@ -61,6 +61,16 @@ void calibrate(double a, double h, Parameters& p) {
   p.wall_scale = float((whole - cut) / whole) / beyond;
 }
 
+/// Of a keyed place, m/s.
+double fastest(const Animated<V3d>& track, const Timeline& time) {
+  double speed = 0;
+  constexpr double part = 0.25;  // frames
+  if (track.keys.size() < 2) return 0;
+  for (double f = time.first; f < time.last; f += part)
+    speed = std::max(speed, (track.at(f + part) - track.at(f)).length() / part * time.fps);
+  return speed;
+}
+
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
 double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double obstacle_speed) {
@@ -73,7 +83,10 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double
   };
   for (size_t i = 0; i < fluid.position.size(); ++i)
     see(fluid.position[i], fluid.velocity[i].length());
-  for (const FluidEmitter& e : shot.fluid.emitter) see(e.center, e.speed);
+  for (const FluidEmitter& e : shot.fluid.emitter) {
+    for (const auto& [frame, center] : e.center.keys)
+      see(center, e.speed + fastest(e.center, shot.timeline));
+  }
   for (const Cloth& c : shot.cloth) speed2 = std::max(speed2, c.velocity.length2());
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
     if (std::abs(down[k]) < 0.5 || shot.domain.axis[k] != Axis::walls) continue;
@@ -85,7 +98,9 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double
 
 /// Is there as much fluid as there is room, with no side open and no way in?
 bool fills_domain(const Shot& shot, const InitialFluid& fluid) {
-  if (!shot.cloth.empty() || !shot.fluid.emitter.empty() || !shot.obstacle.empty()) return false;
+  if (!shot.cloth.empty() || !shot.fluid.emitter.empty() || !shot.obstacle.empty() ||
+      !shot.sink.empty())
+    return false;
   for (const Axis axis : shot.domain.axis) {
     if (axis == Axis::open) return false;
   }
@@ -133,7 +148,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   const bool chosen = shot.fluid.sound_speed > 0 && !is_incompressible(shot);
   p.sound_speed = float(chosen ? shot.fluid.sound_speed
                                : automatic_sound_speed(shot, fluid, obstacles.fastest()));
-  p.obstacles = obstacles.count();
+  p.obstacles = obstacles.count(), p.sinks = int(shot.sink.size());
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
   const double numerical = shot.fluid.artificial_viscosity * p.sound_speed * 0.5 * h / 10;
@@ -367,8 +382,11 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   }
   Scene scene;
   scene.frame = local_frame(shot);
-  const InitialFluid fluid = shot.fluid.present() ? initial_fluid(shot) : InitialFluid{};
+  const InitialFluid fluid =
+      shot.fluid.present() ? initial_fluid(shot, make_level_set) : InitialFluid{};
+  scene.overlapping = fluid.overlapping;
   scene.obstacles = ObstacleSet(shot, scene.frame, make_level_set);
+  scene.sinks = sinks_of(shot, scene.frame, make_level_set);
   scene.parameters = build_parameters(shot, scene.frame, fluid, scene.obstacles);
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {

@@ -1,6 +1,7 @@
 #pragma once
 // From a shot to the initial state: parameters, particles, sheets.
 
+#include <array>
 #include <random>
 #include <string>
 #include <vector>
@@ -41,18 +42,39 @@ struct Sheet {
 /// vertex, or a pin that holds nothing.
 Sheet build_sheet(const Cloth& cloth);
 
-/// A disc of particles that leaves an emitter every spacing / speed seconds.
+/// What leaves an emitter at once, again and again. A layer holds the volume that passes the inlet
+/// in one interval, so that the flow is area times speed. Its places are a spacing apart and cover
+/// the inlet or a little more; layers are a spacing apart or more by as much: never denser than at
+/// rest, which would push the next layers back into the inlet.
 struct EmitterLayer {
-  std::vector<V3d> offset;  // from the centre, m
+  std::vector<std::array<double, 2>> place;  // m, in the plane of the inlet, about its centre
+  double interval;                           // s from layer to layer
 };
 EmitterLayer emitter_layer(const FluidEmitter& emitter, double spacing);
 
-/// Particles of the sources that are there at the start; later sources lose those closer than half
-/// a spacing to earlier ones, across the seams of periodic axes too.
+/// An inlet at a film frame: the axes of its plane, and the velocity of what leaves it, m/s.
+struct Inlet {
+  V3d center, axis[2], velocity;
+};
+Inlet inlet_at(const FluidEmitter& emitter, const Timeline& time, double frame);
+
+/// Lattice places in a closed mesh, world coordinates, on the lattice that begins at domain.min.
+/// @param name  of the volume, for errors. @throws Error if the mesh cannot be read, is not closed,
+/// holds no particle or more than a shot may have, or reaches beyond the domain's walls.
+std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const std::string& name,
+                             const LevelSetMaker& make_level_set);
+
+/// Particles of the sources that are there at the start: boxes, spheres, drops, then volumes, each
+/// in the order of the shot. A later source loses those closer than 0.9 spacings to an earlier one,
+/// across the seams of periodic axes too: no place within a lattice is farther than 0.866 spacings
+/// from it, so that nothing is filled twice.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
+  size_t overlapping = 0;  // particles that later sources lost
 };
-InitialFluid initial_fluid(const Shot& shot);
+/// @param make_level_set  needed for volumes. @throws Error as fill_volume, or if a source loses
+/// all.
+InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set = {});
 
 /// Everything a Simulator starts from.
 struct Scene {
@@ -61,9 +83,9 @@ struct Scene {
   std::vector<Sheet> sheet;
   std::vector<int> first_vertex, first_triangle;  // of each sheet, and one past the end
   ClothTopology cloth;
-  ObstacleSet obstacles;
+  ObstacleSet obstacles, sinks;
   HostState start;
-  size_t inside_obstacles = 0;  // particles of sources that were left out
+  size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
 
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
   float place(int axis, double world) const;

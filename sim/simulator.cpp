@@ -56,6 +56,7 @@ struct Simulator::Implementation {
   uint64_t steps = 0;
   int next_id = 0;
   std::vector<uint64_t> emitted;
+  std::vector<uint64_t> reported;  // HostState::removed of the last report
   sim::ProbeSeries probes;
   sim::Limits limits;
   std::filesystem::path last_checkpoint;
@@ -69,15 +70,21 @@ struct Simulator::Implementation {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
+    reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 3").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 4").finish();
     frame = shot.timeline.first;
     next_id = int(scene.start.id.size());
     solver->load(scene.start);
     limits = solver->measure();
     time = 0 - shot.preroll;  // no -0
     scene.obstacles.place(*solver, time, time);
+    scene.sinks.place(*solver, time, time);
     solver->refresh();
+    if (scene.overlapping > 0) {
+      log_info("sim", fmt::format("{} particles of sources that overlap were left out",
+                                  scene.overlapping));
+    }
     if (scene.inside_obstacles > 0) {
       log_info("sim", fmt::format("{} particles of the sources start inside obstacles or within "
                                   "half a spacing of them and were left out",
@@ -90,32 +97,34 @@ struct Simulator::Implementation {
 
   /// Layers due by `until`, each moved on from the moment it left; the next step knows their speed.
   void emit(double until) {
-    const double a = shot.fluid.spacing;
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& source = shot.fluid.emitter[e];
-      const V3d direction = source.direction.normalized();
       for (;; ++emitted[e]) {
-        const double leaves = source.start - shot.preroll + double(emitted[e]) * a / source.speed;
-        if (leaves > until || leaves > source.stop) break;
-        if (solver->particles() + layer[e].offset.size() > max_particles) {
+        const double leaves =
+            source.start - shot.preroll + (double(emitted[e]) + 0.5) * layer[e].interval;
+        if (leaves > until || leaves > source.stop - shot.preroll) break;
+        if (solver->particles() + layer[e].place.size() > max_particles) {
           throw Error(fmt::format(
               "{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
               "stop the emitter earlier",
               shot.file.string(), e + 1, max_particles, until));
         }
-        limits.max_speed = std::max(limits.max_speed, float(source.speed));
-        add_layer(layer[e], source.center + direction * (source.speed * (until - leaves)),
-                  direction * source.speed, until);
+        const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
+        sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
+        limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
+        inlet.center += inlet.velocity * (until - leaves);
+        add_layer(layer[e], inlet, until);
       }
     }
   }
 
   /// Less what would appear inside an obstacle.
-  void add_layer(const sim::EmitterLayer& disc, const V3d& centre, const V3d& u, double now) {
+  void add_layer(const sim::EmitterLayer& what, const sim::Inlet& inlet, double now) {
     sim::HostVec position, velocity;
     std::vector<int> id;
-    for (const V3d& offset : disc.offset) {
-      const V3d p = centre + offset;
+    const V3d u = inlet.velocity;
+    for (const auto& place : what.place) {
+      const V3d p = inlet.center + inlet.axis[0] * place[0] + inlet.axis[1] * place[1];
       if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
       position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
@@ -144,6 +153,7 @@ struct Simulator::Implementation {
               : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
       const double then = parts <= 1 ? stop : time + dt;
       scene.obstacles.place(*solver, time, then);
+      scene.sinks.place(*solver, time, then);
       limits = solver->step(dt, substeps);
       time = then;
       ++steps;
@@ -200,7 +210,15 @@ struct Simulator::Implementation {
                                         : ", a softer cloth or a larger fluid.sound_speed"));
   }
 
-  void describe(StepReport& report) const {
+  /// What sinks took and open sides let go since the last report.
+  void count_removed(StepReport& report, const std::vector<uint64_t>& removed) {
+    for (size_t k = 0; k < shot.sink.size(); ++k)
+      report.drained.emplace_back(shot.sink[k].shape.name, removed[k] - reported[k]);
+    report.lost = removed.back() - reported.back();
+    reported = removed;
+  }
+
+  void describe(StepReport& report) {
     if (report.unconverged > 0) {
       log_warning(
           "sim",
@@ -246,6 +264,7 @@ struct Simulator::Implementation {
       energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
+    count_removed(report, state.removed);
   }
 
   ParticleFrame particles() const {
@@ -336,7 +355,7 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
   if (checkpoint.emitted.size() != s.emitted.size() ||
       checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices()) ||
-      !s.probes.fits(checkpoint.probes)) {
+      checkpoint.state.removed.size() != s.reported.size() || !s.probes.fits(checkpoint.probes)) {
     throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
   }
   s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
@@ -345,7 +364,9 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   s.probes.resume(std::move(checkpoint.probes));
   s.solver->load(checkpoint.state);
   s.scene.obstacles.place(*s.solver, s.time, s.time);
+  s.scene.sinks.place(*s.solver, s.time, s.time);
   s.solver->refresh();
+  s.reported = checkpoint.state.removed;
   s.last_checkpoint = path;
 }
 

@@ -60,6 +60,8 @@ class BackendSolver : public Solver {
     }
     state_.guard_hits = host.guard_hits;
     state_.guard_holds = host.guard_holds;
+    state_.removed = host.removed;
+    state_.removed.resize(size_t(state_.parameters.sinks) + 1);
   }
 
   HostState save() const override {
@@ -81,6 +83,7 @@ class BackendSolver : public Solver {
     }
     host.guard_hits = state_.guard_hits;
     host.guard_holds = state_.guard_holds;
+    host.removed = state_.removed;
     return host;
   }
 
@@ -162,14 +165,17 @@ class BackendSolver : public Solver {
     return probe_states(state_, queries);
   }
 
-  void load_level_set(int obstacle, int which, const LevelSet& set) override {
-    state_.obstacles.field.resize(size_t(2) * state_.parameters.obstacles);
-    ObstacleState::Field& field = state_.obstacles.field.at(size_t(2) * obstacle + which);
+  void load_level_set(Solids of, int index, int which, const LevelSet& set) override {
+    const bool sinks = of == Solids::sinks;
+    ObstacleState& o = sinks ? state_.sinks : state_.obstacles;
+    const Parameters& p = state_.parameters;
+    o.field.resize(size_t(2) * (sinks ? p.sinks : p.obstacles));
+    ObstacleState::Field& field = o.field.at(size_t(2) * index + which);
     from_host(field.block, set.block), from_host(field.value, set.value);
     field.shape = field_view(set);
   }
-  void place_obstacles(const std::vector<ObstaclePlacement>& placement) override {
-    ObstacleState& o = state_.obstacles;
+  void place(Solids which, const std::vector<ObstaclePlacement>& placement) override {
+    ObstacleState& o = which == Solids::sinks ? state_.sinks : state_.obstacles;
     std::vector<ObstacleView> views;
     for (size_t k = 0; k < placement.size(); ++k) {
       ObstacleView view{placement[k], {}};

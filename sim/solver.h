@@ -32,6 +32,7 @@ struct HostState {
   HostVec cloth_position, cloth_velocity;
   Limits limits;  // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
+  std::vector<uint64_t> removed;  // particles since the start: by each sink; last: left the domain
 };
 
 /// What never changes about the sheets, all in one.
@@ -52,6 +53,9 @@ struct ObstacleImpulse {
   double impulse[3] = {0, 0, 0};  // kg m/s, by pressure and by stopped particles
   int64_t stopped = 0;            // particles that pressure did not stop
 };
+
+/// What bodies in space are for: fluid flows around obstacles and vanishes in sinks.
+enum class Solids { obstacles, sinks };
 
 /// Columns a pass may name; only those that the plan names are allocated.
 enum ColumnGroup : unsigned {
@@ -96,11 +100,11 @@ class Solver {
   virtual void refresh() = 0;
   /// Limits of a state that no step has made yet.
   virtual Limits measure() = 0;
-  /// Level set 0 or 1 of an obstacle. To be called before it is placed.
-  virtual void load_level_set(int obstacle, int which, const LevelSet& set) = 0;
-  /// Where the obstacles of Parameters::obstacles are during the next step, and at its end for
-  /// refresh().
-  virtual void place_obstacles(const std::vector<ObstaclePlacement>& placement) = 0;
+  /// Level set 0 or 1 of an obstacle or sink. To be called before it is placed.
+  virtual void load_level_set(Solids of, int index, int which, const LevelSet& set) = 0;
+  /// Where the obstacles of Parameters::obstacles, or its sinks, are during the next step, and at
+  /// its end for refresh().
+  virtual void place(Solids which, const std::vector<ObstaclePlacement>& placement) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no

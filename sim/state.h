@@ -197,7 +197,7 @@ struct State {
   ClothState cloth;
   ClothSystem cloth_system;
   ContactState contact;
-  ObstacleState obstacles;
+  ObstacleState obstacles, sinks;
   SortScratch scratch;
   VecColumn swap_vector;
   Column<int> swap_int;
@@ -205,9 +205,10 @@ struct State {
   int substeps = 1;  // cloth steps in it
   bool owes = true;  // FluidState::owed may hold something
   std::function<void()>
-      after_substep;         // of an observer: called when all of a coupled substep is in place
-  uint64_t guard_hits = 0;   // particles held back by the path test, since the start
-  uint64_t guard_holds = 0;  // substeps in which vertices had to be stopped
+      after_substep;  // of an observer: called when all of a coupled substep is in place
+  std::vector<uint64_t> removed;  // particles since the start, see HostState
+  uint64_t guard_hits = 0;        // particles held back by the path test, since the start
+  uint64_t guard_holds = 0;       // substeps in which vertices had to be stopped
 };
 
 }  // namespace drench::sim::DRENCH_BACKEND

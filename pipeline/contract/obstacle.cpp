@@ -61,7 +61,7 @@ void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
       std::find_if(edges.begin(), edges.end(), [](const auto& e) { return e.second != 0; });
   if (open == edges.end() && !mesh.triangle.empty()) return;
   if (mesh.triangle.empty())
-    throw Error(file.string() + ": has no triangles; an obstacle needs some");
+    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
   const auto corner = [&](uint32_t of) {
     const auto found =
         std::find_if(place.begin(), place.end(), [&](const auto& p) { return p.second == of; });
@@ -70,7 +70,7 @@ void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
   };
   throw Error(
       fmt::format("{}: the mesh is not closed: the edge from {} to {} has not as many "
-                  "triangles one way as the other. An obstacle needs an inside: close its "
+                  "triangles one way as the other. It needs an inside: close its "
                   "holes and orient it in one way",
                   file.string(), corner(open->first.first), corner(open->first.second)));
 }
@@ -171,15 +171,19 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
   return pattern.parent_path() / name;
 }
 
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale) {
+  TriangleMesh mesh = read_mesh(file);
+  check_closed(mesh, file);
+  for (V3f& p : mesh.position) p *= float(scale);
+  return mesh;
+}
+
 TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
   const bool sequence = is_sequence(obstacle.mesh_file);
   const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
-  TriangleMesh mesh = read_mesh(file);
-  check_closed(mesh, file);
-  for (V3f& p : mesh.position) p *= float(obstacle.scale);
-  return mesh;
+  return read_closed_mesh(file, obstacle.scale);
 }
 
 TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {

@@ -75,10 +75,26 @@ struct FluidSphere {
   double radius = 0;
   V3d velocity{0, 0, 0};
 };
-struct FluidEmitter {  // a round inlet; particles leave as lattice layers
-  V3d center, direction{0, -1, 0};
-  double radius = 0, speed = 0;  // m, m/s
-  double start = 0, stop = 1e9;  // s
+enum class EmitterType { disc, rectangle };
+
+struct FluidEmitter {  // an inlet; particles leave as lattice layers
+  EmitterType type = EmitterType::disc;
+  Animated<V3d> center{V3d(0)};            // m; the fluid takes on its velocity
+  Animated<V3d> direction{V3d(0, -1, 0)};  // disc: any length but 0
+  double radius = 0.05;                    // disc, m
+  V3d u{0.1, 0, 0}, v{0, 0, 0.1};          // rectangle: half edges, m; fluid leaves along u x v
+  double speed = 0;                        // m/s, relative to the inlet
+  double start = 0, stop = 1e9;            // s after the simulation's start
+};
+/// A closed mesh filled with lattice particles at the start. As in Obstacle, its own frame has the
+/// origin at `position`.
+struct FluidVolume {
+  std::filesystem::path mesh_file;  // PLY or OBJ, absolute after reading
+  V3d position{0, 0, 0};            // m
+  V3d rotation_deg{0, 0, 0};        // about x, then y, then z of the world
+  double scale = 1;                 // of its coordinates, to m
+  double inset = 0.5;     // spacings: how deep inside the surface particles stand at least
+  V3d velocity{0, 0, 0};  // m/s
 };
 struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kept apart
   V3d min, max, velocity{0, 0, 0};
@@ -105,8 +121,9 @@ struct Fluid {
   std::vector<FluidSphere> sphere;
   std::vector<FluidEmitter> emitter;
   std::vector<FluidDrops> drops;
+  std::vector<FluidVolume> volume;
   bool present() const {
-    return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty());
+    return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty() && volume.empty());
   }
 };
 
@@ -149,6 +166,13 @@ struct Obstacle {
   double scale = 1;                    // mesh: of its coordinates, to m
   std::string material = "ground";
   bool visible = true;
+};
+
+/// A part of space that takes away the fluid in it. No solid, not drawn.
+struct Sink {
+  Obstacle shape;                // material and visible are unused
+  double start = 0, stop = 1e9;  // s after the simulation's start
+  Sink() { shape.name = "sink"; }
 };
 
 enum class CouplingScheme {
@@ -257,6 +281,7 @@ struct Shot {
   Fluid fluid;
   std::vector<Cloth> cloth;
   std::vector<Obstacle> obstacle;
+  std::vector<Sink> sink;
   Coupling coupling;
   std::vector<Probe> probe;
   SurfaceSettings surface;

@@ -9,6 +9,7 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/probe_check.h"
+#include "pipeline/contract/source_check.h"
 
 namespace drench {
 
@@ -34,6 +35,7 @@ class Checker {
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
     for (size_t i = 0; i < shot_.obstacle.size(); ++i) check_obstacle(i);
+    check_sources(shot_, sources_);
     check_names();
     check_probes(shot_, sources_);
     if (!shot_.fluid.present() && shot_.cloth.empty()) {
@@ -251,7 +253,6 @@ class Checker {
       check_positive(path + ".radius", sphere.radius, " m", "the sphere would hold no fluid");
       check_inside(path, sphere.center - V3d(sphere.radius), sphere.center + V3d(sphere.radius));
     }
-    for (size_t i = 0; i < fluid.emitter.size(); ++i) check_emitter(i);
     for (size_t i = 0; i < fluid.drops.size(); ++i) check_drops(i);
   }
 
@@ -267,20 +268,6 @@ class Checker {
       }
     }
     check_inside(path, box.min, box.max);
-  }
-
-  void check_emitter(size_t i) const {
-    const FluidEmitter& emitter = shot_.fluid.emitter[i];
-    const std::string path = fmt::format("fluid.emitter[{}]", i);
-    check_positive(path + ".radius", emitter.radius, " m", "the inlet has no area");
-    check_positive(path + ".speed", emitter.speed, " m/s", "nothing would flow");
-    check_not_zero(path + ".direction", emitter.direction);
-    if (emitter.start >= emitter.stop) {
-      fail(path + ".start", fmt::format("{0}.start is {1} s and {0}.stop is {2} s; it would stop "
-                                        "before it starts. Exchange them",
-                                        path, emitter.start, emitter.stop));
-    }
-    check_inside(path, emitter.center, emitter.center);
   }
 
   void check_drops(size_t i) const {
@@ -313,7 +300,7 @@ class Checker {
     for (const FluidSphere& sphere : fluid.sphere) count += ball(sphere.radius) / unit;
     for (const FluidEmitter& e : fluid.emitter) {
       const double flows = std::max(0.0, std::min(e.stop, end) - e.start);
-      count += pi * e.radius * e.radius * e.speed * flows / unit;
+      count += inlet_area(e) * e.speed * flows / unit;
     }
     for (const FluidDrops& drops : fluid.drops) {
       count += drops.particles > 0 ? drops.particles : drops.count * ball(drops.radius) / unit;
@@ -437,6 +424,9 @@ class Checker {
   void check_names() const {
     check_distinct(shot_.cloth, "cloth");
     check_distinct(shot_.obstacle, "obstacle");
+    std::vector<Obstacle> sinks;
+    for (const Sink& sink : shot_.sink) sinks.push_back(sink.shape);
+    check_distinct(sinks, "sink");
     check_distinct(shot_.probe, "probe");
     check_distinct(shot_.light, "light");
     check_distinct(shot_.material, "material");

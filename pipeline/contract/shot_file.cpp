@@ -250,6 +250,14 @@ class Reader {
       Obstacle& obstacle = *static_cast<Obstacle*>(object);
       obstacle.rotation_deg.interpolation = obstacle.position.interpolation;
     }
+    if (section.name == "sink") {
+      Obstacle& shape = static_cast<Sink*>(object)->shape;
+      shape.rotation_deg.interpolation = shape.position.interpolation;
+    }
+    if (section.name == "fluid.emitter") {
+      FluidEmitter& emitter = *static_cast<FluidEmitter*>(object);
+      emitter.direction.interpolation = emitter.center.interpolation;
+    }
   }
 
   void read_key(const Section& section, const Parameter& p, void* object, const std::string& path,

@@ -1,96 +1,10 @@
 #include "pipeline/contract/shot_table.h"
 
-#include <type_traits>
+#include "pipeline/contract/shot_rows.h"
 
 namespace drench::shot_table {
 
 namespace {
-
-template <class T>
-struct Member;
-template <class Owner_, class Value_>
-struct Member<Value_ Owner_::*> {
-  using Owner = Owner_;
-  using Value = Value_;
-};
-
-template <auto First, auto... Rest>
-void* field_of(void* owner) {
-  auto& value = static_cast<typename Member<decltype(First)>::Owner*>(owner)->*First;
-  if constexpr (sizeof...(Rest) > 0) {
-    return field_of<Rest...>(&value);
-  } else {
-    return &value;
-  }
-}
-
-template <auto First, auto... Rest>
-struct LastMember : LastMember<Rest...> {};
-template <auto Only>
-struct LastMember<Only> : Member<decltype(Only)> {};
-
-template <class T>
-constexpr Kind kind_of() {
-  if constexpr (std::is_same_v<T, bool>) return Kind::boolean;
-  if constexpr (std::is_same_v<T, int>) return Kind::integer;
-  if constexpr (std::is_same_v<T, uint32_t>) return Kind::natural;
-  if constexpr (std::is_same_v<T, double>) return Kind::number;
-  if constexpr (std::is_same_v<T, std::string>) return Kind::name;
-  if constexpr (std::is_same_v<T, std::filesystem::path>) return Kind::path;
-  if constexpr (std::is_same_v<T, V3d>) return Kind::vector;
-  if constexpr (std::is_same_v<T, V3f>) return Kind::colour;
-  if constexpr (std::is_same_v<T, V2i>) return Kind::cells;
-  if constexpr (std::is_same_v<T, Timeline>) return Kind::frames;
-  if constexpr (std::is_same_v<T, Animated<double>>) return Kind::number_track;
-  if constexpr (std::is_same_v<T, Animated<V3d>>) return Kind::vector_track;
-  if constexpr (std::is_same_v<T, std::vector<uint32_t>>) return Kind::vertices;
-  if constexpr (std::is_same_v<T, std::optional<std::pair<V3d, V3d>>>) return Kind::box;
-  static_assert(!std::is_enum_v<T> || sizeof(T) == sizeof(int));
-  return Kind::choice;
-}
-
-struct Row : Parameter {
-  Row needed() const {
-    Row row = *this;
-    row.required = true;
-    return row;
-  }
-  Row one_of(std::vector<std::string_view> names) const {
-    Row row = *this;
-    row.choices = std::move(names);
-    return row;
-  }
-  Row identity() const {
-    Row row = *this;
-    row.fixed = true;
-    return row;
-  }
-  Row only(unsigned bits) const {
-    Row row = *this;
-    row.types = bits;
-    return row;
-  }
-  Row as(Kind other) const {
-    Row row = *this;
-    row.kind = other;
-    return row;
-  }
-};
-
-template <auto... Members>
-Row row(std::string_view section, std::string_view key, std::string_view unit, Limits limits,
-        unsigned stages, std::string_view description) {
-  Row row;
-  row.section = section;
-  row.key = key;
-  row.kind = kind_of<typename LastMember<Members...>::Value>();
-  row.unit = unit;
-  row.limits = limits;
-  row.stages = stages;
-  row.description = description;
-  row.field = field_of<Members...>;
-  return row;
-}
 
 template <size_t I>
 void* axis_field(void* domain) {
@@ -122,15 +36,10 @@ Row grid_pins_row() {
   return row.one_of({"corners", "edge_u0", "edge_u1", "edge_v0", "edge_v1", "rim"});
 }
 
-constexpr Limits none{};
-constexpr Limits place{-1e5, 1e5};      // m: beyond, float steps are wider than a millimetre
-constexpr Limits speed{-1000, 1000};    // m/s
-constexpr Limits seeds{0, 4294967295};  // uint32_t
 constexpr Limits share{0, 1};
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
 constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;         // bits of ProbeType
 constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
-constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;          // bits of ObstacleType
 
 std::vector<Parameter> shot_rows() {
   return {
@@ -220,21 +129,6 @@ std::vector<Parameter> fluid_rows() {
           .needed(),
       row<&FluidSphere::velocity>("fluid.sphere", "velocity", "m/s", speed, simulate,
                                   "at the start"),
-
-      row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
-                                 "centre of the round inlet")
-          .needed(),
-      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
-                                    "the way the fluid leaves; any length but 0"),
-      row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
-          .needed(),
-      row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
-                                "at the inlet")
-          .needed(),
-      row<&FluidEmitter::start>("fluid.emitter", "start", "s", {0, 1e9}, simulate,
-                                "after the simulation's start"),
-      row<&FluidEmitter::stop>("fluid.emitter", "stop", "s", {0, 1e9}, simulate,
-                               "after the simulation's start"),
 
       row<&FluidDrops::min>("fluid.drops", "min", "m", place, simulate,
                             "lower corner of the centres")
@@ -544,6 +438,19 @@ Section typed(Section section) {
   return named<Object>(section);
 }
 
+Section emitters(Section section) {
+  section.type_of = [](void* object) { return int(static_cast<FluidEmitter*>(object)->type); };
+  return section;
+}
+
+Section sinks(Section section) {
+  section.type_of = [](void* object) { return int(static_cast<Sink*>(object)->shape.type); };
+  section.name_of = [](void* object) -> const std::string* {
+    return &static_cast<Sink*>(object)->shape.name;
+  };
+  return section;
+}
+
 Section whole_shot() {
   Section section;
   section.name = "shot";
@@ -566,14 +473,19 @@ const std::vector<Section>& sections() {
       single<&Shot::fluid>("fluid", "The fluid. Without sources there is none."),
       repeated<&Fluid::box>("fluid.box", "fluid", "A block of fluid at the start."),
       repeated<&Fluid::sphere>("fluid.sphere", "fluid", "A ball of fluid at the start."),
-      repeated<&Fluid::emitter>("fluid.emitter", "fluid", "A round inlet."),
+      emitters(repeated<&Fluid::emitter>("fluid.emitter", "fluid",
+                                         "An inlet, standing or moving as its keys say.")),
       repeated<&Fluid::drops>("fluid.drops", "fluid",
                               "Drops with centres drawn evenly in a box and kept apart."),
+      repeated<&Fluid::volume>("fluid.volume", "fluid",
+                               "A closed mesh full of fluid at the start."),
       named<Cloth>(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
       repeated<&Cloth::pin>("cloth.pin", "cloth",
                             "Vertices held where they start: a list or a box."),
       typed<Obstacle>(repeated<&Shot::obstacle>(
           "obstacle", "", "A solid in the fluid, standing or moving as its keys say.")),
+      sinks(repeated<&Shot::sink>(
+          "sink", "", "A drain: takes away the fluid that comes into it. No solid, not drawn.")),
       single<&Shot::coupling>("coupling", "How fluid and cloth push each other."),
       typed<Probe>(repeated<&Shot::probe>(
           "probe", "", "A measurement, a row for every step in `sim/probe.NAME.csv`.")),
@@ -592,7 +504,7 @@ const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
     for (const auto& part :
-         {shot_rows(), fluid_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
+         {shot_rows(), fluid_rows(), source_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
           surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }

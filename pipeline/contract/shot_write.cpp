@@ -41,6 +41,8 @@ std::string default_text(const Parameter& parameter) {
     fresh.fluid.sphere.resize(1);
     fresh.fluid.emitter.resize(1);
     fresh.fluid.drops.resize(1);
+    fresh.fluid.volume.resize(1);
+    fresh.sink.resize(1);
     fresh.cloth.resize(1);
     fresh.cloth[0].pin.resize(1);
     fresh.obstacle.resize(1);
@@ -209,7 +211,11 @@ Shot one_of_everything(const std::string& name) {
   shot.name = name;
   shot.fluid.box.push_back({.min = {-0.5, 0, -0.5}, .max = {0.5, 0.1, 0.5}});
   shot.fluid.sphere.push_back({.center = {0, 0.5, 0}, .radius = 0.1});
-  shot.fluid.emitter.push_back({.center = {0.6, 0.6, 0}, .radius = 0.05, .speed = 1});
+  FluidEmitter inlet;
+  inlet.center = V3d(0.6, 0.6, 0), inlet.speed = 1;
+  shot.fluid.emitter.push_back(inlet);
+  inlet.type = EmitterType::rectangle, inlet.center = V3d(-0.6, 0.6, 0);
+  shot.fluid.emitter.push_back(inlet);
   shot.fluid.drops.push_back(
       {.min = {-0.5, 0.7, -0.5}, .max = {0.5, 0.9, 0.5}, .radius = 0.03, .count = 4});
   Cloth sheet;
@@ -274,11 +280,10 @@ std::string described_shot(
   return text + quality_text;
 }
 
-/// Every key of an obstacle. A comment, because the reference has cloth, which goes with none yet.
-std::string commented_obstacle() {
-  const Section& section = *shot_table::find_section("obstacle");
-  std::string text = fmt::format("\n# {} Not together with cloth yet.\n# {}\n", section.description,
-                                 header_of(section));
+/// Every key of a section, as a comment: for what the reference cannot have, and why.
+std::string commented(const char* name, const char* why) {
+  const Section& section = *shot_table::find_section(name);
+  std::string text = fmt::format("\n# {} {}\n# {}\n", section.description, why, header_of(section));
   for (const Parameter* p : shot_table::parameters_of(section.name)) {
     const std::string value = default_text(*p);
     text += fmt::format("# {} = {}  # {}{}: {}\n", p->key,
@@ -301,7 +306,9 @@ std::string reference_shot(const std::string& name) {
         return fmt::format("{}  # {}{}: {}\n", line, p.required ? "required; " : "",
                            value_column(p), p.description);
       });
-  return text + commented_obstacle();
+  return text + commented("fluid.volume", "Not without its file.") +
+         commented("obstacle", "Not together with cloth yet.") +
+         commented("sink", "At its defaults it would take the fluid above.");
 }
 
 std::string starting_shot(const std::string& name) {

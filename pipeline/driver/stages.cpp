@@ -24,6 +24,8 @@ namespace {
 
 StageReport report_of(const StepReport& step, const std::string& device) {
   StageReport report;
+  json drained = json::object();
+  for (const auto& [sink, count] : step.drained) drained[sink] = count;
   report.json = json{{"device", device},
                      {"steps", step.steps},
                      {"cloth_substeps", step.cloth_substeps},
@@ -43,11 +45,17 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"sheet_sweeps", step.sheet_sweeps},
                      {"sheets_cut_short", step.sheets_cut_short},
                      {"viscous_unconverged", step.viscous_unconverged},
+                     {"drained", drained},
+                     {"lost", step.lost},
                      {"guard_hits", step.guard_hits}}
                     .dump();
   report.line =
       fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
                   step.steps, step.cloth_substeps, step.limit, step.particles, step.max_speed);
+  for (const auto& [sink, count] : step.drained) {
+    if (count > 0) report.line += fmt::format(" {}={}", sink, count);
+  }
+  if (step.lost > 0) report.line += fmt::format(" lost={}", step.lost);
   return report;
 }
 

@@ -72,6 +72,11 @@ void add_obstacle_meshes(const Shot& shot, StageKeyBuilder& builder) {
     if (!is_sequence(obstacle.mesh_file)) builder.file(obstacle.mesh_file);
 }
 
+void add_source_meshes(const Shot& shot, StageKeyBuilder& builder) {
+  for (const FluidVolume& volume : shot.fluid.volume) builder.file(volume.mesh_file);
+  for (const Sink& sink : shot.sink) builder.file(sink.shape.mesh_file);
+}
+
 std::map<int, Digest> sequence_digests(const Shot& shot) {
   std::map<int, Digest> digests;
   for (int frame = shot.timeline.first; frame <= shot.timeline.last; ++frame) {
@@ -88,15 +93,16 @@ std::map<int, Digest> sequence_digests(const Shot& shot) {
 }
 
 StageKey simulate_key(const Shot& shot, const std::string& device_class) {
-  StageKeyBuilder builder(
-      "simulate", build_id::simulate,
-      sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "coupling", "probe"}));
+  StageKeyBuilder builder("simulate", build_id::simulate,
+                          sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "sink",
+                                             "coupling", "probe"}));
   builder.settings(stage_settings_digest(shot, Stage::simulate))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first)
       .device(device_class);
   for (const Cloth& cloth : shot.cloth) builder.file(cloth.mesh_file);
   add_obstacle_meshes(shot, builder);
+  add_source_meshes(shot, builder);
   return builder.finish();
 }
 

@@ -2,6 +2,7 @@
 // Particles sorted by cell at the start of every step; ties keep their order, which a checkpoint
 // holds.
 
+#include "sim/passes/drain.h"
 #include "sim/passes/polygon_grid.h"
 #include "sim/periodic.h"
 
@@ -53,16 +54,17 @@ inline void sort_by_cell(State& state) {
   if (period.z > 0.f) box.low.z = p.low[2];
   f.grid = make_grid_shape(box.low, box.high, p.support_radius, period);
   const GridShape grid = f.grid;
-  const int lost = grid.cells();
+  const int lost = grid.cells(), sinks = state.sinks.count;
   int* cell = f.cell.data();
   parallel_for(
       "fluid cells", n, DRENCH_LAMBDA(int i) {
         const Vec3<float> q = x[i];
         const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
                             q.z >= lower.z && q.z <= upper.z;
-        cell[i] = inside ? grid.cell(q) : lost;
+        cell[i] = inside ? grid.cell(q) : lost + sinks;
       });
-  stable_sort_keys(f.cell, n, lost, f.order, f.cell_start, state.scratch);
+  if (state.sinks.count > 0) mark_drained(state, lost);
+  stable_sort_keys(f.cell, n, lost + state.sinks.count, f.order, f.cell_start, state.scratch);
 }
 
 inline void sort_particles(State& state) {
@@ -84,7 +86,7 @@ inline void sort_particles(State& state) {
   }
   bool open = false;
   for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];
-  if (open) f.count = value_at(f.cell_start, f.grid.cells());
+  if (open || state.sinks.count > 0) drop_removed(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -119,6 +119,7 @@ TEST_F(ShotDigest, ChangesForExactlyTheStagesOfEachRow) {
   for (const ObstacleType type :
        {ObstacleType::plane, ObstacleType::box, ObstacleType::sphere, ObstacleType::mesh}) {
     everything.obstacle.emplace_back().type = type;  // beside cloth, as no shot that is read has it
+    everything.sink.emplace_back().shape.type = type;
   }
   size_t seen = 0;
   for (const Parameter& p : shot_table::parameters()) {
@@ -142,9 +143,9 @@ TEST_F(ShotDigest, ChangesForExactlyTheStagesOfEachRow) {
 // What each section is for decides who reads it, whatever the table says.
 TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
   const std::set<std::string_view> looks{"camera", "light", "material", "ground", "render"};
-  const std::set<std::string_view> physics{"domain",        "fluid.box",   "fluid.sphere",
-                                           "fluid.emitter", "fluid.drops", "cloth.pin",
-                                           "coupling",      "probe"};
+  const std::set<std::string_view> physics{
+      "domain",       "fluid.box", "fluid.sphere", "fluid.emitter", "fluid.drops",
+      "fluid.volume", "sink",      "cloth.pin",    "coupling",      "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     if (looks.contains(p.section)) {
       EXPECT_EQ(p.stages, shot_table::render) << p.key;

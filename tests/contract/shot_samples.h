@@ -11,6 +11,7 @@ namespace drench::test {
 /// Files that full_shot names, in `folder`.
 inline void write_shot_files(const TemporaryFolder& folder) {
   write_file_whole(folder / "flag.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
+  write_file_whole(folder / "drop.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n");
   write_file_whole(folder / "sky.exr", "a map");
   write_file_whole(folder / "weave.png", "a texture");
 }
@@ -46,11 +47,32 @@ radius = 0.1
 speed = 2
 stop = 1
 
+[[fluid.emitter]]
+type = "rectangle"
+center = [[1001, [0.5, 1.5, 0]], [1012, [0.6, 1.5, 0]]]
+u = [0.1, 0, 0]
+v = [0, 0, 0.05]
+speed = 1
+stop = 0.2
+interp = "smooth"
+
+[[fluid.volume]]
+mesh = "drop.obj"
+position = [0, 1.4, 0]
+scale = 0.1
+
 [[fluid.drops]]
 min = [-0.5, 1.2, -0.5]
 max = [0.5, 1.5, 0.5]
 radius = 0.05
 count = 4
+
+[[sink]]
+type = "box"
+name = "drain"
+position = [[1001, [0.8, 0.1, 0]], [1024, [0.8, 0.2, 0]]]
+size = [0.3, 0.2, 0.3]
+start = 0.5
 
 [[cloth]]
 name = "sheet"

@@ -107,6 +107,10 @@ class Resume : public testing::TestWithParam<FluidSolver> {
     FluidEmitter emitter;
     emitter.center = V3d(0.1, 0.4, 0.1), emitter.radius = 0.03, emitter.speed = 1;
     shot.fluid.emitter.push_back(emitter);
+    Sink sink;  // below the emitter
+    sink.shape.type = ObstacleType::sphere, sink.shape.radius = 0.04;
+    sink.shape.position.keys = {{1001, V3d(0.1, 0.36, 0.1)}, {1005, V3d(0.1, 0.33, 0.1)}};
+    shot.sink.push_back(sink);
     return shot;
   }
   std::string bytes(const std::filesystem::path& path) const {

@@ -131,6 +131,30 @@ TEST(Skip, ProbesAddNoPassAndNoColumnAndChangeNoBit) {
   }
 }
 
+// Sinks are part of sorting: no pass, no column, and what they do not meet keeps its bits.
+TEST(Skip, ASinkThatMeetsNothingChangesNoBit) {
+  for (const auto solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
+    Shot shot = empty_shot();
+    shot.fluid.solver = solver;
+    shot.gravity = V3d(0, -9.81, 0);
+    shot.domain.axis[1] = Axis::walls;
+    add_box(shot, V3d(0, -0.98, 0), {8, 8, 8});
+    Stepper without(shot);
+    shot.sink.emplace_back().shape.type = ObstacleType::sphere;
+    shot.sink[0].shape.position = V3d(0, 0.7, 0);
+    Stepper with(shot);
+    ASSERT_EQ(without.solver->plan().size(), with.solver->plan().size());
+    EXPECT_EQ(without.solver->allocated(), with.solver->allocated());
+    for (int k = 0; k < 200; ++k) without.step(5e-4), with.step(5e-4);
+    const sim::HostState a = without.solver->save(), b = with.solver->save();
+    EXPECT_EQ(a.id, b.id);
+    EXPECT_EQ(a.position.x, b.position.x);
+    EXPECT_EQ(a.position.y, b.position.y);
+    EXPECT_EQ(a.velocity.z, b.velocity.z);
+    EXPECT_EQ(a.pressure_term, b.pressure_term);
+  }
+}
+
 // refresh() between steps, as every frame's end makes it, changes nothing either.
 TEST(Skip, RefreshChangesNoBit) {
   Shot shot = empty_shot();

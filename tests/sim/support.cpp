@@ -50,6 +50,7 @@ Stepper::Stepper(sim::Scene scene_) : scene(std::move(scene_)) {
   solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
   solver->load(scene.start);
   scene.obstacles.place(*solver, 0, 0);
+  scene.sinks.place(*solver, 0, 0);
   limits = solver->measure();
 }
 
@@ -59,6 +60,7 @@ double Stepper::next_dt() { return scene.obstacles.limit(time, stable_dt()); }
 void Stepper::step(double dt) {
   const double parts = std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6);
   scene.obstacles.place(*solver, time, time + dt);
+  scene.sinks.place(*solver, time, time + dt);
   limits = solver->step(dt, scene.cloth.vertices() > 0 ? std::max(1, int(parts)) : 1);
   time += dt, ++steps;
 }

@@ -1,0 +1,111 @@
+#include "pipeline/contract/shot_rows.h"
+
+namespace drench::shot_table {
+
+namespace {
+
+constexpr unsigned disc = 1, rectangle = 2;  // bits of EmitterType
+constexpr Limits turns{-360000, 360000};     // deg
+
+std::vector<Parameter> emitter_rows() {
+  return {
+      row<&FluidEmitter::type>("fluid.emitter", "type", "", none, simulate, "shape of the inlet")
+          .one_of({"disc", "rectangle"})
+          .identity(),
+      row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
+                                 "centre of the inlet; may be animated: the fluid takes on its "
+                                 "velocity")
+          .needed(),
+      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
+                                    "the way the fluid leaves; any length but 0; may be animated")
+          .only(disc),
+      row<&FluidEmitter::center>("fluid.emitter", "interp", "", none, simulate,
+                                 "between the keys of center and direction")
+          .as(Kind::track_mode)
+          .one_of({"linear", "smooth"}),
+      row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
+          .only(disc),
+      row<&FluidEmitter::u>("fluid.emitter", "u", "m", place, simulate,
+                            "half of one edge; the fluid leaves along u x v")
+          .only(rectangle),
+      row<&FluidEmitter::v>("fluid.emitter", "v", "m", place, simulate,
+                            "half of the other edge, at right angles to u")
+          .only(rectangle),
+      row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
+                                "relative to the inlet")
+          .needed(),
+      row<&FluidEmitter::start>("fluid.emitter", "start", "s", {0, 1e9}, simulate,
+                                "after the simulation's start"),
+      row<&FluidEmitter::stop>("fluid.emitter", "stop", "s", {0, 1e9}, simulate,
+                               "after the simulation's start"),
+  };
+}
+
+std::vector<Parameter> volume_rows() {
+  return {
+      row<&FluidVolume::mesh_file>("fluid.volume", "mesh", "", none, simulate,
+                                   "closed PLY or OBJ; particles stand on the lattice that begins "
+                                   "at domain.min")
+          .needed(),
+      row<&FluidVolume::position>("fluid.volume", "position", "m", place, simulate,
+                                  "where the origin of the mesh stands"),
+      row<&FluidVolume::rotation_deg>("fluid.volume", "rotation_deg", "deg", turns, simulate,
+                                      "about x, then y, then z through position"),
+      row<&FluidVolume::scale>("fluid.volume", "scale", "", {1e-6, 1e6}, simulate,
+                               "metres for a unit of the file"),
+      row<&FluidVolume::inset>("fluid.volume", "inset", "", {0, 1}, simulate,
+                               "how deep inside the surface particles stand at least / spacing: "
+                               "0.5 stays within a vessel's walls, 0 gives the mesh's volume"),
+      row<&FluidVolume::velocity>("fluid.volume", "velocity", "m/s", speed, simulate,
+                                  "at the start"),
+  };
+}
+
+std::vector<Parameter> sink_rows() {
+  return {
+      row<&Sink::shape, &Obstacle::type>("sink", "type", "", none, simulate, "its shape")
+          .one_of({"plane", "box", "sphere", "mesh"})
+          .needed()
+          .identity(),
+      row<&Sink::shape, &Obstacle::name>("sink", "name", "", none, simulate,
+                                         "in the log; sink, sink2, ... unless given")
+          .identity(),
+      row<&Sink::shape, &Obstacle::position>("sink", "position", "m", place, simulate,
+                                             "a point of the plane, the centre of the box or "
+                                             "sphere, the origin of the mesh; may be animated"),
+      row<&Sink::shape, &Obstacle::rotation_deg>(
+          "sink", "rotation_deg", "deg", turns, simulate,
+          "about x, then y, then z through position; may be animated"),
+      row<&Sink::shape, &Obstacle::position>("sink", "interp", "", none, simulate,
+                                             "between the keys of position and rotation_deg")
+          .as(Kind::track_mode)
+          .one_of({"linear", "smooth"}),
+      row<&Sink::shape, &Obstacle::normal>("sink", "normal", "", place, simulate,
+                                           "points away from the side that takes fluid; any length "
+                                           "but 0")
+          .only(plane),
+      row<&Sink::shape, &Obstacle::size>("sink", "size", "m", {0, 1e5}, simulate, "edges")
+          .only(box),
+      row<&Sink::shape, &Obstacle::radius>("sink", "radius", "m", {0, 1e5}, simulate, "radius")
+          .only(ball),
+      row<&Sink::shape, &Obstacle::mesh_file>("sink", "mesh", "", none, simulate,
+                                              "closed PLY or OBJ")
+          .only(mesh_type),
+      row<&Sink::shape, &Obstacle::scale>("sink", "scale", "", {1e-6, 1e6}, simulate,
+                                          "metres for a unit of the file")
+          .only(mesh_type),
+      row<&Sink::start>("sink", "start", "s", {0, 1e9}, simulate, "after the simulation's start"),
+      row<&Sink::stop>("sink", "stop", "s", {0, 1e9}, simulate, "after the simulation's start"),
+  };
+}
+
+}  // namespace
+
+std::vector<Parameter> source_rows() {
+  std::vector<Parameter> all = emitter_rows();
+  for (const auto& part : {volume_rows(), sink_rows()})
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace drench::shot_table

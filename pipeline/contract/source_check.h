@@ -1,0 +1,16 @@
+#pragma once
+// Emitters, volumes and sinks: what none of their values shows alone.
+
+#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot_check.h"
+
+namespace drench {
+
+/// m^2
+double inlet_area(const FluidEmitter& emitter);
+
+/// @throws Error with place, keys, values, reason and remedy for the first emitter, volume or sink
+/// that cannot be right.
+void check_sources(const Shot& shot, const ShotSources& sources);
+
+}  // namespace drench
