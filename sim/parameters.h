@@ -35,6 +35,10 @@ struct Parameters {
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
   bool paper = false;            // coupling scheme
+  // air, which moves as WindNow says; 0: none
+  float air_density = 0;                     // kg/m^3
+  float cloth_drag = 0, cloth_friction = 0;  // coefficients across and along a sheet
+  float fluid_drag = 0;                      // times the drag of drops
   // time
   double fixed_dt = 0;  // s, 0 is adaptive
 };

@@ -166,6 +166,11 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   }
   p.full = p.incompressible && fills_domain(shot, fluid);
   if (p.incompressible) set_viscosity(shot, p);
+  if (shot.wind.present) {
+    p.air_density = float(shot.wind.air_density);
+    p.cloth_drag = float(shot.wind.cloth_drag), p.cloth_friction = float(shot.wind.cloth_friction);
+    p.fluid_drag = float(shot.wind.fluid_drag);
+  }
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;
@@ -313,6 +318,13 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
   for (size_t r = 1; r < start.size(); ++r) t.fan_start.push_back(start[r] + offset);
   t.fan_entry.insert(t.fan_entry.end(), flat.begin(), flat.end());
   for (size_t v = 0; v < sheet.position.size(); ++v) {
+    double third = 0;
+    for (const int entry : fan[v]) {
+      const auto& k = sheet.triangle[size_t(entry / 3 - base_triangle)];
+      const V3d a = sheet.rest[k[0]];
+      third += (sheet.rest[k[1]] - a).cross(sheet.rest[k[2]] - a).length() / 6;
+    }
+    t.air_share.push_back(float(sheet.mass[v] / (cloth.areal_density * third)));
     t.mass.push_back(float(sheet.mass[v]));
     t.inverse_mass.push_back(sheet.pinned[v] ? 0.f : float(1 / sheet.mass[v]));
     t.damping_rate.push_back(float(cloth.damping));
@@ -386,6 +398,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
       shot.fluid.present() ? initial_fluid(shot, make_level_set) : InitialFluid{};
   scene.overlapping = fluid.overlapping;
   scene.obstacles = ObstacleSet(shot, scene.frame, make_level_set);
+  if (shot.wind.present) scene.wind = Wind(shot, scene.frame);
   scene.sinks = sinks_of(shot, scene.frame, make_level_set);
   scene.parameters = build_parameters(shot, scene.frame, fluid, scene.obstacles);
   HostState& start = scene.start;

@@ -10,6 +10,7 @@
 #include "pipeline/contract/shot.h"
 #include "sim/obstacles.h"
 #include "sim/solver.h"
+#include "sim/wind.h"
 
 namespace drench::sim {
 
@@ -84,6 +85,7 @@ struct Scene {
   std::vector<int> first_vertex, first_triangle;  // of each sheet, and one past the end
   ClothTopology cloth;
   ObstacleSet obstacles, sinks;
+  Wind wind;
   HostState start;
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
 

@@ -154,6 +154,7 @@ struct Simulator::Implementation {
       const double then = parts <= 1 ? stop : time + dt;
       scene.obstacles.place(*solver, time, then);
       scene.sinks.place(*solver, time, then);
+      if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(then));
       limits = solver->step(dt, substeps);
       time = then;
       ++steps;

@@ -191,6 +191,7 @@ class BackendSolver : public Solver {
     o.stopped.resize(4 * views.size());
     o.stopped.clear_bytes(0);
   }
+  void blow(const WindNow& wind) override { state_.wind = wind; }
   std::vector<ObstacleImpulse> obstacle_impulses() const override {
     const ObstacleState& o = state_.obstacles;
     const std::vector<long long> stopped = to_host(o.stopped, o.stopped.size());
@@ -273,6 +274,9 @@ class BackendSolver : public Solver {
       v->resize(c.padded);
     }
     c.force.clear();
+    for (VecColumn* v : {&c.air_diagonal, &c.air_cross, &c.air_push})
+      v->resize(state_.parameters.air_density > 0.f ? c.padded : 0);
+    if (state_.parameters.air_density > 0.f) from_host(c.air_share, t.air_share);
     c.centroid.resize(c.triangles);
     c.sorted_low.resize(c.triangles + 8);
     c.sorted_high.resize(c.triangles + 8);

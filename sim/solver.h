@@ -12,6 +12,7 @@
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
 #include "sim/probe_query.h"
+#include "sim/wind_now.h"
 
 namespace drench::sim {
 
@@ -42,6 +43,7 @@ struct ClothTopology {
   std::vector<float> rest_length, stiffness, spring_damping;
   std::vector<int> corner, neighbour, sheet;  // 3, 3, 1 a triangle
   std::vector<float> half_thickness;
+  std::vector<float> air_share;  // of a vertex: area its mass stands for / a third of its triangles
   HostVec rest_centroid;
   std::vector<int> fan_start, fan_entry, rim;
   int vertices() const { return int(mass.size()); }
@@ -105,6 +107,8 @@ class Solver {
   /// Where the obstacles of Parameters::obstacles, or its sinks, are during the next step, and at
   /// its end for refresh().
   virtual void place(Solids which, const std::vector<ObstaclePlacement>& placement) = 0;
+  /// The wind of the next step, where Parameters::air_density is above 0.
+  virtual void blow(const WindNow& wind) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no

@@ -11,6 +11,7 @@
 #include "sim/parameters.h"
 #include "sim/sort.h"
 #include "sim/wall_table.h"
+#include "sim/wind_now.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -83,11 +84,15 @@ struct ClothState {
   VecColumn sorted_low, sorted_high;                // m, bounding boxes in that order, padded by 8
   Column<PreparedTriangle<float>> sorted_triangle;  // in that order as well, a cache line each
   GridShape grid{};
-  float largest_radius = 0;    // m
-  float moved = 0;             // m, what any vertex has moved at most since far_by was set
-  Vec3<float> low{}, high{};   // m, bounds of all vertices
-  VecColumn predicted;         // m/s, mean over the step
-  Column<float> share;         // sum of contact weights
+  float largest_radius = 0;   // m
+  float moved = 0;            // m, what any vertex has moved at most since far_by was set
+  Vec3<float> low{}, high{};  // m, bounds of all vertices
+  VecColumn predicted;        // m/s, mean over the step
+  Column<float> share;        // sum of contact weights
+  VecColumn air_diagonal,
+      air_cross;               // kg/s, see AirDrag; these and air_push only where there is air
+  Column<float> air_share;     // see ClothTopology
+  VecColumn air_push;          // N
   VecColumn force;             // N from the fluid, constant over the step
   Column<int> held;            // by the path test for this substep
   Column<long long> stop_sum;  // 4 a vertex: see PathTest
@@ -198,6 +203,7 @@ struct State {
   ClothSystem cloth_system;
   ContactState contact;
   ObstacleState obstacles, sinks;
+  WindNow wind;
   SortScratch scratch;
   VecColumn swap_vector;
   Column<int> swap_int;

@@ -11,6 +11,8 @@
 #include "sim/passes/sheet_side.h"
 #include "sim/passes/sort_particles.h"
 #include "sim/passes/viscosity_solve.h"
+#include "sim/passes/wind_on_cloth.h"
+#include "sim/passes/wind_on_fluid.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -117,10 +119,16 @@ bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
+bool windy(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && p.air_density > 0 && p.fluid_drag > 0;
+}
 bool compressible(const Parameters& p, bool) { return p.fluid && !p.incompressible; }
 bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
 bool exact(const Parameters& p, bool cloth) { return coupled(p, cloth) && !p.incompressible; }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
+bool strong_in_wind(const Parameters& p, bool cloth) {
+  return strong(p, cloth) && p.air_density > 0;
+}
 bool paper(const Parameters& p, bool cloth) { return p.fluid && cloth && p.paper; }
 bool fluid_alone(const Parameters& p, bool cloth) { return compressible(p, cloth) && !cloth; }
 bool cloth_alone(const Parameters& p, bool cloth) { return !p.fluid && cloth; }
@@ -137,6 +145,8 @@ const Pass all_passes[] = {
      exact_sides},
     {"sort_near", strong, column_sheet, column_contact, sort_all_contacts},
     {"start_rows", strong, column_sheet | column_contact, column_cloth, start_contacts},
+    // Explicit sheets feel it substep by substep, in cloth_verlet.
+    {"wind_on_cloth", strong_in_wind, column_cloth, column_cloth, wind_on_cloth},
     {"linearise_cloth", strong, column_cloth, column_cloth_system, linearise_cloth},
     {"find_neighbours", projected, column_position, column_density | column_projection,
      find_neighbours},
@@ -148,6 +158,8 @@ const Pass all_passes[] = {
      moving | column_density | column_projection, project_around_obstacles},
     {"apply_viscosity", viscous, column_velocity | column_projection,
      column_velocity | column_projection, apply_viscosity},
+    {"wind_on_fluid", windy, moving | column_density | column_projection, column_velocity,
+     wind_on_fluid},
     {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
     {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
      find_nearest_centroids},
@@ -200,6 +212,7 @@ void step_cloth_alone(State& state) {
   state.cloth.force.clear();
   if (state.parameters.incompressible) {
     state.contact.near = 0;
+    if (state.parameters.air_density > 0) wind_on_cloth(state);
     linearise_cloth(state);
     settle_sheets(state);
     finish_sheets(state);

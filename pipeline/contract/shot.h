@@ -175,6 +175,18 @@ struct Sink {
   Sink() { shape.name = "sink"; }
 };
 
+/// Air that drags fluid and cloth along. Without [wind] there is none.
+struct Wind {
+  bool present = false;
+  Animated<V3d> velocity{V3d(0)};  // m/s
+  double air_density = 1.2;        // kg/m^3
+  double gust = 0;                 // m/s, RMS of what is added
+  double gust_size = 1;            // m, longest wave of it
+  double cloth_drag = 1.2;         // coefficient across a sheet; square plates have 1.17
+  double cloth_friction = 0.02;    // along it, both sides
+  double fluid_drag = 1;           // times the drag of drops
+};
+
 enum class CouplingScheme {
   exact,
   paper
@@ -282,6 +294,7 @@ struct Shot {
   std::vector<Cloth> cloth;
   std::vector<Obstacle> obstacle;
   std::vector<Sink> sink;
+  Wind wind;
   Coupling coupling;
   std::vector<Probe> probe;
   SurfaceSettings surface;

@@ -99,7 +99,8 @@ inline constexpr Limits speed{-1000, 1000};    // m/s
 inline constexpr Limits seeds{0, 4294967295};  // uint32_t
 inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits of ObstacleType
 
-/// Rows of emitters, volumes and sinks: where fluid comes from and goes to.
+/// Rows of emitters, volumes, sinks and wind: where fluid comes from and goes to, and what drives
+/// it.
 std::vector<Parameter> source_rows();
 
 }  // namespace drench::shot_table

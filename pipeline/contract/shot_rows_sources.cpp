@@ -99,11 +99,34 @@ std::vector<Parameter> sink_rows() {
   };
 }
 
+std::vector<Parameter> wind_rows() {
+  return {
+      row<&Wind::present>("wind", "present", "", none, simulate,
+                          "there is air; true when [wind] is written"),
+      row<&Wind::velocity>("wind", "velocity", "m/s", speed, simulate,
+                           "of the air; may be animated"),
+      row<&Wind::air_density>("wind", "air_density", "kg/m^3", {0, 100}, simulate,
+                              "0 is no air at all"),
+      row<&Wind::gust>("wind", "gust", "m/s", {0, 100}, simulate,
+                       "RMS of waves that are added to velocity and carried along by it; the same "
+                       "for the same shot.seed"),
+      row<&Wind::gust_size>("wind", "gust_size", "m", {1e-3, 1e5}, simulate,
+                            "longest of these waves; the shortest is a quarter of it"),
+      row<&Wind::cloth_drag>("wind", "cloth_drag", "", {0, 100}, simulate,
+                             "drag coefficient across a sheet; square plates have 1.17"),
+      row<&Wind::cloth_friction>("wind", "cloth_friction", "", {0, 100}, simulate,
+                                 "drag coefficient along a sheet, of both sides"),
+      row<&Wind::fluid_drag>("wind", "fluid_drag", "", {0, 100}, simulate,
+                             "times the drag of drops on the fluid's surface and spray; "
+                             "incompressible fluid only"),
+  };
+}
+
 }  // namespace
 
 std::vector<Parameter> source_rows() {
   std::vector<Parameter> all = emitter_rows();
-  for (const auto& part : {volume_rows(), sink_rows()})
+  for (const auto& part : {volume_rows(), sink_rows(), wind_rows()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

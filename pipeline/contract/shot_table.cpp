@@ -486,6 +486,7 @@ const std::vector<Section>& sections() {
           "obstacle", "", "A solid in the fluid, standing or moving as its keys say.")),
       sinks(repeated<&Shot::sink>(
           "sink", "", "A drain: takes away the fluid that comes into it. No solid, not drawn.")),
+      single<&Shot::wind>("wind", "Air that drags fluid and cloth along, still or moving."),
       single<&Shot::coupling>("coupling", "How fluid and cloth push each other."),
       typed<Probe>(repeated<&Shot::probe>(
           "probe", "", "A measurement, a row for every step in `sim/probe.NAME.csv`.")),

@@ -273,9 +273,11 @@ std::string described_shot(
       "# Units are SI, Y is up, colours are linear ACEScg, \"srgb(r, g, b)\" or \"#rrggbb\".\n",
       shot.name, about);
   shot_table::for_each_object(shot, [&](const Section& section, void* object, const std::string&) {
-    text += fmt::format("\n# {}\n{}\n", section.description, header_of(section));
+    std::string lines;
     for (const Parameter* p : shot_table::parameters_of(section.name))
-      if (shot_table::applies(*p, section, object)) text += line(*p, shown_value(*p, object));
+      if (shot_table::applies(*p, section, object)) lines += line(*p, shown_value(*p, object));
+    if (lines.empty()) return;
+    text += fmt::format("\n# {}\n{}\n{}", section.description, header_of(section), lines);
   });
   return text + quality_text;
 }
@@ -317,6 +319,7 @@ std::string starting_shot(const std::string& name) {
       "a ball of water falls on a sheet held at its corners.\n"
       "# Keys behind '#' show their defaults. `drench init NAME --reference` writes every one.",
       [](const Parameter& p, const std::string& value) {
+        if (p.section == "wind") return std::string();  // its header alone would be air
         const bool standard = value.empty() || (p.field && value == default_text(p));
         const std::string unit = p.unit.empty() ? "" : fmt::format("{}: ", p.unit);
         return fmt::format("{}{} = {}  # {}{}\n", standard ? "# " : "", p.key,

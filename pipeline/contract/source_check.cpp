@@ -134,6 +134,14 @@ void check_sources(const Shot& shot, const ShotSources& sources) {
   check_all(shot.fluid.emitter, "fluid.emitter");
   check_all(shot.fluid.volume, "fluid.volume");
   check_all(shot.sink, "sink");
+  const bool felt = shot.wind.present && shot.wind.air_density > 0 && shot.wind.fluid_drag > 0;
+  if (felt && shot.fluid.present() && !is_incompressible(shot)) {
+    throw Error(fmt::format(
+        "{}: wind.fluid_drag is {} but the shot's fluid is weakly compressible, which feels no "
+        "wind. Use fluid.solver = \"incompressible\", or wind.fluid_drag = 0 for wind on cloth "
+        "alone",
+        sources.at("wind.fluid_drag"), shot.wind.fluid_drag));
+  }
 }
 
 }  // namespace drench

@@ -95,7 +95,7 @@ std::map<int, Digest> sequence_digests(const Shot& shot) {
 StageKey simulate_key(const Shot& shot, const std::string& device_class) {
   StageKeyBuilder builder("simulate", build_id::simulate,
                           sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "sink",
-                                             "coupling", "probe"}));
+                                             "wind", "coupling", "probe"}));
   builder.settings(stage_settings_digest(shot, Stage::simulate))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first)

@@ -2,12 +2,12 @@
 // Implicit Euler of the sheets, linearised once a step about where they are (Baraff and Witkin
 // 1998): with w = x_end - x - dt v, the way that a vertex comes off the straight one,
 //   A w = dt^2 (f(x) + m g + f_owed - m c v) - (dt C + dt^2 K) dt v + loads,   A = m (1 + dt c) +
-//   dt C + dt^2 K,
+//   dt C + dt^2 K + dt B,
 // K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
 // pressures give (sheet_pressure.h). Solved by conjugate gradients scaled by the 3 x 3 blocks of
-// the vertices. Pinned vertices stay at w = 0, and vertices that a wall of the domain holds up have
-// the w that takes them there.
+// the vertices. B is the drag of the air (wind_on_cloth.h), whose push joins f. Pinned vertices
+// stay at w = 0, and vertices that a wall of the domain holds up have the w that takes them there.
 
 #include "sim/passes/cloth_springs.h"
 
@@ -24,12 +24,15 @@ struct ClothMatrix {
   SpringEnds ends;
   const float *tension, *inertia;
   VecView axis, free;
+  AirDrag air;
+  float dt;  // s
 
   template <class Index>
   DRENCH_HD auto times(const VecView& view, Index i) const {
     using T = decltype(load(inertia, i));
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
+    if (air.on) y = y + air.times(i, x) * T(dt);
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
@@ -41,8 +44,9 @@ struct ClothMatrix {
 
 inline ClothMatrix cloth_matrix(const State& state) {
   const ClothSystem& s = state.cloth_system;
-  return {spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(), s.axis.view(),
-          s.free.view()};
+  return {
+      spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(), s.axis.view(), s.free.view(),
+      air_drag_of(state),          float(state.dt)};
 }
 
 /// Inverses of the blocks on A's diagonal, as L D L^T.
@@ -92,6 +96,8 @@ inline void linearise_cloth(State& state) {
   float *tension = s.tension.data(), *inertia = s.inertia.data();
   const BlockInverse block = block_inverse(state);
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
+  const AirDrag air = air_drag_of(state);
+  const VecView air_push = c.air_push.view();
   ClothControl* control = s.control.data();
   parallel_for(
       "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
@@ -117,6 +123,12 @@ inline void linearise_cloth(State& state) {
           store(tension, at, t), axis.put(at, e);
           b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
           b[3] = b[3] + t + e.y * e.y, b[4] = b[4] + e.y * e.z, b[5] = b[5] + t + e.z * e.z;
+        }
+        if (air.on) {
+          const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);
+          push = push + air_push.at(i);
+          b[0] = b[0] + d.x, b[1] = b[1] + m.x, b[2] = b[2] + m.z;
+          b[3] = b[3] + d.y, b[4] = b[4] + m.y, b[5] = b[5] + d.z;
         }
         store(inertia, i, heavy);
         block.put(i, b, maximum(heavy, T(1e-20f)));

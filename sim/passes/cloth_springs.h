@@ -1,6 +1,5 @@
 #pragma once
-#include "sim/parallel.h"
-#include "sim/state.h"
+#include "sim/passes/wind_on_cloth.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -96,6 +95,9 @@ inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const ClothWalls walls = cloth_walls_of(p);
+  const AirDrag air = air_drag_of(state);
+  const VecView air_push = c.air_push.view();
+  if (air.on) blow_at_cloth(state, b.position, b.velocity);
   for_each_lane(
       "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
@@ -104,6 +106,11 @@ inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
         const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
         const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
         Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
+        if (air.on) {  // implicit: v' = v + dt w (push - B (v' - v_start))
+          const T s = w * T(dt);
+          const Vec3<T> push = air_push.at(i) - air.times(i, v - b.velocity.at(i));
+          v = v + air.settle(i, s, push * s);
+        }
         Vec3<T> x = b.position.at(i) + v * T(dt);
         walls.stop(x, v);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};

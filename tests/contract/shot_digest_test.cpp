@@ -144,8 +144,8 @@ TEST_F(ShotDigest, ChangesForExactlyTheStagesOfEachRow) {
 TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
   const std::set<std::string_view> looks{"camera", "light", "material", "ground", "render"};
   const std::set<std::string_view> physics{
-      "domain",       "fluid.box", "fluid.sphere", "fluid.emitter", "fluid.drops",
-      "fluid.volume", "sink",      "cloth.pin",    "coupling",      "probe"};
+      "domain", "fluid.box", "fluid.sphere", "fluid.emitter", "fluid.drops", "fluid.volume",
+      "wind",   "sink",      "cloth.pin",    "coupling",      "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     if (looks.contains(p.section)) {
       EXPECT_EQ(p.stages, shot_table::render) << p.key;

@@ -107,6 +107,10 @@ class Resume : public testing::TestWithParam<FluidSolver> {
     FluidEmitter emitter;
     emitter.center = V3d(0.1, 0.4, 0.1), emitter.radius = 0.03, emitter.speed = 1;
     shot.fluid.emitter.push_back(emitter);
+    if (GetParam() == FluidSolver::incompressible) {
+      shot.wind.present = true, shot.wind.gust = 2;
+      shot.wind.velocity.keys = {{1001, V3d(0)}, {1004, V3d(6, 0, 1)}};
+    }
     Sink sink;  // below the emitter
     sink.shape.type = ObstacleType::sphere, sink.shape.radius = 0.04;
     sink.shape.position.keys = {{1001, V3d(0.1, 0.36, 0.1)}, {1005, V3d(0.1, 0.33, 0.1)}};

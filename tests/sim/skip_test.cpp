@@ -155,6 +155,38 @@ TEST(Skip, ASinkThatMeetsNothingChangesNoBit) {
   }
 }
 
+// No [wind], or air of no density: no pass, no column, the same bits.
+TEST(Skip, NoAirIsNoPassAndChangesNoBit) {
+  const auto names = [](const Stepper& run) {
+    std::vector<std::string> all;
+    for (const sim::PassInfo& pass : run.solver->plan()) all.push_back(pass.name);
+    return all;
+  };
+  for (const auto solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
+    Shot shot = empty_shot();
+    shot.fluid.solver = solver;
+    shot.gravity = V3d(0, -9.81, 0);
+    add_box(shot, V3d(-0.04, 0.01, -0.04), {8, 8, 8});
+    add_sheet(shot, 0.2, 0, 8);
+    Stepper without(shot);
+    shot.wind.present = true, shot.wind.velocity = V3d(9, 0, 0), shot.wind.gust = 2;
+    shot.wind.air_density = 0;
+    Stepper with(shot);
+    EXPECT_EQ(names(without), names(with));
+    EXPECT_EQ(without.solver->allocated(), with.solver->allocated());
+    for (const std::string& name : names(with)) EXPECT_EQ(name.find("wind"), std::string::npos);
+    for (int k = 0; k < 50; ++k) without.step(3e-4), with.step(3e-4);
+    const sim::HostState a = without.solver->save(), b = with.solver->save();
+    EXPECT_EQ(a.position.x, b.position.x);
+    EXPECT_EQ(a.velocity.x, b.velocity.x);
+    EXPECT_EQ(a.cloth_position.x, b.cloth_position.x);
+    EXPECT_EQ(a.cloth_velocity.y, b.cloth_velocity.y);
+    shot.wind.air_density = 1.2, shot.wind.fluid_drag = solver == FluidSolver::incompressible;
+    size_t more = names(Stepper(shot)).size() - names(without).size();
+    EXPECT_EQ(more, solver == FluidSolver::incompressible ? 2u : 0u);  // explicit sheets: in theirs
+  }
+}
+
 // refresh() between steps, as every frame's end makes it, changes nothing either.
 TEST(Skip, RefreshChangesNoBit) {
   Shot shot = empty_shot();

@@ -61,6 +61,7 @@ void Stepper::step(double dt) {
   const double parts = std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6);
   scene.obstacles.place(*solver, time, time + dt);
   scene.sinks.place(*solver, time, time + dt);
+  if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(time + dt));
   limits = solver->step(dt, scene.cloth.vertices() > 0 ? std::max(1, int(parts)) : 1);
   time += dt, ++steps;
 }
