@@ -16,6 +16,9 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
     // What has not moved yet may be about to: the sound speed is ten times what is expected.
     const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
     consider(0.4 * a / speed, "speed");
+    if (p.surface_tension > 0)
+      consider(0.25 * std::sqrt(p.rest_density * a * a * a / (2 * M_PI * p.surface_tension)),
+               "surface tension");
     if (g > 0) consider(0.08 * std::sqrt(a / g), "gravity");
     if (limits.step > 0 && p.fixed_dt == 0) {
       // Impacts may ask for more iterations than there are; shorter steps ask for fewer, each. What

@@ -26,6 +26,7 @@ struct Parameters {
   bool no_slip = false;               // at the domain's walls
   float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
   float gravity[3] = {0, 0, 0};       // m/s^2
+  float surface_tension = 0;          // N/m
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
@@ -70,7 +71,8 @@ struct Limits {
 /// The largest stable fluid step and the name of the limit that rules it.
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
 /// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003, and
-/// a step follows the one before: half of it when its solve was cut short. Its viscosity sets none.
+/// a step follows the one before: half of it when its solve was cut short; surface tension 0.25
+/// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none.
 struct StepLimit {
   double dt;
   const char* name;

@@ -29,6 +29,9 @@ struct Quad {
   friend DRENCH_HD Quad operator*(Quad a, Quad b) {
     return {a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w};
   }
+  friend DRENCH_HD Quad operator/(Quad a, Quad b) {
+    return {a.x / b.x, a.y / b.y, a.z / b.z, a.w / b.w};
+  }
 };
 DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
   return {fmaf(a.x, b.x, c.x), fmaf(a.y, b.y, c.y), fmaf(a.z, b.z, c.z), fmaf(a.w, b.w, c.w)};
@@ -58,6 +61,7 @@ struct Quad {
   friend DRENCH_HD Quad operator+(Quad a, Quad b) { return Quad(a.v + b.v); }
   friend DRENCH_HD Quad operator-(Quad a, Quad b) { return Quad(a.v - b.v); }
   friend DRENCH_HD Quad operator*(Quad a, Quad b) { return Quad(a.v * b.v); }
+  friend DRENCH_HD Quad operator/(Quad a, Quad b) { return Quad(a.v / b.v); }
 };
 DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
   return Quad(Quad::Native(_mm256_fmadd_ps(a.v, b.v, c.v)));

@@ -171,6 +171,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.cloth_drag = float(shot.wind.cloth_drag), p.cloth_friction = float(shot.wind.cloth_friction);
     p.fluid_drag = float(shot.wind.fluid_drag);
   }
+  p.surface_tension = float(shot.fluid.surface_tension);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;

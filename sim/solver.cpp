@@ -227,6 +227,7 @@ class BackendSolver : public Solver {
       if (!state_.parameters.incompressible) f.inverse_density.resize(n);
     }
     if (allocated_ & column_projection) state_.pressure.resize(n);
+    if (allocated_ & column_tension) state_.tension.normal.resize(n);
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,
                                &f.edge, &f.cloth_share}) {

@@ -71,6 +71,7 @@ enum ColumnGroup : unsigned {
   column_cloth = 128,
   column_cloth_system = 512,  // the implicit step of the sheets
   column_projection = 256,    // neighbour lists and rows of the pressure solve
+  column_tension = 1024,      // normals of the surface
 };
 
 struct PassInfo {

@@ -179,6 +179,11 @@ struct PressureState {
   }
 };
 
+/// Columns of surface tension (passes/surface_tension.h), rebuilt every step.
+struct TensionState {
+  Column<Float4> normal;  // unit, outwards; w: 0 inside
+};
+
 /// Obstacles as the step has them (obstacle_placement.h) and the level sets they point to.
 struct ObstacleState {
   struct Field {
@@ -199,6 +204,7 @@ struct State {
   FluidState fluid;
   PressureState pressure;
   ViscosityState viscosity;
+  TensionState tension;
   ClothState cloth;
   ClothSystem cloth_system;
   ContactState contact;

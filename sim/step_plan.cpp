@@ -10,6 +10,7 @@
 #include "sim/passes/sheet_filter.h"
 #include "sim/passes/sheet_side.h"
 #include "sim/passes/sort_particles.h"
+#include "sim/passes/surface_tension.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/passes/wind_on_cloth.h"
 #include "sim/passes/wind_on_fluid.h"
@@ -116,6 +117,9 @@ bool around_obstacles(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.obstacles > 0;
 }
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
+bool tense(const Parameters& p, bool cloth) {
+  return projected(p, cloth) && p.surface_tension > 0;
+}
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
@@ -150,6 +154,8 @@ const Pass all_passes[] = {
     {"linearise_cloth", strong, column_cloth, column_cloth_system, linearise_cloth},
     {"find_neighbours", projected, column_position, column_density | column_projection,
      find_neighbours},
+    {"apply_surface_tension", tense, column_velocity | column_projection,
+     column_velocity | column_projection | column_tension, apply_surface_tension},
     {"smooth_velocities", smoothed, column_velocity | column_projection,
      column_velocity | column_projection, smooth_velocities},
     {"project_density", free_of_obstacles, moving | column_density | column_projection,

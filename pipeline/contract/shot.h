@@ -114,6 +114,7 @@ struct Fluid {
   double xsph = 0.01;                 // incompressible: share of the neighbours' velocity, a step
   double rest_density = 1000;         // kg/m^3
   double kinematic_viscosity = 1e-6;  // m^2/s
+  double surface_tension = 0;         // N/m, incompressible
   double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none
   double sound_speed = 0;             // m/s; 0: ten times the largest speed expected
   std::string material = "water";

@@ -238,6 +238,7 @@ class Checker {
            "explicit pressures alone. Use coupling.scheme = \"exact\" or fluid.solver = "
            "\"weakly_compressible\"");
     }
+    if (fluid.surface_tension > 0) check_surface_tension();
     if (fluid.support_ratio > 0 && fluid.support_ratio < 1.2) {
       fail("fluid.support_ratio",
            fmt::format("support radius is {} m (support_ratio {}) but fluid.spacing is {} m; "
@@ -254,6 +255,33 @@ class Checker {
       check_inside(path, sphere.center - V3d(sphere.radius), sphere.center + V3d(sphere.radius));
     }
     for (size_t i = 0; i < fluid.drops.size(); ++i) check_drops(i);
+  }
+
+  /// What surface tension has been measured with, and nothing else.
+  void check_surface_tension() const {
+    const auto refuse = [&](std::string_view what, std::string_view action) {
+      fail("fluid.surface_tension",
+           fmt::format("fluid.surface_tension is {} N/m but {}. {}, or remove it",
+                       shot_.fluid.surface_tension, what, action));
+    };
+    if (!is_incompressible(shot_)) {
+      refuse("the shot's fluid is weakly compressible, which has none",
+             "Use fluid.solver = \"incompressible\"");
+    }
+    if (!shot_.cloth.empty())
+      refuse("the shot has cloth, which does not know it", "Remove the cloth");
+    if (!shot_.obstacle.empty()) {
+      refuse("the shot has obstacles, which do not know it", "Remove the obstacles");
+    }
+    for (const Axis axis : shot_.domain.axis) {
+      if (axis == Axis::periodic)
+        refuse("an axis is \"periodic\", where it has not been verified", "Use walls or open ends");
+    }
+    if (shot_.fluid.support_ratio > 0) {
+      refuse(fmt::format("fluid.support_ratio is {}, at which its strength has not been measured",
+                         shot_.fluid.support_ratio),
+             "Leave fluid.support_ratio at 0");
+    }
   }
 
   void check_box(size_t i) const {

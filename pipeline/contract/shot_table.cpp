@@ -111,6 +111,10 @@ std::vector<Parameter> fluid_rows() {
       row<&Fluid::rest_density>("fluid", "rest_density", "kg/m^3", {1, 1e5}, simulate, "at rest"),
       row<&Fluid::kinematic_viscosity>("fluid", "kinematic_viscosity", "m^2/s", {0, 1000}, simulate,
                                        "of the fluid; water has 1e-6"),
+      row<&Fluid::surface_tension>(
+          "fluid", "surface_tension", "N/m", {0, 100}, simulate,
+          "of the incompressible solver: surface tension against air; water has 0.072. Not with "
+          "cloth, obstacles or periodic axes"),
       row<&Fluid::artificial_viscosity>(
           "fluid", "artificial_viscosity", "", {0, 10}, simulate,
           "of the weakly compressible solver: alpha of Monaghan 1992; 0 is none"),

@@ -60,6 +60,23 @@ TEST(Skip, AFluidWithoutViscosityHasNoPassForIt) {
   EXPECT_EQ(passes(1e-6), 1);
 }
 
+TEST(Skip, AFluidWithoutSurfaceTensionHasNoPassAndNoColumnForIt) {
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible;
+  add_box(shot, V3d(0), {4, 4, 4});
+  const auto passes = [&](double tension) {
+    shot.fluid.surface_tension = tension;
+    const Stepper run(shot);
+    int count = 0;
+    for (const sim::PassInfo& pass : run.solver->plan())
+      count += pass.name == "apply_surface_tension";
+    EXPECT_EQ((run.solver->allocated() & sim::column_tension) != 0, tension > 0);
+    return count;
+  };
+  EXPECT_EQ(passes(0), 0);
+  EXPECT_EQ(passes(0.072), 1);
+}
+
 /// A block that falls onto a floor, with or without a sheet 0.5 m away.
 sim::HostState splash(int steps, bool with_cloth) {
   Shot shot = empty_shot();

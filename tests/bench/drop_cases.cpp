@@ -1,0 +1,31 @@
+// Case fluid_drop: a drop with surface tension in zero gravity (tests/validation/drop.h).
+
+#include <cmath>
+#include <string>
+
+#include "tests/bench/bench.h"
+#include "tests/validation/drop.h"
+
+namespace drench::bench {
+namespace {
+
+void run_drop(double radius, const Emit& emit) {
+  validation::Drop drop;
+  Line line;
+  line.cost = measure([&] { drop = validation::oscillating_drop(radius); });
+  line.method = "attraction along the surface";
+  line.resolution = std::to_string(int(radius)) + " spacings to the radius";
+  line.error = std::abs(drop.period - 1), line.error_of = "period of mode 2", line.gate = 0.08;
+  line.more["particles"] = drop.particles, line.more["period"] = drop.period;
+  line.more["laplace_jump"] = drop.jump, line.more["current"] = drop.current;
+  line.more["momentum"] = drop.momentum, line.more["amplitude_kept"] = drop.kept;
+  emit(line);
+}
+
+const Registration fluid_drop{"fluid_drop", "a drop: period, pressure, currents",
+                              [](const Emit& emit) {
+                                for (const double radius : {7., 10., 15.}) run_drop(radius, emit);
+                              }};
+
+}  // namespace
+}  // namespace drench::bench
