@@ -175,8 +175,8 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
 }
 
 /// Takes back the substep of the vertices that particles stopped in this round, or of all. A
-/// stopped vertex takes on the mean velocity of those particles; what that changes of its momentum
-/// they share.
+/// stopped vertex takes on its common velocity with those particles; what that changes of its
+/// momentum they share.
 inline void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
@@ -194,7 +194,8 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
         for (int e = 0; e < 3; ++e) {
           const int v = corner[3 * t + e];
           if (hold[v] || test.inverse_mass[v] == 0.f) continue;
-          gain = gain + (next_v[v] - test.stop_velocity(v)) * (mass[v] / float(test.stop_count(v)));
+          const Vec3<float> lost = next_v[v] - test.stop_velocity(v, next_v[v]);
+          gain = gain + lost * (mass[v] / float(test.stop_count(v)));
         }
         velocity.set(i, velocity[i] + gain * inverse_mass);
       });
@@ -202,7 +203,7 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
       "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
         if (!everywhere && !stopped) return;
-        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v));
+        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v, next_v[v]));
         for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
         hold[v] = 1;
         next.set(v, x[v]);

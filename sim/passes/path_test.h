@@ -128,10 +128,16 @@ struct PathTest {
     add_atomic(sum + 3, (long long)(v.z / velocity_unit));
   }
   DRENCH_HD int stop_count(int vertex) const { return int(stop_sum[4 * vertex]); }
-  DRENCH_HD Vec3<float> stop_velocity(int vertex) const {  // mean of the particles that stop it
+  /// Of the vertex and the particles that stop it, after an impact without rebound; a particle
+  /// gives a third of its mass to each corner. The mean of the particles alone would leave them a
+  /// heavy vertex's momentum to share: 0.08 kg in 0.008 kg, thrown thirty times as fast.
+  DRENCH_HD Vec3<float> stop_velocity(int vertex, Vec3<float> own) const {
     const long long* sum = stop_sum + 4 * vertex;
-    const double scale = velocity_unit / double(sum[0]);
-    return {float(sum[1] * scale), float(sum[2] * scale), float(sum[3] * scale)};
+    const double share = mass / 3., of_cloth = cloth_mass[vertex];
+    const double unit = velocity_unit * share, inverse = 1 / (of_cloth + share * double(sum[0]));
+    return {float((sum[1] * unit + own.x * of_cloth) * inverse),
+            float((sum[2] * unit + own.y * of_cloth) * inverse),
+            float((sum[3] * unit + own.z * of_cloth) * inverse)};
   }
 
   /// Where the particle ends this substep; false if another round is needed because it stopped a
