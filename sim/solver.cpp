@@ -285,9 +285,25 @@ class BackendSolver : public Solver {
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
-    if (allocated_ & column_cloth_system) allocate_cloth_system();
+    if (allocated_ & column_cloth_system) allocate_cloth_system(), find_loose_sheets(t);
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
+  }
+
+  /// A sheet's vertices follow each other.
+  void find_loose_sheets(const ClothTopology& t) {
+    std::map<int, std::pair<int, int>> sheet;  // first and last vertex
+    for (size_t k = 0; k < t.corner.size(); ++k) {
+      const int v = t.corner[k];
+      auto& [first, last] = sheet.try_emplace(t.sheet[k / 3], v, v).first->second;
+      first = std::min(first, v), last = std::max(last, v);
+    }
+    for (const auto& [id, range] : sheet) {
+      const auto begin = t.inverse_mass.begin() + range.first,
+                 end = t.inverse_mass.begin() + range.second + 1;
+      if (std::find(begin, end, 0.f) == end)
+        state_.cloth.loose.push_back({range.first, int(end - begin)});
+    }
   }
 
   void allocate_cloth_system() {

@@ -57,6 +57,10 @@ struct FluidState {
   Column<int> held, stopped;  // by the path test for this substep; triangle it stopped, -1 none
 };
 
+struct VertexRange {
+  int first, count;
+};
+
 /// All sheets in one: vertices, springs by vertex, triangles.
 struct ClothState {
   int vertices = 0, triangles = 0;
@@ -76,6 +80,7 @@ struct ClothState {
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
+  std::vector<VertexRange> loose;    // of the sheets without a pin
   // rebuilt
   VecColumn next, next_velocity;  // the substep being made
   VecColumn start;                // at the start of the step
@@ -102,6 +107,7 @@ struct ClothState {
 struct ClothControl {
   int done = 0, sweeps = 0;
   double reference = 0, energy = 0, step = 1, turn = 0;  // r . z of the loads, of the residual
+  Vec3<float> shift{0.f, 0.f, 0.f};                      // m, of a whole sheet
 };
 
 /// Columns of the implicit step of the sheets (passes/cloth_implicit.h), rebuilt every step.

@@ -264,4 +264,43 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
   }
 }
 
+/// What the mass of a sheet times its way lacks to what it is given, and how many of its vertices
+/// something holds.
+struct SheetLack {
+  double x = 0, y = 0, z = 0, inertia = 0, held = 0;
+  DRENCH_HD SheetLack operator()(const SheetLack& a, const SheetLack& b) const {
+    return {a.x + b.x, a.y + b.y, a.z + b.z, a.inertia + b.inertia, a.held + b.held};
+  }
+};
+
+/// Springs push no sheet as a whole, so that in A w = right the sum of inertia times w is that of
+/// right over every sheet that nothing holds. Sweeps that end early leave that a little off, which
+/// the fluid has given and the sheet not received: a shift of the whole sheet closes it.
+inline void balance_loose_sheets(State& state, const VecView& w, const VecView& right) {
+  const VecView free = state.cloth_system.free.view();
+  const float* inertia = state.cloth_system.inertia.data();
+  ClothControl* control = state.cloth_system.control.data();
+  for (const VertexRange& sheet : state.cloth.loose) {
+    const int first = sheet.first;
+    reduce_then(
+        "cloth: lack", sheet.count, SheetLack{},
+        DRENCH_LAMBDA(int k) {
+          const int i = first + k;
+          const double m = inertia[i];
+          const Vec3<float> given = right[i], way = w[i], may = free[i];
+          return SheetLack{given.x - m * way.x, given.y - m * way.y, given.z - m * way.z, m,
+                           3. - may.x - may.y - may.z};
+        },
+        SheetLack{},
+        DRENCH_LAMBDA(const SheetLack& lack) {
+          const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
+          control->shift = {float(lack.x * inverse), float(lack.y * inverse),
+                            float(lack.z * inverse)};
+        });
+    parallel_for(
+        "cloth: balance", sheet.count,
+        DRENCH_LAMBDA(int k) { w.set(first + k, w[first + k] + control->shift); });
+  }
+}
+
 }  // namespace drench::sim::DRENCH_BACKEND

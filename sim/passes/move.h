@@ -203,7 +203,8 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
       "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
         if (!everywhere && !stopped) return;
-        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f) next_v.set(v, test.stop_velocity(v, next_v[v]));
+        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
+          next_v.set(v, test.stop_velocity(v, next_v[v]));
         for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
         hold[v] = 1;
         next.set(v, x[v]);

@@ -2,7 +2,7 @@
 // The last guard of the exact coupling: the straight path of a particle over a cloth substep
 // against the triangles that move meanwhile. In double on the stored floats, so that whoever counts
 // crossings from the stored states finds none. Where they would cross, the lighter one yields: a
-// triangle lighter than the particle is held for the substep and takes on the velocity of the
+// triangle lighter than the particle is held for the substep and shares its momentum with the
 // particles that stopped it; a lighter particle is put back on its side of the triangle, a small
 // clearance off the place where they met, by an impulse shared with the vertices. What finds no
 // free place is held; if all is held nothing moves, which is free of crossings whatever the tangle.
@@ -189,13 +189,13 @@ struct PathTest {
     }
     const float approach = dot(direction, velocity[i] - wall);
     if (approach >= 0.f) return;
-    const Vec3<float> impulse = direction * (-approach / row);
-    owed.set(i, owed[i] + impulse);
+    const Vec3<float> whole = direction * -approach, shared = direction * (-approach / row);
+    const bool held = still(hit.triangle);
     // Between fluid on both sides a light sheet can neither move nor take more than its share, and
     // the rest of the velocity would pile up in a particle that does not move: there it is given
-    // up.
-    velocity.set(
-        i, velocity[i] + (still(hit.triangle) ? direction * -approach : impulse * (1.f / mass)));
+    // up. A heavy sheet takes all.
+    owed.set(i, owed[i] + (held && !lighter(hit.triangle) ? whole * mass : shared));
+    velocity.set(i, velocity[i] + (held ? whole : shared * (1.f / mass)));
   }
 
   /// Can the particle meet the sheet at all? Its distance at the start of the step against all

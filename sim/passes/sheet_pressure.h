@@ -17,8 +17,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 /// Sweeps at most before the first, between further iterations of the pressures, and at the end; a
 /// pool on a taut sheet takes as many iterations as with an exact answer, with 4 in place of 16 one
-/// in ten more, with 2 twice as many. What is left at the end is momentum that the sheets did not
-/// get.
+/// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum of
+/// those that nothing holds is whole (balance_loose_sheets).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
@@ -223,11 +223,16 @@ inline void respond_sheets(State& state, int sweeps, float tolerance) {
 /// The sheets' answer to the pressures that the solve ended with, to the tolerance.
 inline void settle_sheets(State& state) {
   ClothSystem& s = state.cloth_system;
-  if (state.contact.near > 0) return respond_sheets(state, last_sweeps, last_tolerance);
-  s.right.clear();
-  hold_at_walls(state);
-  add_to_reference(state, s.base.view(), 0.f);
-  sweep_cloth(state, s.change.view(), s.base.view(), last_sweeps, last_tolerance);
+  const VecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
+  if (state.contact.near > 0) {
+    respond_sheets(state, last_sweeps, last_tolerance);
+  } else {
+    s.right.clear();
+    hold_at_walls(state);
+    add_to_reference(state, given, 0.f);
+    sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
+  }
+  balance_loose_sheets(state, s.change.view(), given);
 }
 
 /// Takes the sheets' motion off the density rates.

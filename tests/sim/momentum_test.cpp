@@ -65,6 +65,36 @@ TEST_P(Momentum, IsKeptWhereThePathTestActs) {
   if (GetParam() == FluidSolver::weakly_compressible) EXPECT_GT(drift.guard_hits, 0u);
 }
 
+// Sheets six times as heavy as the water between them close on it until the path test stops them,
+// too: 0.08 kg of vertex by 0.008 kg of particle. Nothing is faster than twice an even outflow from
+// a disc, speed R / (2 gap), when 30 mm are left.
+TEST(HeavySheets, KeepMomentumWhereParticlesStopThem) {
+  const double a = 0.02, speed = 10, size = 16 * a;
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = a;
+  add_box(shot, V3d(-5 * a, -2 * a, -5 * a), {10, 4, 10});
+  for (const double side : {-1., 1.}) {
+    Cloth& sheet = add_sheet(shot, size, side * (2 * a + 0.0005), 16);
+    sheet.name = side < 0 ? "low" : "high";
+    sheet.adjacent_stiffness = 6000, sheet.diagonal_stiffness = 3000;
+    sheet.damping = 0, sheet.areal_density = 200, sheet.velocity.y = -side * speed / 2;
+  }
+  Stepper run(shot);
+  const V3d before = total_momentum(run.scene, run.scene.start);
+  double drift = 0, fastest = 0;
+  for (int k = 0; k < 40; ++k) {
+    run.step();
+    ASSERT_LT(run.limits.bad_particle + run.limits.bad_vertex, 0) << k;
+    const sim::HostState state = run.solver->save();
+    drift = std::max(drift, (total_momentum(run.scene, state) - before).length() /
+                                momentum_scale(run.scene, state, speed / 2));
+    fastest = std::max(fastest, double(run.limits.max_speed));
+  }
+  EXPECT_GT(run.solver->save().guard_holds, 5u);
+  EXPECT_LT(drift, 1e-7);
+  EXPECT_LT(fastest, speed * (size / 2) / 0.03);
+}
+
 TEST_P(Momentum, IsKeptByASidewaysBlow) {
   const Drift drift = drift_of(V3d(2, -1, 1), 0.2, GetParam());
   EXPECT_LT(drift.worst, 1e-5);

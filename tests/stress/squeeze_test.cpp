@@ -41,15 +41,14 @@ TEST_P(Squeeze, LetsTheWaterOutSidewaysOnly) {
   Watch watch(shot, 1);
   const double reach = 0.5 * (a + thickness);  // epsilon
   double gap = 1;
-  double fastest = 0;  // while there are two layers
   while (watch.run.time < 6 * a / speed && watch.step()) {
     gap = std::min(gap, height_of(watch, 1) - height_of(watch, 0) - thickness);
-    if (gap > 3 * reach) fastest = watch.figures().max_speed;
     if (gap < 0.5 * reach) break;
   }
   EXPECT_LT(gap, 3 * reach);
-  // Twice what an even outflow has at the rim of a disc that closes: speed R / (2 gap).
-  EXPECT_LT(fastest, speed * (size / 2) / (3 * reach));
+  // Twice what an even outflow has at the rim of a disc that closes: speed R / (2 gap). The sheets
+  // bend: their rims meet, and go through each other, while their middles are 50 mm apart.
+  EXPECT_LT(watch.figures().max_speed, speed * (size / 2) / (3 * reach));
   int out = 0;
   const sim::HostState& state = watch.state();
   for (size_t i = 0; i < state.id.size(); ++i) {
@@ -58,11 +57,7 @@ TEST_P(Squeeze, LetsTheWaterOutSidewaysOnly) {
   }
   Gates gates = squeezed();
   gates.speed = not_gated;  // what is pressed out is as fast as the gap is wide over high
-  gates.drift = 5e-4;  // the sheets' solve leaves 1e-4 of what it is given, and these are heavy
-  if (speed >= 1) {
-    // Once one layer is left, 2.1 epsilon, a particle feels the nearer sheet alone and is thrown.
-    gates.blow_ups = 1, gates.energy = 1;
-  }
+  gates.drift = 1e-6;
   report("squeezed fluid", fmt::format("{} m/s", speed), watch, gates,
          fmt::format("gap {:.2f} epsilon, {} of {} out", gap / reach, out, state.id.size()));
 }
