@@ -17,8 +17,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 /// Sweeps at most before the first, between further iterations of the pressures, and at the end; a
 /// pool on a taut sheet takes as many iterations as with an exact answer, with 4 in place of 16 one
-/// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum of
-/// those that nothing holds is whole (balance_loose_sheets).
+/// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum
+/// of those that nothing holds is whole (balance_loose_sheets).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
