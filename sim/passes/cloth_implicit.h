@@ -264,7 +264,7 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
   }
 }
 
-/// What the mass of a sheet times its way lacks to what it is given, and how many of its vertices
+/// What a sheet's way leaves of what it is given, kg m, its mass, and how many of its axes
 /// something holds.
 struct SheetLack {
   double x = 0, y = 0, z = 0, inertia = 0, held = 0;
@@ -273,12 +273,12 @@ struct SheetLack {
   }
 };
 
-/// Springs push no sheet as a whole, so that in A w = right the sum of inertia times w is that of
-/// right over every sheet that nothing holds. Sweeps that end early leave that a little off, which
-/// the fluid has given and the sheet not received: a shift of the whole sheet closes it.
+/// What sweeps that end early leave of A w = right the fluid has given and the sheet not received.
+/// Springs push no sheet as a whole: where nothing holds it a shift by the sum over its mass, on
+/// which they do not act, closes its momentum.
 inline void balance_loose_sheets(State& state, const VecView& w, const VecView& right) {
   const VecView free = state.cloth_system.free.view();
-  const float* inertia = state.cloth_system.inertia.data();
+  const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
   for (const VertexRange& sheet : state.cloth.loose) {
     const int first = sheet.first;
@@ -286,10 +286,8 @@ inline void balance_loose_sheets(State& state, const VecView& w, const VecView& 
         "cloth: lack", sheet.count, SheetLack{},
         DRENCH_LAMBDA(int k) {
           const int i = first + k;
-          const double m = inertia[i];
-          const Vec3<float> given = right[i], way = w[i], may = free[i];
-          return SheetLack{given.x - m * way.x, given.y - m * way.y, given.z - m * way.z, m,
-                           3. - may.x - may.y - may.z};
+          const Vec3<float> left = right[i] - matrix.times(w, i), may = free[i];
+          return SheetLack{left.x, left.y, left.z, matrix.inertia[i], 3. - may.x - may.y - may.z};
         },
         SheetLack{},
         DRENCH_LAMBDA(const SheetLack& lack) {
