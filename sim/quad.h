@@ -16,6 +16,12 @@ struct alignas(16) Float4 {
   float x, y, z, w;
 };
 
+/// L v of a symmetric L: its diagonal, and its xy, yz, zx.
+DRENCH_HD Float4 multiply_symmetric(const Float4& d, const Float4& c, const Float4& v) {
+  return {d.x * v.x + c.x * v.y + c.z * v.z, c.x * v.x + d.y * v.y + c.y * v.z,
+          c.z * v.x + c.y * v.y + d.z * v.z, 0.f};
+}
+
 #if defined(__CUDACC__)
 
 struct Quad {

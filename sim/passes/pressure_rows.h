@@ -10,12 +10,6 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// L v of a symmetric L: its diagonal, and its xy, yz, zx.
-DRENCH_HD Float4 multiply_symmetric(const Float4& d, const Float4& c, const Float4& v) {
-  return {d.x * v.x + c.x * v.y + c.z * v.z, c.x * v.x + d.y * v.y + c.y * v.z,
-          c.z * v.x + c.y * v.y + d.z * v.z, 0.f};
-}
-
 /// vector = -D^T q.
 template <class Separation>
 struct PressureAcceleration {

@@ -50,9 +50,7 @@ struct ViscousIteration {
     return length2_f > longest2 ? f * sqrtf(longest2 / length2_f) : f;
   }
   DRENCH_HD Float4 preconditioned(const Float4& r, int i) const {
-    const Float4 d = diagonal[i], c = cross[i];
-    return {d.x * r.x + c.x * r.y + c.z * r.z, c.x * r.x + d.y * r.y + c.y * r.z,
-            c.z * r.x + c.y * r.y + d.z * r.z, 0.f};
+    return multiply_symmetric(diagonal[i], cross[i], r);
   }
   DRENCH_HD static double inner(const Float4& a, const Float4& b) {
     return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
