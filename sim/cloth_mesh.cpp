@@ -2,6 +2,7 @@
 // must pass.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -18,21 +19,24 @@ namespace {
 using Edge = std::pair<uint32_t, uint32_t>;
 Edge ordered(uint32_t a, uint32_t b) { return a < b ? Edge{a, b} : Edge{b, a}; }
 
-/// Springs between the same two vertices add up.
+/// Springs between the same two nodes add up.
 struct SpringMap {
-  std::map<Edge, double> stiffness;
-  void add(uint32_t a, uint32_t b, double k) { stiffness[ordered(a, b)] += k; }
+  const Sheet& sheet;
+  std::map<std::pair<Edge, std::array<int, 3>>, double> stiffness;
+
+  /// @param image  periods that are added to where b is
+  void add(uint32_t a, uint32_t b, double k, Imath::V3i image = Imath::V3i(0)) {
+    auto from = uint32_t(sheet.node[a]), to = uint32_t(sheet.node[b]);
+    image += sheet.image[b] - sheet.image[a];
+    if (from > to) std::swap(from, to), image = -image;
+    stiffness[{{from, to}, {image.x, image.y, image.z}}] += k;
+  }
 };
 
-/// A grid of cells. Every cell gives its four sides half an adjacent spring each, stiffer across
-/// and softer along a stretched cell (k = modulus x width / length), both its diagonals, and a
-/// quarter of its mass to each corner: the lattice's moduli then hold up to the rim
-/// (tests/validation/README.md).
-void build_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+uint32_t at(const Cloth& cloth, int i, int j) { return uint32_t(j * (cloth.cells.x + 1) + i); }
+
+void build_grid(const Cloth& cloth, Sheet& sheet) {
   const int nu = cloth.cells.x, nv = cloth.cells.y;
-  const double du = cloth.u.length() / nu, dv = cloth.v.length() / nv;
-  const double mass = cloth.areal_density * cloth.u.cross(cloth.v).length() / (double(nu) * nv);
-  const auto at = [&](int i, int j) { return uint32_t(j * (nu + 1) + i); };
   for (int j = 0; j <= nv; ++j) {
     for (int i = 0; i <= nu; ++i) {
       const double s = double(i) / nu, t = double(j) / nv;
@@ -40,17 +44,10 @@ void build_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
       sheet.uv.push_back(Imath::V2f(float(s), float(t)));
     }
   }
-  sheet.mass.assign(sheet.position.size(), 0.0);
   for (int j = 0; j < nv; ++j) {
     for (int i = 0; i < nu; ++i) {
-      const uint32_t a = at(i, j), b = at(i + 1, j), c = at(i + 1, j + 1), d = at(i, j + 1);
-      for (uint32_t v : {a, b, c, d}) sheet.mass[v] += mass / 4;
-      springs.add(a, b, 0.5 * cloth.adjacent_stiffness * dv / du);
-      springs.add(d, c, 0.5 * cloth.adjacent_stiffness * dv / du);
-      springs.add(a, d, 0.5 * cloth.adjacent_stiffness * du / dv);
-      springs.add(b, c, 0.5 * cloth.adjacent_stiffness * du / dv);
-      springs.add(a, c, cloth.diagonal_stiffness);
-      springs.add(b, d, cloth.diagonal_stiffness);
+      const uint32_t a = at(cloth, i, j), b = at(cloth, i + 1, j), c = at(cloth, i + 1, j + 1),
+                     d = at(cloth, i, j + 1);
       // v x u points to the front, so a sheet in x, z faces up.
       sheet.triangle.push_back({a, d, c});
       sheet.triangle.push_back({a, c, b});
@@ -58,26 +55,57 @@ void build_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
   }
 }
 
-/// A triangle mesh: edges are adjacent springs, the two vertices opposite an edge a diagonal one.
-void build_from_file(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+/// Every cell of a grid gives its four sides half an adjacent spring each, stiffer across and
+/// softer along a stretched cell (k = modulus x width / length), both its diagonals, and a quarter
+/// of its mass to each corner: the lattice's moduli then hold up to the rim
+/// (tests/validation/README.md).
+void fill_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+  const int nu = cloth.cells.x, nv = cloth.cells.y;
+  const double du = cloth.u.length() / nu, dv = cloth.v.length() / nv;
+  const double mass = cloth.areal_density * cloth.u.cross(cloth.v).length() / (double(nu) * nv);
+  for (int j = 0; j < nv; ++j) {
+    for (int i = 0; i < nu; ++i) {
+      const uint32_t a = at(cloth, i, j), b = at(cloth, i + 1, j), c = at(cloth, i + 1, j + 1),
+                     d = at(cloth, i, j + 1);
+      for (uint32_t v : {a, b, c, d}) sheet.mass[size_t(sheet.node[v])] += mass / 4;
+      springs.add(a, b, 0.5 * cloth.adjacent_stiffness * dv / du);
+      springs.add(d, c, 0.5 * cloth.adjacent_stiffness * dv / du);
+      springs.add(a, d, 0.5 * cloth.adjacent_stiffness * du / dv);
+      springs.add(b, c, 0.5 * cloth.adjacent_stiffness * du / dv);
+      springs.add(a, c, cloth.diagonal_stiffness);
+      springs.add(b, d, cloth.diagonal_stiffness);
+    }
+  }
+}
+
+void build_from_file(const Cloth& cloth, Sheet& sheet) {
   const TriangleMesh mesh = read_mesh(cloth.mesh_file);
   for (const V3f& p : mesh.position) sheet.position.push_back(V3d(p));
   sheet.uv = mesh.uv;
   sheet.triangle = mesh.triangle;
-  sheet.mass.assign(sheet.position.size(), 0.0);
-  std::map<Edge, std::vector<uint32_t>> opposite;
+}
+
+/// Edges of triangles are adjacent springs, the two vertices opposite an edge a diagonal one.
+void fill_mesh(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
+  struct Tip {
+    uint32_t vertex, beside;  // one end of the edge, the same node from both sides
+  };
+  std::map<Edge, std::vector<Tip>> opposite;
   for (const auto& t : sheet.triangle) {
     const V3d e = sheet.position[t.y] - sheet.position[t.x],
               f = sheet.position[t.z] - sheet.position[t.x];
     for (int k = 0; k < 3; ++k) {
       const uint32_t a = t[k], b = t[(k + 1) % 3];
-      sheet.mass[a] += cloth.areal_density * e.cross(f).length() / 6;
+      sheet.mass[size_t(sheet.node[a])] += cloth.areal_density * e.cross(f).length() / 6;
       springs.add(a, b, 0.5 * cloth.adjacent_stiffness);
-      opposite[ordered(a, b)].push_back(t[(k + 2) % 3]);
+      const auto na = uint32_t(sheet.node[a]), nb = uint32_t(sheet.node[b]);
+      opposite[ordered(na, nb)].push_back({t[(k + 2) % 3], na < nb ? a : b});
     }
   }
   for (const auto& [edge, tips] : opposite) {
-    if (tips.size() == 2) springs.add(tips[0], tips[1], cloth.diagonal_stiffness);
+    if (tips.size() != 2) continue;
+    springs.add(tips[0].vertex, tips[1].vertex, cloth.diagonal_stiffness,
+                sheet.image[tips[0].beside] - sheet.image[tips[1].beside]);
   }
 }
 
@@ -123,7 +151,7 @@ void check_triangles(const Sheet& sheet) {
 }
 
 void apply_pins(const Cloth& cloth, Sheet& sheet) {
-  sheet.pinned.assign(sheet.position.size(), false);
+  sheet.pinned.assign(sheet.point.size(), false);
   for (size_t k = 0; k < cloth.pin.size(); ++k) {
     size_t held = 0;
     for (uint32_t v : cloth.pin[k].vertices) {
@@ -132,7 +160,7 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
             "cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
             sheet.name, k + 1, v, sheet.position.size()));
       }
-      sheet.pinned[v] = true;
+      sheet.pinned[size_t(sheet.node[v])] = true;
       ++held;
     }
     if (cloth.pin[k].box) {
@@ -142,7 +170,7 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
         if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y ||
             p.z > high.z)
           continue;
-        sheet.pinned[v] = true;
+        sheet.pinned[size_t(sheet.node[v])] = true;
         ++held;
       }
     }
@@ -155,21 +183,23 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
 
 }  // namespace
 
-Sheet build_sheet(const Cloth& cloth) {
+Sheet build_sheet(const Cloth& cloth, const Seams& seams) {
   Sheet sheet;
   sheet.name = cloth.name;
-  SpringMap springs;
-  if (cloth.mesh_file.empty()) {
-    build_grid(cloth, sheet, springs);
-  } else {
-    build_from_file(cloth, sheet, springs);
-  }
+  const bool grid = cloth.mesh_file.empty();
+  grid ? build_grid(cloth, sheet) : build_from_file(cloth, sheet);
   if (sheet.triangle.empty())
     throw Error("cloth \"" + sheet.name + "\": the mesh has no triangles");
   check_triangles(sheet);
   sheet.rest = sheet.position;
-  for (const auto& [edge, k] : springs.stiffness) {
-    if (k > 0) sheet.spring.push_back({int(edge.first), int(edge.second), k});
+  join_at_seams(sheet, seams);
+  sheet.mass.assign(sheet.point.size(), 0.0);
+  SpringMap springs{sheet, {}};
+  grid ? fill_grid(cloth, sheet, springs) : fill_mesh(cloth, sheet, springs);
+  for (const auto& [ends, k] : springs.stiffness) {
+    const auto& [edge, image] = ends;
+    const Imath::V3i periods(image[0], image[1], image[2]);
+    if (k > 0) sheet.spring.push_back({int(edge.first), int(edge.second), periods, k});
   }
   apply_pins(cloth, sheet);
   return sheet;

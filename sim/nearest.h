@@ -27,7 +27,7 @@ inline NearestOutput nearest_output(State& state, float reach) {
 
 inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
   FluidState& f = state.fluid;
-  const PolygonView polygons = polygons_of(state.cloth);
+  const PolygonView polygons = polygons_of(state);
   const NearestOutput out = nearest_output(state, reach);
   const int* before = f.memory_triangle.data();
   parallel_for(
@@ -35,7 +35,7 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
         out.triangle[i] = -1;
         out.far_by[i] -= out.cloth_moved;
         if (out.far_by[i] > 0.f) return;
-        const Vec3<float> p = position[i];
+        Vec3<float> p = position[i];
         float best = out.search * out.search;
         int nearest = -1;
         const auto test = [&](const PreparedTriangle<float>& triangle, int t) {
@@ -48,7 +48,9 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
         if (before[i] >= 0) {
           Vec3<float> a, b, c;
           polygons.corners(before[i], a, b, c);
+          p = polygons.beside(before[i], position[i]);
           test(prepare_triangle(a, b, c), before[i]);
+          p = position[i];
         }
         polygons.for_each_near_box(p, p, sqrtf(best),
                                    [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
@@ -76,17 +78,28 @@ struct NearestOfPack {
                                    one.inverse_bc, one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
-    may = may & (distance2_bound(plane, t) < best) & !same(which, triangle);
+    may = may & (distance2_bound(plane, t) < best);
+    if (!polygons.periodic) may = may & !same(which, triangle);  // else it may be an image of it
     if (may.bits()) take(closest_point(plane, t), triangle, may);
   }
   /// Each its own triangle, -1 for none.
   DRENCH_HD void test_each(const PolygonView& polygons, LaneIndex triangle) {
     const Mask valid = is_index(triangle);
     const LaneIndex t = select(valid, triangle, same_index(0)), first = t + t + t;
-    const auto corner = [&](int c) {
-      return polygons.position.at(load(polygons.corner, first + c));
-    };
-    take(closest_point<Pack>(p, corner(0), corner(1), corner(2)), triangle, valid);
+    const auto corner = [&](int c) { return polygons.place.at(polygons.position, first + c); };
+    const Vec3<Pack> from = polygons.periodic ? beside(polygons, t) : p;
+    take(closest_point<Pack>(from, corner(0), corner(1), corner(2)), triangle, valid);
+  }
+  DRENCH_HD Vec3<Pack> beside(const PolygonView& polygons, LaneIndex triangle) const {
+    alignas(32) float x[8], y[8], z[8];
+    alignas(32) int t[8];
+    p.x.store(x), p.y.store(y), p.z.store(z);
+    store_lanes(t, first_lanes(8), triangle);
+    for (int k = 0; k < 8; ++k) {
+      const Vec3<float> q = polygons.beside(t[k], {x[k], y[k], z[k]});
+      x[k] = q.x, y[k] = q.y, z[k] = q.z;
+    }
+    return {Pack::load(x), Pack::load(y), Pack::load(z)};
   }
   DRENCH_HD void take(const ClosestPoint<Pack>& foot, LaneIndex triangle, Mask valid) {
     const Mask closer = (foot.distance2 < best) & valid;
@@ -168,7 +181,7 @@ class PackOfNeighbours {
 
 inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
   FluidState& f = state.fluid;
-  const PolygonView polygons = polygons_of(state.cloth);
+  const PolygonView polygons = polygons_of(state);
   const NearestOutput out = nearest_output(state, reach);
   const int *cell_start = f.cell_start.data(), *before = f.memory_triangle.data();
   const GridShape g = f.grid;

@@ -132,6 +132,7 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
           if (filtered) {
             tile.fill(grid, cx, row % g.ny, row / g.ny,
                       join(places, filter.inputs_with_position().column), 10);
+            tile.carry_planes(3);
           }
         }
         if (!filtered) tile.fill(grid, cx, row % g.ny, row / g.ny, places, 3);

@@ -20,7 +20,7 @@ __device__ void for_each_within(const GridView& grid, const VecView& position, i
                    const float r2 = length2(position[j] - seen);
                    if (r2 >= h * h) continue;
                    if constexpr (Filter::columns > 0) {
-                     if (tested && filter.hides(i, j)) continue;
+                     if (tested && filter.hides(i, j, shift)) continue;
                    }
                    visit(j, r2);
                  }

@@ -76,7 +76,7 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
                  for (int j = begin; j < end; ++j) {
                    const P other = load(j);
                    if constexpr (Filter::columns > 0) {
-                     if (tested && filter.hides(i, j)) {
+                     if (tested && filter.hides(i, j, shift)) {
                        any_hidden = true;
                        continue;
                      }
@@ -137,6 +137,22 @@ class Tile {
     }
   }
   int size() const { return size_; }
+  /// What a sheet filter reads of the particles from beyond a seam, seen from this side of it:
+  /// three columns of places and, after three of normals, the planes.
+  void carry_planes(int place) {
+    float* to = data_.data() + size_t(place) * stride_;
+    const auto column = [&](int c) { return to + size_t(c) * stride_; };
+    for (int r = 0; r < rows_; to += count_[r++]) {
+      const float* s = shift_[r];
+      if (s[0] == 0.f && s[1] == 0.f && s[2] == 0.f) continue;
+      for (int k = 0; k < count_[r]; ++k) {
+        for (int c = 0; c < 3; ++c) {
+          column(c)[k] += s[c];
+          column(6)[k] -= column(3 + c)[k] * s[c];
+        }
+      }
+    }
+  }
   /// The particle that stands in each place, and anything in the padding.
   void particles(std::vector<int>& particle) const {
     if (particle.size() < size_t(stride_)) particle.resize(stride_);

@@ -17,9 +17,28 @@ DRENCH_HD float wrap(float x, float low, float high) {
 }
 
 /// Lengths of the periodic axes, m; 0 for others.
+inline bool any_periodic(const Parameters& p) {
+  return p.periodic[0] || p.periodic[1] || p.periodic[2];
+}
 inline Vec3<float> periods_of(const Parameters& p) {
   const auto period = [&](int k) { return p.periodic[k] ? p.high[k] - p.low[k] : 0.f; };
   return {period(0), period(1), period(2)};
+}
+
+/// The nearest image of a separation. @param period  m; 0 where an axis is not periodic.
+DRENCH_HD Vec3<float> nearest(Vec3<float> d, Vec3<float> period) {
+  const auto along = [](float x, float length) {
+    return length > 0.f ? x - length * floorf(x / length + 0.5f) : x;
+  };
+  return {along(d.x, period.x), along(d.y, period.y), along(d.z, period.z)};
+}
+
+/// The image of x nearest to `to`; x itself, to the bit, where that is it.
+DRENCH_HD Vec3<float> image_beside(Vec3<float> x, Vec3<float> to, Vec3<float> period) {
+  const auto along = [](float x, float to, float length) {
+    return length > 0.f ? x + length * floorf((to - x) / length + 0.5f) : x;
+  };
+  return {along(x.x, to.x, period.x), along(x.y, to.y, period.y), along(x.z, to.z, period.z)};
 }
 
 /// x_i - x_j of listed neighbours where no axis is periodic, ...
@@ -48,7 +67,7 @@ inline NearestImage nearest_image_of(const Parameters& p) {
 /// Calls f with the separation that the axes of the domain ask for.
 template <class F>
 void with_separation(const Parameters& p, const F& f) {
-  if (p.periodic[0] || p.periodic[1] || p.periodic[2])
+  if (any_periodic(p))
     f(nearest_image_of(p));
   else
     f(Straight{});

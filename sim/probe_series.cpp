@@ -160,10 +160,11 @@ void ProbeSeries::aim(Series& series, const Shot& shot, const Scene& scene) cons
   }
   if (q.kind == ProbeKind::vertex) {
     const size_t s = sheet_named(scene, probe.cloth);
-    const int v = tip_vertex(probe, shot, scene.sheet[s]);
-    q.begin = scene.first_vertex[s] + v;
+    const Sheet& sheet = scene.sheet[s];
+    const int node = sheet.node[size_t(tip_vertex(probe, shot, sheet))];
+    q.begin = scene.first_vertex[s] + node;
     for (int k = 0; k < 3; ++k)
-      series.rest[k] = frame_.to_local(k, scene.sheet[s].rest[size_t(v)][k]);
+      series.rest[k] = frame_.to_local(k, sheet.rest[sheet.point[size_t(node)]][k]);
   }
 }
 

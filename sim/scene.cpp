@@ -201,9 +201,9 @@ double damping_of(const Sheet& sheet, const Sheet::Spring& s, const Cloth& cloth
 /// damping k.
 template <class Coefficient>
 double largest_rate(const Sheet& sheet, const Coefficient& coefficient) {
-  std::vector<std::array<double, 6>> block(sheet.position.size(), {0, 0, 0, 0, 0, 0});
+  std::vector<std::array<double, 6>> block(sheet.point.size(), {0, 0, 0, 0, 0, 0});
   for (const Sheet::Spring& s : sheet.spring) {
-    const V3d e = (sheet.position[s.b] - sheet.position[s.a]).normalized();
+    const V3d e = sheet.along(s).normalized();
     const double entry[6] = {e.x * e.x, e.x * e.y, e.x * e.z, e.y * e.y, e.y * e.z, e.z * e.z};
     for (int v : {s.a, s.b}) {
       for (int k = 0; k < 6; ++k) block[v][k] += 2 * coefficient(s) * entry[k];
@@ -249,23 +249,26 @@ void append_springs(const Sheet& sheet, const Cloth& cloth, const LocalFrame& fr
   struct End {
     int vertex;
     float length, stiffness, damping;
+    V3d shift;  // m
   };
-  std::vector<std::vector<End>> rows(sheet.position.size());
-  const auto local = [&](int v) {
-    const V3d& p = sheet.rest[v];
+  std::vector<std::vector<End>> rows(sheet.point.size());
+  const auto local = [&](int node) {
+    const V3d& p = sheet.rest[sheet.point[size_t(node)]];
     return V3d(frame.to_local(0, p.x), frame.to_local(1, p.y), frame.to_local(2, p.z));
   };
   for (const Sheet::Spring& s : sheet.spring) {
-    const double length = (local(s.b) - local(s.a)).length();
+    const V3d shift = V3d(s.image) * sheet.period;
+    const double length = (local(s.b) + shift - local(s.a)).length();
     const double damping = damping_of(sheet, s, cloth);
-    rows[s.a].push_back({s.b + base, float(length), float(s.stiffness), float(damping)});
-    rows[s.b].push_back({s.a + base, float(length), float(s.stiffness), float(damping)});
+    rows[s.a].push_back({s.b + base, float(length), float(s.stiffness), float(damping), shift});
+    rows[s.b].push_back({s.a + base, float(length), float(s.stiffness), float(damping), -shift});
   }
   if (t.spring_start.empty()) t.spring_start.push_back(0);
   for (const auto& row : rows) {
     for (const End& e : row) {
       t.spring_end.push_back(e.vertex), t.rest_length.push_back(e.length);
       t.stiffness.push_back(e.stiffness), t.spring_damping.push_back(e.damping);
+      t.spring_shift.push(float(e.shift.x), float(e.shift.y), float(e.shift.z));
     }
     t.spring_start.push_back(int(t.spring_end.size()));
   }
@@ -276,15 +279,15 @@ void append_springs(const Sheet& sheet, const Cloth& cloth, const LocalFrame& fr
 void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) {
   std::unordered_map<uint64_t, int> of_edge;
   const auto key = [](uint32_t a, uint32_t b) { return uint64_t(a) << 32 | b; };
+  const auto node = [&](size_t k, int c) { return uint32_t(sheet.node[sheet.triangle[k][c % 3]]); };
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
-    for (int c = 0; c < 3; ++c)
-      of_edge[key(sheet.triangle[k][c], sheet.triangle[k][(c + 1) % 3])] = int(k);
+    for (int c = 0; c < 3; ++c) of_edge[key(node(k, c), node(k, c + 1))] = int(k);
   }
   const size_t first = t.rim.size();
-  t.rim.resize(first + sheet.position.size(), 0);
-  for (const auto& triangle : sheet.triangle) {
+  t.rim.resize(first + sheet.point.size(), 0);
+  for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     for (int c = 0; c < 3; ++c) {
-      const uint32_t a = triangle[c], b = triangle[(c + 1) % 3];
+      const uint32_t a = node(k, c), b = node(k, c + 1);
       const auto other = of_edge.find(key(b, a));
       t.neighbour.push_back(other == of_edge.end() ? -1 : other->second + base_triangle);
       if (other == of_edge.end()) t.rim[first + a] = t.rim[first + b] = 1;
@@ -298,13 +301,18 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
   const int base = t.vertices(), base_triangle = t.triangles();
   append_springs(sheet, cloth, frame, t, base);
   append_neighbours(sheet, t, base_triangle);
-  std::vector<std::vector<int>> fan(sheet.position.size());
+  std::vector<std::vector<int>> fan(sheet.point.size());
+  V3d spanned(0);
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     V3d centre(0);
     for (int c = 0; c < 3; ++c) {
       const uint32_t v = sheet.triangle[k][c];
-      t.corner.push_back(int(v) + base);
-      fan[v].push_back(3 * (int(k) + base_triangle) + c);
+      t.corner.push_back(sheet.node[v] + base);
+      const V3d shift = V3d(sheet.image[v]) * sheet.period;
+      t.corner_shift.push(float(shift.x), float(shift.y), float(shift.z));
+      for (int axis = 0; axis < 3; ++axis)
+        if (sheet.image[v][axis] != 0) spanned[axis] = sheet.period[axis];
+      fan[size_t(sheet.node[v])].push_back(3 * (int(k) + base_triangle) + c);
       centre += sheet.rest[v] / 3;
     }
     t.sheet.push_back(index);
@@ -312,13 +320,14 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     t.rest_centroid.push(float(centre.x - frame.origin[0]), float(centre.y - frame.origin[1]),
                          float(centre.z - frame.origin[2]));
   }
+  t.rest_period.push(float(spanned.x), float(spanned.y), float(spanned.z));
   std::vector<int> start, flat;
   to_rows(fan, start, flat);
   const int offset = int(t.fan_entry.size());
   if (t.fan_start.empty()) t.fan_start.push_back(0);
   for (size_t r = 1; r < start.size(); ++r) t.fan_start.push_back(start[r] + offset);
   t.fan_entry.insert(t.fan_entry.end(), flat.begin(), flat.end());
-  for (size_t v = 0; v < sheet.position.size(); ++v) {
+  for (size_t v = 0; v < sheet.point.size(); ++v) {
     double third = 0;
     for (const int entry : fan[v]) {
       const auto& k = sheet.triangle[size_t(entry / 3 - base_triangle)];
@@ -329,17 +338,43 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     t.mass.push_back(float(sheet.mass[v]));
     t.inverse_mass.push_back(sheet.pinned[v] ? 0.f : float(1 / sheet.mass[v]));
     t.damping_rate.push_back(float(cloth.damping));
-    const V3d p = sheet.position[v], u = sheet.pinned[v] ? V3d(0) : cloth.velocity;
+    const V3d p = sheet.position[sheet.point[v]], u = sheet.pinned[v] ? V3d(0) : cloth.velocity;
     scene.start.cloth_position.push(frame.to_local(0, p.x), frame.to_local(1, p.y),
                                     frame.to_local(2, p.z));
     scene.start.cloth_velocity.push(float(u.x), float(u.y), float(u.z));
   }
 }
 
+using Triangle = std::array<cpu::Vec3<float>, 3>;
+
+/// The images of a triangle of which something lies within `reach` of the domain, along periodic
+/// axes.
+std::vector<Triangle> images_of(const Triangle& triangle, float reach, const Parameters& p) {
+  std::vector<Triangle> images{triangle};
+  for (int k = 0; k < 3; ++k) {
+    if (!p.periodic[k]) continue;
+    const auto along = [k](auto& v) -> auto& { return k == 0 ? v.x : k == 1 ? v.y : v.z; };
+    const float period = p.high[k] - p.low[k];
+    float low = 1e30f, high = -1e30f;
+    for (const auto& c : triangle)
+      low = std::min(low, along(c) - reach), high = std::max(high, along(c) + reach);
+    std::vector<Triangle> moved;
+    for (float n = std::ceil((p.low[k] - high) / period); low + n * period < p.high[k]; ++n) {
+      for (Triangle image : images) {
+        for (auto& c : image) along(c) += n * period;
+        moved.push_back(image);
+      }
+    }
+    images = moved;
+  }
+  return images;
+}
+
 /// Refuses particles closer to a sheet than a quarter spacing: the side they belong to is a guess.
 void check_overlap(const Shot& shot, const Scene& scene) {
   using P = cpu::Vec3<float>;
-  const HostVec &x = scene.start.position, &v = scene.start.cloth_position;
+  const HostVec &x = scene.start.position, &v = scene.start.cloth_position,
+                &shift = scene.cloth.corner_shift;
   const float a = scene.parameters.spacing;
   std::unordered_multimap<uint64_t, int> cells;
   const auto key = [a](float px, float py, float pz) {
@@ -348,33 +383,40 @@ void check_overlap(const Shot& shot, const Scene& scene) {
   };
   for (size_t i = 0; i < x.size(); ++i) cells.emplace(key(x.x[i], x.y[i], x.z[i]), int(i));
   for (int t = 0; t < scene.cloth.triangles(); ++t) {
-    P corner[3], low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
+    Triangle whole;
     for (int k = 0; k < 3; ++k) {
       const int c = scene.cloth.corner[3 * t + k];
-      corner[k] = {v.x[c], v.y[c], v.z[c]};
-      low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y),
-             std::min(low.z, corner[k].z)};
-      high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y),
-              std::max(high.z, corner[k].z)};
+      whole[k] = {v.x[c], v.y[c], v.z[c]};
+      if (shift.size() > 0)
+        whole[k] = whole[k] + P{shift.x[3 * t + k], shift.y[3 * t + k], shift.z[3 * t + k]};
     }
     const float reach = 0.25f * a + scene.cloth.half_thickness[t];
-    for (float z = low.z - reach; z < high.z + reach + a; z += a) {
-      for (float y = low.y - reach; y < high.y + reach + a; y += a) {
-        for (float px = low.x - reach; px < high.x + reach + a; px += a) {
-          const auto [begin, end] = cells.equal_range(key(px, y, z));
-          for (auto it = begin; it != end; ++it) {
-            const P p{x.x[it->second], x.y[it->second], x.z[it->second]};
-            const float d2 = cpu::closest_point(p, corner[0], corner[1], corner[2]).distance2;
-            if (d2 >= reach * reach) continue;
-            throw Error(
-                fmt::format("{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, "
-                            "{:.4g}, {:.4g}) m is {:.2g} m from it, "
-                            "nearer than {:.2g} m (a quarter spacing and half the thickness), so "
-                            "it has no side. Move the fluid "
-                            "or the cloth at least half a spacing ({:.3g} m) apart",
-                            shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name,
-                            scene.frame.to_world(0, p.x), scene.frame.to_world(1, p.y),
-                            scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
+    for (const Triangle& corner : images_of(whole, reach, scene.parameters)) {
+      P low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
+      for (int k = 0; k < 3; ++k) {
+        low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y),
+               std::min(low.z, corner[k].z)};
+        high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y),
+                std::max(high.z, corner[k].z)};
+      }
+      for (float z = low.z - reach; z < high.z + reach + a; z += a) {
+        for (float y = low.y - reach; y < high.y + reach + a; y += a) {
+          for (float px = low.x - reach; px < high.x + reach + a; px += a) {
+            const auto [begin, end] = cells.equal_range(key(px, y, z));
+            for (auto it = begin; it != end; ++it) {
+              const P p{x.x[it->second], x.y[it->second], x.z[it->second]};
+              const float d2 = cpu::closest_point(p, corner[0], corner[1], corner[2]).distance2;
+              if (d2 >= reach * reach) continue;
+              throw Error(
+                  fmt::format("{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, "
+                              "{:.4g}, {:.4g}) m is {:.2g} m from it, "
+                              "nearer than {:.2g} m (a quarter spacing and half the thickness), so "
+                              "it has no side. Move the fluid "
+                              "or the cloth at least half a spacing ({:.3g} m) apart",
+                              shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name,
+                              scene.frame.to_world(0, p.x), scene.frame.to_world(1, p.y),
+                              scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
+            }
           }
         }
       }
@@ -418,7 +460,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   start.owed.resize(start.id.size());
   double dt_limit = 1e30;
   for (size_t s = 0; s < shot.cloth.size(); ++s) {
-    scene.sheet.push_back(build_sheet(shot.cloth[s]));
+    scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
     scene.first_vertex.push_back(scene.cloth.vertices());
     scene.first_triangle.push_back(scene.cloth.triangles());
     append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, scene);
@@ -426,6 +468,11 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   }
   scene.first_vertex.push_back(scene.cloth.vertices());
   scene.first_triangle.push_back(scene.cloth.triangles());
+  if (std::none_of(scene.sheet.begin(), scene.sheet.end(),
+                   [](const Sheet& sheet) { return sheet.joined(); })) {
+    ClothTopology& t = scene.cloth;
+    t.corner_shift = t.spring_shift = t.rest_period = {};
+  }
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
       scene.parameters.incompressible ? 1e30f : float(std::min(dt_limit, 1e-3));

@@ -24,24 +24,49 @@ struct LocalFrame {
   double to_world(int axis, float local) const { return origin[axis] + double(local); }
 };
 
-/// One sheet as its builder leaves it, world coordinates.
+/// Periodic axes as sheets meet them, m.
+struct Seams {
+  V3d period{0, 0, 0};   // 0 where an axis is not periodic
+  double tolerance = 0;  // within which two vertices are images of one another
+  double least_gap = 0;  // of edges that are not
+};
+Seams seams_of(const Shot& shot);
+
+/// One sheet as its builder leaves it, world coordinates. Vertices are those that are drawn; the
+/// mass points of the simulation are the nodes: the same, but that a sheet which spans a periodic
+/// axis has one line of nodes for its two edges there.
 struct Sheet {
   std::string name;
   std::vector<V3d> position, rest;
   std::vector<Imath::V2f> uv;
   std::vector<Imath::Vec3<uint32_t>> triangle;
-  std::vector<double> mass;  // kg
-  std::vector<bool> pinned;
+  std::vector<int> node;          // of a vertex
+  std::vector<Imath::V3i> image;  // periods from its node to a vertex
+  std::vector<uint32_t> point;    // of a node: the vertex that stands where it does
+  V3d period{0, 0, 0};            // m
+  std::vector<double> mass;       // kg, of a node
+  std::vector<bool> pinned;       // nodes
   struct Spring {
-    int a, b;
+    int a, b;          // nodes
+    Imath::V3i image;  // periods from b to the end that a sees
     double stiffness;  // N/m
   };
   std::vector<Spring> spring;
+
+  bool joined() const { return point.size() < position.size(); }
+  V3d along(const Spring& s) const {  // m, from a to b
+    return position[point[size_t(s.b)]] + V3d(s.image) * period - position[point[size_t(s.a)]];
+  }
 };
 
+/// Finds the nodes of a sheet of vertices and triangles: vertices on free edges that are images of
+/// one another across a seam share one. @throws Error if edges nearly meet at a seam, or meet with
+/// fewer than three cells around.
+void join_at_seams(Sheet& sheet, const Seams& seams);
+
 /// Grid or mesh file, checked. @throws Error for a degenerate or non-manifold triangle, an unused
-/// vertex, or a pin that holds nothing.
-Sheet build_sheet(const Cloth& cloth);
+/// vertex, a pin that holds nothing, or as join_at_seams.
+Sheet build_sheet(const Cloth& cloth, const Seams& seams = {});
 
 /// What leaves an emitter at once, again and again. A layer holds the volume that passes the inlet
 /// in one interval, so that the flow is area times speed. Its places are a spacing apart and cover

@@ -281,9 +281,10 @@ struct Simulator::Implementation {
     return out;
   }
 
-  V3f world(const sim::HostVec& p, size_t i) const {
-    return V3f(float(scene.frame.to_world(0, p.x[i])), float(scene.frame.to_world(1, p.y[i])),
-               float(scene.frame.to_world(2, p.z[i])));
+  V3f world(const sim::HostVec& p, size_t i, const V3d& shift = V3d(0)) const {
+    return V3f(float(scene.frame.to_world(0, p.x[i]) + shift.x),
+               float(scene.frame.to_world(1, p.y[i]) + shift.y),
+               float(scene.frame.to_world(2, p.z[i]) + shift.z));
   }
 
   std::vector<ClothFrame> cloth() const {
@@ -292,11 +293,14 @@ struct Simulator::Implementation {
     for (size_t s = 0; s < scene.sheet.size(); ++s) {
       const sim::Sheet& sheet = scene.sheet[s];
       ClothFrame out{sheet.name, {}};
-      for (int v = scene.first_vertex[s]; v < scene.first_vertex[s + 1]; ++v) {
-        out.mesh.position.push_back(world(state.cloth_position, v));
+      // Both edges at a seam are drawn, so that there is no hole in what is seen.
+      for (size_t point = 0; point < sheet.position.size(); ++point) {
+        const int v = scene.first_vertex[s] + sheet.node[point];
+        const V3d shift = V3d(sheet.image[point]) * sheet.period;
+        out.mesh.position.push_back(world(state.cloth_position, size_t(v), shift));
         out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v],
                                        state.cloth_velocity.z[v]);
-        out.mesh.rest_position.push_back(V3f(sheet.rest[v - scene.first_vertex[s]]));
+        out.mesh.rest_position.push_back(V3f(sheet.rest[point]));
       }
       out.mesh.uv = sheet.uv;
       out.mesh.triangle = sheet.triangle;

@@ -263,6 +263,12 @@ class BackendSolver : public Solver {
       host.resize(c.padded, 0.f);  // a padding vertex is pinned and has no springs
       from_host(column, host);
     };
+    c.joined = t.corner_shift.size() > 0;
+    upload(c.corner_shift, t.corner_shift);
+    std::vector<Vec3<float>> rest_period;
+    for (size_t k = 0; k < t.rest_period.size(); ++k)
+      rest_period.push_back({t.rest_period.x[k], t.rest_period.y[k], t.rest_period.z[k]});
+    from_host(c.rest_period, rest_period);
     pad(c.mass, t.mass), pad(c.inverse_mass, t.inverse_mass), pad(c.damping_rate, t.damping_rate);
     load_springs(t);
     from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
@@ -342,11 +348,18 @@ class BackendSolver : public Solver {
     std::vector<int> end(size);
     std::vector<float> length(size, 0.f), stiffness(size, 0.f), damping(size, 0.f);
     for (size_t k = 0; k < size; ++k) end[k] = int(k % c.padded);
+    const std::vector<float>* of_springs[3] = {&t.spring_shift.x, &t.spring_shift.y,
+                                               &t.spring_shift.z};
+    std::vector<float> shift[3];
+    for (std::vector<float>& axis : shift) axis.resize(c.joined ? size : 0, 0.f);
     for (int v = 0; v < c.vertices; ++v) {
       for (int k = t.spring_start[v], free = 0; k < t.spring_start[v + 1]; ++k, ++free) {
         const auto slot = std::find(offset.begin(), offset.end(), t.spring_end[k] - v);
         const size_t to =
             size_t(slot == offset.end() ? free : slot - offset.begin()) * c.padded + v;
+        if (c.joined) {
+          for (int a = 0; a < 3; ++a) shift[a][to] = (*of_springs[a])[k];
+        }
         end[to] = t.spring_end[k], length[to] = t.rest_length[k];
         stiffness[to] = t.stiffness[k], damping[to] = t.spring_damping[k];
       }
@@ -354,6 +367,7 @@ class BackendSolver : public Solver {
     from_host(c.slot_offset, offset), from_host(c.spring_end, end),
         from_host(c.rest_length, length);
     from_host(c.stiffness, stiffness), from_host(c.spring_damping, damping);
+    upload(c.spring_shift, {shift[0], shift[1], shift[2]});
   }
 
   State state_;

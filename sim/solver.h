@@ -46,6 +46,10 @@ struct ClothTopology {
   std::vector<float> air_share;  // of a vertex: area its mass stands for / a third of its triangles
   HostVec rest_centroid;
   std::vector<int> fan_start, fan_entry, rim;
+  // Where a sheet is joined to itself across the seam of a periodic axis, else empty: how far from
+  // its vertex a corner of a triangle, the other end of a spring stands, m; of each sheet the
+  // periods it spans.
+  HostVec corner_shift, spring_shift, rest_period;
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
 };

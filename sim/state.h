@@ -81,6 +81,11 @@ struct ClothState {
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
   std::vector<VertexRange> loose;    // of the sheets without a pin
+  // where a sheet is joined to itself across a seam, else empty (passes/polygon_grid.h)
+  bool joined = false;
+  VecColumn corner_shift;           // m, of a triangle's corner from its vertex
+  VecColumn spring_shift;           // m, of a spring's other end from its vertex, slot by slot
+  Column<Vec3<float>> rest_period;  // m, of a sheet: periods that it spans; 0 along other axes
   // rebuilt
   VecColumn next, next_velocity;  // the substep being made
   VecColumn start;                // at the start of the step
@@ -88,6 +93,7 @@ struct ClothState {
   Column<int> cell, order, cell_start;              // polygons by centroid
   VecColumn sorted_low, sorted_high;                // m, bounding boxes in that order, padded by 8
   Column<PreparedTriangle<float>> sorted_triangle;  // in that order as well, a cache line each
+  VecColumn sorted_shift;  // m, of the image that stands there; only where an axis is periodic
   GridShape grid{};
   float largest_radius = 0;   // m
   float moved = 0;            // m, what any vertex has moved at most since far_by was set

@@ -146,7 +146,7 @@ class Checker {
     }
   }
 
-  /// A particle must not see a neighbour twice, nor cloth reach the seam, which it does not know.
+  /// A particle must not see a neighbour twice.
   void check_periodic(int axis) const {
     const std::string key = fmt::format("domain.{}", "xyz"[axis]);
     const double length = shot_.domain.max[axis] - shot_.domain.min[axis];
@@ -155,9 +155,10 @@ class Checker {
                             "Use \"walls\" or \"open\", or remove the [[obstacle]]",
                             key));
     }
-    if (!shot_.cloth.empty()) {
-      fail(key, fmt::format("{} is \"periodic\" but the shot has cloth, which cannot pass through "
-                            "the seam. Use \"walls\" or \"open\"",
+    if (!shot_.cloth.empty() && shot_.fluid.present() && !is_incompressible(shot_)) {
+      fail(key, fmt::format("{} is \"periodic\" but the shot has cloth in a weakly compressible "
+                            "fluid, which does not see it across the seam. Use fluid.solver = "
+                            "\"incompressible\", or \"walls\" or \"open\"",
                             key));
     }
     const double support = support_ratio(shot_) * shot_.fluid.spacing;

@@ -112,7 +112,7 @@ inline void linearise_cloth(State& state) {
         Vec3<T> held = none;
         for (int k = 0; k < ends.slots; ++k) {
           const auto at = i + k * ends.stride;
-          const Vec3<T> d = ends.at_end(x, i, k) - here;
+          const Vec3<T> d = ends.way(x, here, i, k);
           const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
           const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
           const T t = stiff * max0(excess * inverse);

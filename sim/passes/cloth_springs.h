@@ -9,6 +9,16 @@ namespace drench::sim::DRENCH_BACKEND {
 struct SpringEnds {
   const int *end, *slot_offset;
   int slots, stride;
+  VecView shift;  // m, of the other ends; only where a sheet is joined to itself across a seam
+  bool joined;
+
+  /// From vertex i, which is at x, to the place of the other end of slot s.
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> way(const VecView& position, Vec3<T> x, Index i, int s) const {
+    Vec3<T> d = at_end(position, i, s) - x;
+    if (joined) d = d + shift.at(i + s * stride);
+    return d;
+  }
 
   /// A vector at the other ends of slot s.
   DRENCH_HD Vec3<float> at_end(const VecView& view, int i, int s) const {
@@ -26,7 +36,9 @@ struct SpringEnds {
 };
 
 inline SpringEnds spring_ends_of(const ClothState& c) {
-  return {c.spring_end.data(), c.slot_offset.data(), c.spring_slots, c.padded};
+  return {c.spring_end.data(),   c.slot_offset.data(),
+          c.spring_slots,        c.padded,
+          c.spring_shift.view(), c.joined};
 }
 
 struct ClothSprings {
@@ -41,7 +53,7 @@ struct ClothSprings {
     Vec3<T> f{T(0.f), T(0.f), T(0.f)};
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
-      const Vec3<T> d = ends.at_end(position, i, s) - x;
+      const Vec3<T> d = ends.way(position, x, i, s);
       const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
       const T rate = dot(ends.at_end(velocity, i, s) - v, d) * inverse;
       const T pull = load(stiffness, at) * (l - load(rest_length, at)) + load(damping, at) * rate;

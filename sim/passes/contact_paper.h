@@ -11,7 +11,7 @@ namespace drench::sim::DRENCH_BACKEND {
 // by twice the area, without which it is no distance). No lateral bound, no memory of the side.
 inline void find_nearest_centroids(State& state) {
   FluidState& f = state.fluid;
-  const PolygonView polygons = polygons_of(state.cloth);
+  const PolygonView polygons = polygons_of(state);
   const VecView position = f.position.view(), normal = f.normal.view();
   int* triangle = f.triangle.data();
   float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data(),

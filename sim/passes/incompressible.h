@@ -25,11 +25,13 @@ void predict_with(State& state, const Move& move) {
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view();
   const Vec3<float> kick{dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]};
   const bool keep = f.start.x.size() > 0;  // sheets stand where they stood
+  const Vec3<float> period = periods_of(p);
   parallel_for(
       "predict", f.count, DRENCH_LAMBDA(int i) {
         Vec3<float> velocity = v[i] + kick;
-        if (keep) start.set(i, x[i]);
-        x.set(i, move(x[i], velocity));
+        const Vec3<float> to = move(x[i], velocity);
+        if (keep) start.set(i, image_beside(x[i], to, period));
+        x.set(i, to);
         v.set(i, velocity);
       });
 }
@@ -94,7 +96,9 @@ void project_with(State& state, const Move& move) {
       });
 }
 inline void project_density(State& state) {
-  project_with(state, mover_of(state.parameters, float(state.dt)));
+  const float dt = float(state.dt);
+  const bool paths = state.cloth.vertices > 0;  // that are not to break off at a seam
+  project_with(state, paths ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt));
 }
 
 /// Fluid and sheets go to their new places, each path tested against the moving triangles.

@@ -26,6 +26,12 @@ struct Mover {
     v = {u[0], u[1], u[2]};
     return {p[0], p[1], p[2]};
   }
+  DRENCH_HD Vec3<float> wrapped(Vec3<float> x) const {
+    float p[3] = {x.x, x.y, x.z};
+    for (int k = 0; k < 3; ++k)
+      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
+    return {p[0], p[1], p[2]};
+  }
   DRENCH_HD Vec3<float> inside(Vec3<float> x) const {
     float p[3] = {x.x, x.y, x.z};
     for (int k = 0; k < 3; ++k)
@@ -42,6 +48,20 @@ inline Mover mover_of(const Parameters& p, float dt) {
     mover.low[k] = p.low[k] + margin, mover.high[k] = p.high[k] - margin;
   }
   return mover;
+}
+
+/// The same without periodic sides, for paths: they go on beyond the seam, where the images of
+/// triangles are, and `wrap_positions` ends them.
+inline Mover path_mover_of(const Parameters& p, float dt) {
+  Mover mover = mover_of(p, dt);
+  for (bool& axis : mover.periodic) axis = false;
+  return mover;
+}
+inline void wrap_positions(State& state) {
+  const Mover mover = mover_of(state.parameters, 0.f);
+  const VecView x = state.fluid.position.view();
+  parallel_for(
+      "wrap", state.fluid.count, DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
 }
 
 inline void move_particles(State& state) {
@@ -105,7 +125,7 @@ inline PathTest path_test_of(State& state, float moved) {
       "path test: cloth motion", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
-  return {polygons_of(c),
+  return {polygons_of(state),
           c.position.view(),
           next,
           c.next_velocity.view(),
@@ -147,7 +167,7 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
   const Drift drift = drift_of(state);
-  const Mover mover = mover_of(state.parameters, dt);
+  const Mover mover = path_mover_of(state.parameters, dt);
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
   return parallel_reduce(
@@ -236,7 +256,7 @@ inline void move_unguarded_particles(State& state) {
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
   float* far_by = f.far_by.data();
-  const Mover mover = mover_of(state.parameters, dt);
+  const Mover mover = path_mover_of(state.parameters, dt);
   const Drift drift = drift_of(state);
   const float room = reach + 2.f * path_clearance * spacing,
               support = state.parameters.support_radius;
@@ -324,6 +344,7 @@ inline void move_coupled(State& state) {
     if (state.after_substep) state.after_substep();
   }
   state.cloth.moved += moved;
+  if (any_periodic(state.parameters)) wrap_positions(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -87,12 +87,13 @@ struct PathTest {
   struct Hit {
     int triangle = -1;
     double time = 2;
+    int place = -1;  // in the grid's order: which image of the triangle
   };
 
-  DRENCH_HD MovingTriangle moving(int t) const {
-    const int* k = polygons.corner + 3 * t;
-    return {to_double(cloth[k[0]]),      to_double(cloth[k[1]]),      to_double(cloth[k[2]]),
-            to_double(cloth_next[k[0]]), to_double(cloth_next[k[1]]), to_double(cloth_next[k[2]])};
+  DRENCH_HD MovingTriangle moving(int place) const {
+    const auto from = [&](int e) { return to_double(polygons.corner_in(place, e, cloth)); };
+    const auto to = [&](int e) { return to_double(polygons.corner_in(place, e, cloth_next)); };
+    return {from(0), from(1), from(2), to(0), to(1), to(2)};
   }
 
   DRENCH_HD Hit first_hit(Vec3<float> from, Vec3<float> to) const {
@@ -100,9 +101,8 @@ struct PathTest {
     const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
     const Vec3<float> high{maximum(from.x, to.x), maximum(from.y, to.y), maximum(from.z, to.z)};
     polygons.for_each_near_box(low, high, cloth_moved + clearance, [&](int k) {
-      const int t = polygons.order[k];
-      const double time = crossing_time(moving(t), to_double(from), to_double(to));
-      if (time >= 0 && time < hit.time) hit = {t, time};
+      const double time = crossing_time(moving(k), to_double(from), to_double(to));
+      if (time >= 0 && time < hit.time) hit = {polygons.order[k], time, k};
     });
     return hit;
   }
@@ -165,7 +165,7 @@ struct PathTest {
   /// contacts on the vertices (as in contact_exact.h, or many hits would throw light cloth back);
   /// the cloth's part is owed to it until the next step.
   DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
-    const MovingTriangle m = moving(hit.triangle);
+    const MovingTriangle m = moving(hit.place);
     const Vec3<double> p0 = to_double(from), p1 = to_double(to);
     const double side = side_at(m, p0, p1, 0) > 0 ? 1 : -1;
     const Vec3<double> p = lerp(p0, p1, hit.time), a = lerp(m.a0, m.a1, hit.time),

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "sim/passes/cloth_springs.h"
 #include "sim/passes/measure_density.h"
 #include "sim/passes/probe_height.h"
 #include "sim/passes/probe_pressure.h"
@@ -71,14 +72,14 @@ struct PointEnergy {
 /// Energy of the springs, J: each stands in the slots of both its ends.
 struct SpringEnergy {
   VecView position;
-  const int* end;
+  SpringEnds ends;
   const float *rest_length, *stiffness;
-  int slots, stride;
   DRENCH_HD Totals<3> operator()(int i) const {
     double sum = 0;
-    for (int s = 0; s < slots; ++s) {
-      const int at = s * stride + i;
-      const Vec3<double> d = to_double(position[end[at]]) - to_double(position[i]);
+    for (int s = 0; s < ends.slots; ++s) {
+      const int at = s * ends.stride + i;
+      Vec3<double> d = to_double(position[ends.end[at]]) - to_double(position[i]);
+      if (ends.joined) d = d + to_double(ends.shift[at]);
       const double longer = length(d) - rest_length[at];
       sum += 0.25 * stiffness[at] * longer * longer;
     }
@@ -100,11 +101,10 @@ inline std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const Totals<3> cloth = parallel_reduce(
       "probe: cloth energy", c.vertices, Totals<3>{},
       PointEnergy{c.position.view(), c.velocity.view(), c.mass.data(), 0.f, gravity, zero}, add);
-  const Totals<3> springs =
-      parallel_reduce("probe: spring energy", c.vertices, Totals<3>{},
-                      SpringEnergy{c.position.view(), c.spring_end.data(), c.rest_length.data(),
-                                   c.stiffness.data(), c.spring_slots, c.padded},
-                      add);
+  const Totals<3> springs = parallel_reduce(
+      "probe: spring energy", c.vertices, Totals<3>{},
+      SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},
+      add);
   return to_vector(add(add(fluid, cloth), springs));
 }
 

@@ -36,23 +36,24 @@ struct SheetFilter {
     bool hidden = false;
     polygons.for_each_near_box(low, high, 0.f, [&](int k) {
       if (hidden) return;
-      Vec3<float> a, b, c;
-      polygons.corners(polygons.order[k], a, b, c);
-      hidden =
-          segment_crosses(to_double(from), to_double(to), to_double(a), to_double(b), to_double(c));
+      const auto corner = [&](int e) {
+        return to_double(polygons.corner_in(k, e, polygons.position));
+      };
+      hidden = segment_crosses(to_double(from), to_double(to), corner(0), corner(1), corner(2));
     });
     return hidden;
   }
 
 #if defined(__CUDACC__)
-  DRENCH_HD bool hides(int i, int j) const {
-    const Vec3<float> ni = normal[i], nj = normal[j];
-    const bool front_i = dot(ni, position[j]) + plane[i] > 0.f,
-               front_j = dot(nj, position[i]) + plane[j] > 0.f;
+  /// @param shift  m, added to where j is: it may be seen beyond a seam
+  DRENCH_HD bool hides(int i, int j, Vec3<float> shift) const {
+    const Vec3<float> ni = normal[i], nj = normal[j], to = position[j] + shift;
+    const bool front_i = dot(ni, to) + plane[i] > 0.f,
+               front_j = dot(nj, position[i] - shift) + plane[j] > 0.f;
     if ((front_i && front_j) || i == j) return false;
-    if (length2(position[j] - position[i]) >= support_radius * support_radius) return false;
+    if (length2(to - position[i]) >= support_radius * support_radius) return false;
     if (!front_i && !front_j && dot(ni, nj) < 0.f) return true;
-    return segment_hidden(position[i], position[j]);
+    return segment_hidden(position[i], to);
   }
 #else
   /// What the test of a particle's neighbours reads of the particle itself.
@@ -106,9 +107,8 @@ struct SheetFilter {
 /// @param position  m, those that the planes of the sheets were taken from
 inline SheetFilter sheet_filter(const State& state, const VecView& position) {
   const FluidState& f = state.fluid;
-  return {f.shaded.data(),          position,
-          f.normal.view(),          f.plane.data(),
-          polygons_of(state.cloth), state.parameters.support_radius};
+  return {f.shaded.data(), position,           f.normal.view(),
+          f.plane.data(),  polygons_of(state), state.parameters.support_radius};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -12,7 +12,8 @@ struct SheetTopology {
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
   VecView rest_centroid;
   const float* half_thickness;
-  Vec3<float> low, high;  // m, half a spacing inside the domain's walls
+  Vec3<float> low, high;           // m, half a spacing inside the domain's walls
+  const Vec3<float>* rest_period;  // m, by sheet; where one is joined to itself
 
   /// Is a free edge so near to a wall that no fluid passes between them? Not to a wall that the
   /// sheet lies along.
@@ -35,6 +36,13 @@ struct SheetTopology {
       }
     }
     return true;
+  }
+  /// Are two triangles of one sheet within `reach` of each other at rest?
+  DRENCH_HD bool on_one_patch(int s, int t, float reach) const {
+    if (sheet[s] != sheet[t]) return false;
+    Vec3<float> d = rest_centroid[s] - rest_centroid[t];
+    if (polygons.place.joined) d = nearest(d, rest_period[sheet[s]]);
+    return length(d) < reach;
   }
   DRENCH_HD static bool beyond(float p, float q, float low, float high) {
     return (p < low && q < low) || (p > high && q > high);
@@ -65,8 +73,10 @@ struct SheetTopology {
   }
 };
 
-inline SheetTopology topology_of(const ClothState& c, const Parameters& p) {
-  SheetTopology sheet{polygons_of(c),
+inline SheetTopology topology_of(const State& state) {
+  const ClothState& c = state.cloth;
+  const Parameters& p = state.parameters;
+  SheetTopology sheet{polygons_of(state),
                       c.neighbour.data(),
                       c.sheet.data(),
                       c.fan_start.data(),
@@ -75,7 +85,8 @@ inline SheetTopology topology_of(const ClothState& c, const Parameters& p) {
                       c.rest_centroid.view(),
                       c.half_thickness.data(),
                       {},
-                      {}};
+                      {},
+                      c.rest_period.data()};
   float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
     low[k] = p.wall[k] ? p.low[k] + 0.5f * p.spacing : -1e30f;
@@ -136,7 +147,7 @@ DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb
 // at free edges.
 inline void find_sheet_sides(State& state, const VecView& position) {
   FluidState& f = state.fluid;
-  const SheetTopology sheet = topology_of(state.cloth, state.parameters);
+  const SheetTopology sheet = topology_of(state);
   const VecView normal = f.normal.view();
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
@@ -163,12 +174,12 @@ inline void find_sheet_sides(State& state, const VecView& position) {
         }
         Vec3<float> a, b, c;
         sheet.polygons.corners(t, a, b, c);
-        const Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
+        Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
+        if (sheet.polygons.periodic) to_particle = nearest(to_particle, sheet.polygons.period);
         const float d = length(to_particle);
         const int seen = dot(to_particle, foot.normal) >= 0.f ? 1 : -1;
         const int old = memory_triangle[i];
-        const bool remembered = old >= 0 && sheet.sheet[old] == sheet.sheet[t] &&
-                                length(sheet.rest_centroid[old] - sheet.rest_centroid[t]) < patch;
+        const bool remembered = old >= 0 && sheet.on_one_patch(old, t, patch);
         const int side = remembered ? memory_side[i] : seen;
         memory_triangle[i] = t, memory_side[i] = side;
         const Vec3<float> pseudo =

@@ -9,8 +9,7 @@
 // At rest and at terminal speed nothing of it is approximate; no lift at small angles, no wake, no
 // shelter behind other sheets.
 
-#include "sim/parallel.h"
-#include "sim/state.h"
+#include "sim/passes/polygon_grid.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -63,6 +62,7 @@ inline void blow_at_cloth(State& state, const VecView& position, const VecView& 
   const VecView diagonal = c.air_diagonal.view(), cross_terms = c.air_cross.view(),
                 push = c.air_push.view();
   const int *fan_start = c.fan_start.data(), *fan = c.fan_entry.data(), *corner = c.corner.data();
+  const Corners place = corners_of(c);
   const float* share = c.air_share.data();
   const float half = 0.5f * p.air_density, normal_drag = half * p.cloth_drag,
               tangential_drag = half * p.cloth_friction;
@@ -74,8 +74,10 @@ inline void blow_at_cloth(State& state, const VecView& position, const VecView& 
         Vec3<float> d{0.f, 0.f, 0.f}, m{0.f, 0.f, 0.f};
         for (int k = fan_start[i]; k < fan_start[i + 1]; ++k) {
           const int* v = corner + 3 * (fan[k] / 3);
-          const Vec3<float> a = position[v[0]];
-          const Vec3<float> twice = cross(position[v[1]] - a, position[v[2]] - a);
+          const int first = 3 * (fan[k] / 3);
+          const Vec3<float> a = place.at(position, first);
+          const Vec3<float> twice =
+              cross(place.at(position, first + 1) - a, place.at(position, first + 2) - a);
           const float size = length(twice);  // twice the area
           const Vec3<float> n = twice * (1.f / maximum(size, 1e-20f));
           const Vec3<float> u =

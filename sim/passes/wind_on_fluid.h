@@ -39,14 +39,6 @@ inline DropDrag drop_drag_of(const Parameters& p) {
   return {p.air_density, 1.8e-5f, 0.62035f * p.spacing, p.spacing, own};  // (3 / 4 pi)^(1/3)
 }
 
-/// The nearest image of a separation. @param period  m; 0 where an axis is not periodic.
-DRENCH_HD Vec3<float> nearest(Vec3<float> d, Vec3<float> period) {
-  const auto along = [](float x, float length) {
-    return length > 0.f ? x - length * floorf(x / length + 0.5f) : x;
-  };
-  return {along(d.x, period.x), along(d.y, period.y), along(d.z, period.z)};
-}
-
 inline void wind_on_fluid(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
