@@ -45,6 +45,9 @@ class ProbeChecker {
     const double slack = 0.5 * shot_.fluid.spacing + 1e-9;
     for (const int k : axes) {
       if (domain.axis[size_t(k)] == Axis::open) continue;
+      // Its images are seen across a seam, but each particle once.
+      const bool periodic = domain.axis[size_t(k)] == Axis::periodic;
+      if (periodic && 2 * reach[k] <= domain.max[k] - domain.min[k]) continue;
       const double low = probe_.position[k] - reach[k], high = probe_.position[k] + reach[k];
       if (low >= domain.min[k] - slack && high <= domain.max[k] + slack) continue;
       fail("position",
@@ -120,7 +123,7 @@ std::optional<DomainWall> wall_under(const Probe& probe, const Shot& shot) {
   const V3d n = probe.normal.normalized();
   const double slack = 0.5 * shot.fluid.spacing + 1e-9;
   for (int axis = 0; axis < 3; ++axis) {
-    if (shot.domain.axis[size_t(axis)] == Axis::open || std::abs(n[axis]) < 1 - 1e-6) continue;
+    if (shot.domain.axis[size_t(axis)] != Axis::walls || std::abs(n[axis]) < 1 - 1e-6) continue;
     const double x = probe.position[axis];
     if (std::abs(x - shot.domain.min[axis]) <= slack) return DomainWall{axis, Side::low};
     if (std::abs(x - shot.domain.max[axis]) <= slack) return DomainWall{axis, Side::high};

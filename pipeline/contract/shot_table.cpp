@@ -31,8 +31,9 @@ Row grid_pins_row() {
   row.stages = simulate;
   row.description =
       "held vertices of a grid: one or an array of these names; u0 is the edge where u starts. "
-      "Turned "
-      "into [[cloth.pin]] vertices";
+      "Turned into [[cloth.pin]] vertices. A sheet that spans a periodic axis has no rim there, "
+      "but "
+      "rim and corners hold that line, too: name the two other edges";
   return row.one_of({"corners", "edge_u0", "edge_u1", "edge_v0", "edge_v1", "rim"});
 }
 
@@ -65,9 +66,15 @@ std::vector<Parameter> shot_rows() {
                         "lower corner; walls stand here, and periodic axes begin"),
       row<&Domain::max>("domain", "max", "m", place, simulate,
                         "upper corner; walls stand here, and periodic axes begin anew"),
-      axis_row<0>("x", "both ends of the x axis; periodic ones are one and the same place"),
-      axis_row<1>("y", "both ends of the y axis; periodic ones are one and the same place"),
-      axis_row<2>("z", "both ends of the z axis; periodic ones are one and the same place"),
+      axis_row<0>("x",
+                  "both ends of the x axis; periodic ones are one and the same place, "
+                  "and a sheet that spans the axis is joined to itself there"),
+      axis_row<1>("y",
+                  "both ends of the y axis; periodic ones are one and the same place, "
+                  "and a sheet that spans the axis is joined to itself there"),
+      axis_row<2>("z",
+                  "both ends of the z axis; periodic ones are one and the same place, "
+                  "and a sheet that spans the axis is joined to itself there"),
       row<&Domain::slip>("domain", "slip", "", none, simulate,
                          "how the incompressible solver's fluid meets these walls: free, or none "
                          "(it moves with them). automatic is none if a layer that a wall brakes "

@@ -22,20 +22,22 @@ inline std::vector<double> wall_force(const State& state, const ProbeQuery& quer
 
 /// The same with the weights of a sensor, over their area, along the wall's normal, Pa.
 inline double wall_pressure(const State& state, const ProbeQuery& query) {
-  const Totals<1> sum = parallel_reduce(
-      "probe: wall pressure", state.fluid.count, Totals<1>{},
-      WallSensor{{step_pressure_of(state), {query.axis, query.side}}, soft_disc_of(query)},
-      AddTotals<1>{});
+  const Totals<1> sum =
+      parallel_reduce("probe: wall pressure", state.fluid.count, Totals<1>{},
+                      WallSensor{{step_pressure_of(state), {query.axis, query.side}},
+                                 soft_disc_of(query, state.parameters)},
+                      AddTotals<1>{});
   return sum.value[0] / query.extent;
 }
 
 /// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
 inline double inner_pressure(const State& state, const ProbeQuery& query) {
   const FluidState& f = state.fluid;
-  const Totals<1> sum = parallel_reduce(
-      "probe: pressure", f.count, Totals<1>{},
-      InnerSensor{step_pressure_of(state), soft_disc_of(query), {f.grid, f.cell_start.data()}},
-      AddTotals<1>{});
+  const Totals<1> sum = parallel_reduce("probe: pressure", f.count, Totals<1>{},
+                                        InnerSensor{step_pressure_of(state),
+                                                    soft_disc_of(query, state.parameters),
+                                                    {f.grid, f.cell_start.data()}},
+                                        AddTotals<1>{});
   return sum.value[0] / query.extent;
 }
 

@@ -8,6 +8,7 @@
 
 #include "sim/kernels.h"
 #include "sim/parallel.h"
+#include "sim/periodic.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"
 
@@ -32,11 +33,12 @@ struct LineDensity {
   VecView position;
   float x, z, from, step;  // m
   float h, scale;          // m; kg/m^3, m / h^3
+  Vec3<float> period;      // m; 0 where an axis is not periodic
 
   DRENCH_HD LineSamples operator()(int i) const {
     LineSamples one;
-    const Vec3<float> p = position[i];
-    const float dx = p.x - x, dz = p.z - z, across2 = dx * dx + dz * dz;
+    const Vec3<float> p = position[i], d = nearest({p.x - x, 0.f, p.z - z}, period);
+    const float across2 = d.x * d.x + d.z * d.z;
     const float bottom = from - float(height_samples - 1) * step;
     if (!(across2 < h * h) || p.y - h > from) return one;
     if (p.y - h < bottom) one.next = minimum(p.y + h, bottom);
@@ -83,8 +85,8 @@ inline double surface_height(const State& state, const ProbeQuery& query) {
   const HalfDensity enough = half_density(p, query);
   const float h = p.support_radius;
   LineDensity line{
-      state.fluid.position.view(),  query.place[0], query.place[2], 1e30f, 0.25f * h, h,
-      p.particle_mass / (h * h * h)};
+      state.fluid.position.view(),   query.place[0], query.place[2], 1e30f, 0.25f * h, h,
+      p.particle_mass / (h * h * h), periods_of(p)};
   bool fine = false;
   while (true) {
     const LineSamples s =

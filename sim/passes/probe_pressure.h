@@ -7,6 +7,7 @@
 #include "sim/parallel.h"
 #include "sim/passes/density.h"
 #include "sim/passes/pressure_rows.h"
+#include "sim/periodic.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"
 
@@ -151,23 +152,25 @@ struct WallForce {
 /// spread over about a spacing.
 struct SoftDisc {
   Vec3<float> centre, normal;
-  float radius, rim;  // m; the weight falls from radius - rim to radius + rim
+  float radius, rim;   // m; the weight falls from radius - rim to radius + rim
+  Vec3<float> period;  // m; 0 where an axis is not periodic
 
   DRENCH_HD float across(Vec3<float> p) const {
-    const Vec3<float> d = p - centre;
+    const Vec3<float> d = nearest(p - centre, period);
     const Vec3<float> flat = d - normal * dot(d, normal);
     return minimum(max0((radius + rim - length(flat)) / (2.f * rim)), 1.f);
   }
   DRENCH_HD float along(Vec3<float> p) const {
-    return max0(1.f - fabsf(dot(p - centre, normal)) / rim);
+    return max0(1.f - fabsf(dot(nearest(p - centre, period), normal)) / rim);
   }
 };
 
-inline SoftDisc soft_disc_of(const ProbeQuery& q) {
+inline SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
   return {{q.place[0], q.place[1], q.place[2]},
           {q.normal[0], q.normal[1], q.normal[2]},
           q.radius,
-          q.rim};
+          q.rim,
+          periods_of(p)};
 }
 
 struct WallSensor {
@@ -192,18 +195,15 @@ struct InnerSensor {
     const Vec3<float> x = step.at(i);
     const Vec3<float> n = disc.normal, corrected = step.corrected(i, n);
     const GridShape& g = grid.shape;
-    const int cx = g.cell_x(x.x), cy = g.cell_y(x.y), cz = g.cell_z(x.z);
     float sum = 0.f;
-    for (int z = cz > 0 ? cz - 1 : 0; z <= cz + 1 && z < g.nz; ++z) {
-      for (int y = cy > 0 ? cy - 1 : 0; y <= cy + 1 && y < g.ny; ++y) {
-        const int first = g.index(cx > 0 ? cx - 1 : 0, y, z);
-        const int last = g.index(cx + 1 < g.nx ? cx + 1 : cx, y, z);
-        for (int j = grid.cell_start[first]; j < grid.cell_start[last + 1]; ++j) {
-          const Vec3<float> d = step.at(j) - x;
-          sum += step.pair_weight(length(d)) * dot(d, corrected) * dot(d, n);
-        }
-      }
-    }
+    for_each_run(grid, g.cell_x(x.x), g.cell_y(x.y), g.cell_z(x.z),
+                 [&](int begin, int end, Vec3<float> shift) {
+                   const Vec3<float> seen = x - shift;
+                   for (int j = begin; j < end; ++j) {
+                     const Vec3<float> d = step.at(j) - seen;
+                     sum += step.pair_weight(length(d)) * dot(d, corrected) * dot(d, n);
+                   }
+                 });
     const Vec3<float> s = step.wall_gradient(i);
     const float slope[3] = {s.x, s.y, s.z}, at[3] = {x.x, x.y, x.z}, e[3] = {n.x, n.y, n.z};
     for (int k = 0; k < 3; ++k) {

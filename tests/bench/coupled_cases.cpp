@@ -1,11 +1,12 @@
-// Case sheet_pool: a pool on a pinned sheet of light cotton against the springs' own static
-// solution (tests/validation/coupled.h), run time against error.
+// Cases sheet_pool and strip_pool: a pool on a pinned sheet of light cotton against the springs'
+// own static solution (tests/validation/coupled.h, strip_pool.h), run time against error.
 
 #include <cmath>
 #include <string>
 
 #include "tests/bench/bench.h"
 #include "tests/validation/coupled.h"
+#include "tests/validation/strip_pool.h"
 
 namespace drench::bench {
 namespace {
@@ -25,6 +26,27 @@ void pools(const Emit& emit) {
     emit(line);
   }
 }
+
+void strips(const Emit& emit) {
+  for (const int across : {15, 20, 30, 45}) {
+    validation::StripPool pool;
+    Line line;
+    line.cost = measure([&] { pool = validation::strip_pool(across, 1); });
+    line.method = "incompressible, strong coupling, joined across a periodic axis";
+    line.resolution = std::to_string(across) + " across, " + std::to_string(pool.particles);
+    line.error = std::abs(pool.sag / pool.static_sag - 1), line.gate = 0.05;
+    line.error_of = "sag over that of a plane chain of springs under the hydrostatic load, less 1";
+    line.more["shape"] = pool.shape;
+    line.more["spread_m"] = pool.spread;
+    line.more["speed_m_s"] = pool.speed;
+    line.more["steps"] = pool.steps;
+    emit(line);
+  }
+}
+
+const Registration strip_pool{
+    "strip_pool", "a pool on a sheet that spans a periodic axis: time and error of the sag",
+    strips};
 
 const Registration sheet_pool{"sheet_pool", "a pool on a pinned sheet: time and error of the sag",
                               pools};

@@ -81,7 +81,9 @@ TEST_F(ShotError, NamesWrongTypes) {
 
 TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
   expect_messages({
-      {"[domain]\nx = \"periodic\"\n[[cloth]]\n", {"scene.toml:5", "domain.x", "cloth", "seam"}},
+      {"[domain]\nx = \"periodic\"\n[fluid]\nsolver = \"weakly_compressible\"\n[[fluid.box]]\n"
+       "[[cloth]]\n",
+       {"scene.toml:5", "domain.x", "cloth", "seam", "incompressible"}},
       {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"sphere\"\n",
        {"scene.toml:5", "domain.x", "obstacle", "seam"}},
       {"[fluid]\nsolver = \"weakly_compressible\"\n[[cloth]]\nretardation_time = 0.01\n",

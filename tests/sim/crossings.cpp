@@ -57,6 +57,20 @@ struct Box {
   }
 };
 
+/// Periods to either side and none, m.
+std::vector<V3d> images_of(const V3d& period) {
+  std::vector<V3d> images{V3d(0)};
+  for (int k = 0; k < 3; ++k) {
+    if (!(period[k] > 0)) continue;
+    for (size_t n = images.size(), i = 0; i < n; ++i) {
+      V3d low = images[i], high = images[i];
+      low[k] -= period[k], high[k] += period[k];
+      images.push_back(low), images.push_back(high);
+    }
+  }
+  return images;
+}
+
 double solid_angle(const V3d& a, const V3d& b, const V3d& c) {
   const double la = a.length(), lb = b.length(), lc = c.length();
   return 2 * std::atan2(det(a, b, c), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
@@ -65,12 +79,19 @@ double solid_angle(const V3d& a, const V3d& b, const V3d& c) {
 }  // namespace
 
 int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& before,
-                    const sim::HostState& after) {
-  std::vector<Box> box(cloth.triangles());
-  for (int t = 0; t < cloth.triangles(); ++t) {
+                    const sim::HostState& after, const V3d& period) {
+  const std::vector<V3d> images = images_of(period);
+  const int triangles = cloth.triangles();
+  const auto corner = [&](const sim::HostVec& vertices, int image, int k) {
+    const V3d p = at(vertices, cloth.corner[size_t(k)]) + images[size_t(image)];
+    return cloth.corner_shift.size() > 0 ? p + at(cloth.corner_shift, size_t(k)) : p;
+  };
+  std::vector<Box> box(size_t(triangles) * images.size());
+  for (size_t t = 0; t < box.size(); ++t) {
+    const int image = int(t) / triangles, first = 3 * (int(t) % triangles);
     for (int k = 0; k < 3; ++k) {
-      box[t].add(at(before.cloth_position, cloth.corner[3 * t + k]));
-      box[t].add(at(after.cloth_position, cloth.corner[3 * t + k]));
+      box[t].add(corner(before.cloth_position, image, first + k));
+      box[t].add(corner(after.cloth_position, image, first + k));
     }
   }
   // In the order of their lower x, so that a path looks at those alone that may begin before it
@@ -85,7 +106,10 @@ int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& befor
   const std::vector<int> place = place_of_id(before);
   int count = 0;
   for (size_t i = 0; i < after.id.size(); ++i) {
-    const V3d from = at(before.position, place[after.id[i]]), to = at(after.position, i);
+    const V3d from = at(before.position, place[after.id[i]]);
+    V3d to = at(after.position, i);
+    for (int k = 0; k < 3; ++k)
+      if (period[k] > 0) to[k] -= period[k] * std::round((to[k] - from[k]) / period[k]);
     Box path;
     path.add(from), path.add(to);
     if (!path.meets(all)) continue;
@@ -96,8 +120,9 @@ int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& befor
       if (!path.meets(box[t])) continue;
       Tetrahedron m;
       for (int k = 0; k < 3; ++k) {
-        m.start[k] = at(before.cloth_position, cloth.corner[3 * t + k]) - from;
-        m.end[k] = at(after.cloth_position, cloth.corner[3 * t + k]) - to;
+        const int image = t / triangles, place = 3 * (t % triangles) + k;
+        m.start[k] = corner(before.cloth_position, image, place) - from;
+        m.end[k] = corner(after.cloth_position, image, place) - to;
       }
       count += crosses(m);
     }

@@ -10,8 +10,10 @@ namespace drench::sim_tests {
 /// Bernstein coefficients are halved until they have one sign or the interval is 2^-40 long, and
 /// the place of each root is then tested against the triangle's outline (1e-9 of its size counts as
 /// inside).
+/// @param period  m, of periodic axes, 0 for others: paths are those to the nearest images, and
+/// triangles stand a period to either side as well.
 int count_crossings(const sim::ClothTopology& cloth, const sim::HostState& before,
-                    const sim::HostState& after);
+                    const sim::HostState& after, const V3d& period = V3d(0));
 
 /// Particles under a sheet that is pinned along its square outline at `height`, m local: by the
 /// solid angles of the sheet and of the flat square, which differ by 4 pi for a point between the

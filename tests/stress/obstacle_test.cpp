@@ -124,7 +124,9 @@ TEST(Unsupported, ObstaclesAndSeamsWithClothAreRefused) {
   for (const auto& [what, text] :
        {std::pair{"cloth and an obstacle",
                   shot + "[[obstacle]]\ntype = \"sphere\"\nradius = 0.1\n"},
-        {"cloth and a periodic axis", "[domain]\nx = \"periodic\"\n" + shot.substr(9)}}) {
+        {"cloth, a periodic axis and a weakly compressible fluid",
+         "[fluid]\nsolver = \"weakly_compressible\"\n[domain]\nx = \"periodic\"\n" +
+             shot.substr(9)}}) {
     const std::string said = test::error_of([&] { parse_shot(text, "both.toml"); });
     report("unsupported", what, said.find("cloth") != std::string::npos, said.substr(0, 90));
   }
