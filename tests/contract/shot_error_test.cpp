@@ -81,7 +81,7 @@ TEST_F(ShotError, NamesWrongTypes) {
 
 TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
   expect_messages({
-      {"[domain]\nx = \"periodic\"\n[fluid]\nsolver = \"weakly_compressible\"\n[[fluid.box]]\n"
+      {"[domain]\nx = \"periodic\"\n[fluid]\nsolver = \"weakly_compressible\"\n"
        "[[cloth]]\n",
        {"scene.toml:5", "domain.x", "cloth", "seam", "incompressible"}},
       {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"sphere\"\n",
