@@ -161,8 +161,8 @@ TEST_P(StripPool, HangsAsAPlaneChainOfSpringsDoes) {
   const validation::StripPool pool = validation::strip_pool(GetParam(), 1);
   const double spacing = 0.3 / GetParam();
   ASSERT_GT(pool.static_sag, 0.02);
-  EXPECT_NEAR(pool.sag / pool.static_sag, 1, 0.05);
-  EXPECT_LT(pool.shape, 0.05);
+  EXPECT_NEAR(pool.sag / pool.static_sag, 1, 0.02);
+  EXPECT_LT(pool.shape, 0.02);
   EXPECT_LT(pool.spread, 0.02 * pool.static_sag);
   EXPECT_GT(pool.lowest, 0);
   EXPECT_LT(pool.lowest, 0.8 * spacing);
