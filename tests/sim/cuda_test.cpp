@@ -20,7 +20,7 @@ namespace {
 
 constexpr double spacing = 0.01;  // m
 
-enum class Case { exact, paper, incompressible, strong };
+enum class Case { exact, paper, incompressible, strong, seam };
 
 /// s, a third of the stable step of the scenes here.
 double step_of(const sim::Parameters& p) { return p.incompressible ? 8e-4 : 1e-4; }
@@ -106,6 +106,10 @@ class Cuda : public ::testing::TestWithParam<Case> {
     if (GetParam() == Case::strong) {  // as much water under the sheet as over it
       shot.fluid.box.push_back({V3d(-0.08, 0.105, -0.08), V3d(0.08, 0.185, 0.08), V3d(0, 1, 0)});
     }
+    if (GetParam() == Case::seam) {  // in the middle of the block; the sheet is joined to itself
+      shot.domain.min.z = 0, shot.domain.max.z = shot.cloth[0].v.z;
+      shot.domain.axis[2] = Axis::periodic;
+    }
     scene = sim::build_scene(shot);
     // The same iterations on both devices, whichever side of a tolerance the last bit falls.
     scene.parameters.tolerance = 0, scene.parameters.most_iterations = 10;
@@ -181,11 +185,12 @@ TEST_P(Cuda, GivesTheSameBitsInEveryRun) {
 
 INSTANTIATE_TEST_SUITE_P(Cases, Cuda,
                          ::testing::Values(Case::exact, Case::paper, Case::incompressible,
-                                           Case::strong),
+                                           Case::strong, Case::seam),
                          [](const auto& scene) {
                            return scene.param == Case::exact    ? "Exact"
                                   : scene.param == Case::paper  ? "Paper"
                                   : scene.param == Case::strong ? "Strong"
+                                  : scene.param == Case::seam   ? "Seam"
                                                                 : "Incompressible";
                          });
 
