@@ -30,7 +30,7 @@ class Column {
 
   void resize(size_t size) {  // contents are kept; grown by halves so that emitters rarely copy
     if (size > capacity_) {
-      const size_t capacity = size + size / 2;
+      const size_t capacity = capacity_ ? size + size / 2 : size;
       T* data = nullptr;
       check_cuda(cudaMalloc(&data, capacity * sizeof(T)), "allocating a column");
       check_cuda(cudaMemset(data, 0, capacity * sizeof(T)), "clearing a column");
@@ -42,6 +42,10 @@ class Column {
       data_ = data, capacity_ = capacity;
     }
     size_ = size;
+  }
+  void renew(size_t size) {  // contents are lost; never holds old and new memory at once
+    *this = {};
+    resize(size);
   }
   void upload(const T* source, size_t size, size_t at = 0) {
     if (size == 0) return;
@@ -57,6 +61,7 @@ class Column {
   }
   T* data() const { return data_; }
   size_t size() const { return size_; }
+  size_t capacity() const { return capacity_; }  // elements that memory is held for
   void swap(Column& other) noexcept {
     std::swap(data_, other.data_), std::swap(size_, other.size_),
         std::swap(capacity_, other.capacity_);
@@ -75,6 +80,10 @@ template <class T>
 class Column {
  public:
   void resize(size_t size) { data_.resize(size + 8), size_ = size; }
+  void renew(size_t size) {  // contents are lost; never holds old and new memory at once
+    *this = {};
+    resize(size);
+  }
   void upload(const T* source, size_t size, size_t at = 0) {
     if (size) std::memcpy(data_.data() + at, source, size * sizeof(T));
   }
@@ -86,6 +95,7 @@ class Column {
   }
   T* data() const { return const_cast<T*>(data_.data()); }
   size_t size() const { return size_; }
+  size_t capacity() const { return data_.capacity(); }
   void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
 
  private:

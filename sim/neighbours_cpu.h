@@ -35,7 +35,7 @@ class ListStore {
     }
     return piece.end * 4 <= lists_.index.size();
   }
-  /// Makes room for all of the demand and a quarter more; false if there was enough.
+  /// Makes room for all of the demand and an eighth more; false if there was enough.
   bool grow() {
     if (used_ * 4 <= lists_.index.size()) return false;
     if (used_ > std::numeric_limits<unsigned>::max()) {
@@ -43,8 +43,8 @@ class ListStore {
           "the fluid has more than 17 billion pairs of neighbours. Use a larger "
           "fluid.spacing or a smaller fluid.support_ratio");
     }
-    const size_t entries = used_ * 5;
-    lists_.index.resize(entries), lists_.closeness.resize(entries);
+    const size_t entries = used_ * 4 + used_ / 2;
+    lists_.index.renew(entries), lists_.closeness.renew(entries);
     used_ = 0;
     return true;
   }

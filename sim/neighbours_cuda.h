@@ -40,7 +40,9 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
   });
   exclusive_scan(lists.blocks, n, lists.begin, scratch);
   const size_t entries = size_t(value_at(lists.begin, n)) * 4;
-  if (lists.index.size() < entries) lists.index.resize(entries), lists.closeness.resize(entries);
+  if (lists.index.size() < entries) {
+    lists.index.renew(entries + entries / 8), lists.closeness.renew(entries + entries / 8);
+  }
   int* index = lists.index.data();
   float* closeness = lists.closeness.data();
   const unsigned* first = lists.begin.data();

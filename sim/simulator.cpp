@@ -265,6 +265,7 @@ struct Simulator::Implementation {
       energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
+    for (const sim::ColumnMemory& group : solver->memory()) report.memory += group.bytes;
     count_removed(report, state.removed);
   }
 

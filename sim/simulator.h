@@ -41,6 +41,7 @@ struct StepReport {
   int viscous_unconverged = 0;  // steps in which these did not reach their tolerance
   double worst_viscous_residual = 0;  // RMS that one left over the RMS of the velocity
   uint64_t guard_hits = 0;            // particles that the path test held back
+  uint64_t memory = 0;                // bytes of the state on its device, room to grow included
   std::vector<std::pair<std::string, uint64_t>> drained;  // particles that each sink took
   uint64_t lost = 0;  // particles that left the domain through an open side
 };

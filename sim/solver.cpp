@@ -9,6 +9,7 @@
 #include "sim/passes/obstacle_guard.h"
 #include "sim/passes/probe.h"
 #include "sim/passes/viscosity_solve.h"
+#include "sim/state_memory.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -214,13 +215,14 @@ class BackendSolver : public Solver {
     return info;
   }
   unsigned allocated() const override { return allocated_; }
+  std::vector<ColumnMemory> memory() const override { return memory_of(state_); }
   int particles() const override { return state_.fluid.count; }
 
  private:
   void resize_particles(size_t n) {
     FluidState& f = state_.fluid;
-    for (VecColumn* c : {&f.position, &f.velocity, &state_.swap_vector}) c->resize(n);
-    for (Column<int>* c : {&f.id, &f.cell, &f.order, &state_.swap_int}) c->resize(n);
+    f.position.resize(n), f.velocity.resize(n), state_.swap_float.resize(n);
+    for (Column<int>* c : {&f.id, &f.cell, &f.order}) c->resize(n);
     if (allocated_ & column_acceleration) f.acceleration.resize(n);
     if (allocated_ & column_density) {
       for (Column<float>* c : {&f.density, &f.pressure_term}) c->resize(n);

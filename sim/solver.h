@@ -83,6 +83,12 @@ struct PassInfo {
   unsigned reads, writes;  // of ColumnGroup
 };
 
+/// What a group of columns takes in the memory of the backend, room to grow included.
+struct ColumnMemory {
+  std::string name;
+  size_t bytes;
+};
+
 class Solver {
  public:
   virtual ~Solver() = default;
@@ -122,6 +128,7 @@ class Solver {
   virtual std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) = 0;
   virtual std::vector<PassInfo> plan() const = 0;
   virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
+  virtual std::vector<ColumnMemory> memory() const = 0;  // of the groups that take anything
   virtual int particles() const = 0;
 };
 

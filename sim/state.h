@@ -223,8 +223,7 @@ struct State {
   ObstacleState obstacles, sinks;
   WindNow wind;
   SortScratch scratch;
-  VecColumn swap_vector;
-  Column<int> swap_int;
+  Column<float> swap_float;
   double dt = 0;     // s, of the step being made
   int substeps = 1;  // cloth steps in it
   bool owes = true;  // FluidState::owed may hold something

@@ -47,6 +47,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"viscous_unconverged", step.viscous_unconverged},
                      {"drained", drained},
                      {"lost", step.lost},
+                     {"state_mib", double(step.memory) / (1 << 20)},
                      {"guard_hits", step.guard_hits}}
                     .dump();
   report.line =

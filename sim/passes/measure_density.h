@@ -42,7 +42,9 @@ inline void measure_density(State& state) {
   const Parameters& p = state.parameters;
   sort_by_cell(state);
   f.density.clear_bytes(0);  // lost particles have none
-  const VecView x = f.position.view(), sorted = state.swap_vector.view();
+  const VecView x = f.position.view(),
+                sorted{state.pressure.before.data(), state.pressure.next.data(),
+                       state.pressure.product.data()};
   const int* order = f.order.data();
   parallel_for(
       "measure: sort", f.count, DRENCH_LAMBDA(int i) { sorted.set(i, x[order[i]]); });

@@ -22,11 +22,8 @@ inline void permute(Column<int>& column, Column<int>& spare, const int* order, i
       "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
-inline void permute(VecColumn& column, VecColumn& spare, const int* order, int n) {
-  const VecView from = column.view(), to = spare.view();
-  parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to.set(i, from[order[i]]); });
-  column.swap(spare);
+inline void permute(VecColumn& column, Column<float>& spare, const int* order, int n) {
+  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, spare, order, n);
 }
 
 /// Cells of all particles, their order by cell and where cells begin.
@@ -73,16 +70,17 @@ inline void sort_particles(State& state) {
   const int n = f.count;
   sort_by_cell(state);
   const int* order = f.order.data();
-  permute(f.position, state.swap_vector, order, n);
-  permute(f.velocity, state.swap_vector, order, n);
-  permute(f.id, state.swap_int, order, n);
-  if (p.incompressible) permute(f.pressure_term, state.swap_vector.x, order, n);
+  // Their cells are of no use any more: the columns of integers are permuted into that.
+  permute(f.position, state.swap_float, order, n);
+  permute(f.velocity, state.swap_float, order, n);
+  permute(f.id, f.cell, order, n);
+  if (p.incompressible) permute(f.pressure_term, state.swap_float, order, n);
   if (f.memory_triangle.size()) {
-    if (p.incompressible) permute(f.start, state.swap_vector, order, n);
-    permute(f.memory_triangle, state.swap_int, order, n);
-    permute(f.memory_side, state.swap_int, order, n);
-    permute(f.owed, state.swap_vector, order, n);
-    permute(f.far_by, state.swap_vector.x, order, n);
+    if (p.incompressible) permute(f.start, state.swap_float, order, n);
+    permute(f.memory_triangle, f.cell, order, n);
+    permute(f.memory_side, f.cell, order, n);
+    permute(f.owed, state.swap_float, order, n);
+    permute(f.far_by, state.swap_float, order, n);
   }
   bool open = false;
   for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];

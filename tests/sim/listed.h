@@ -37,8 +37,8 @@ struct Listed {
     state.parameters = sim::build_scene(shot).parameters;
     sim::cpu::FluidState& f = state.fluid;
     f.count = count;
-    for (sim::cpu::VecColumn* c : {&f.position, &f.velocity, &state.swap_vector}) c->resize(count);
-    for (sim::cpu::Column<int>* c : {&f.id, &f.cell, &f.order, &state.swap_int}) c->resize(count);
+    f.position.resize(count), f.velocity.resize(count), state.swap_float.resize(count);
+    for (sim::cpu::Column<int>* c : {&f.id, &f.cell, &f.order}) c->resize(count);
     for (sim::cpu::Column<float>* c : {&f.density, &f.pressure_term}) c->resize(count);
     const sim::cpu::VecView x = f.position.view();
     for (int i = 0; i < count; ++i) {

@@ -172,8 +172,8 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   state.parameters = scene.parameters;
   sim::cpu::FluidState& f = state.fluid;
   const int n = f.count = int(scene.start.id.size());
-  for (auto* c : {&f.position, &f.velocity, &state.swap_vector}) c->resize(size_t(n));
-  for (auto* c : {&f.id, &f.cell, &f.order, &state.swap_int}) c->resize(size_t(n));
+  f.position.resize(n), f.velocity.resize(n), state.swap_float.resize(n);
+  for (auto* c : {&f.id, &f.cell, &f.order}) c->resize(size_t(n));
   for (auto* c : {&f.density, &f.pressure_term}) c->resize(size_t(n));
   sim::cpu::PressureState& s = state.pressure;
   s.resize(size_t(n));
