@@ -45,38 +45,6 @@ TEST(Skip, EachCouplingBringsItsOwnPassesOnly) {
   }
 }
 
-TEST(Skip, AFluidWithoutViscosityHasNoPassForIt) {
-  Shot shot = empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible;
-  add_box(shot, V3d(0), {4, 4, 4});
-  const auto passes = [&](double viscosity) {
-    shot.fluid.kinematic_viscosity = viscosity;
-    int count = 0;
-    for (const sim::PassInfo& pass : Stepper(shot).solver->plan())
-      count += pass.name == "apply_viscosity";
-    return count;
-  };
-  EXPECT_EQ(passes(0), 0);
-  EXPECT_EQ(passes(1e-6), 1);
-}
-
-TEST(Skip, AFluidWithoutSurfaceTensionHasNoPassAndNoColumnForIt) {
-  Shot shot = empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible;
-  add_box(shot, V3d(0), {4, 4, 4});
-  const auto passes = [&](double tension) {
-    shot.fluid.surface_tension = tension;
-    const Stepper run(shot);
-    int count = 0;
-    for (const sim::PassInfo& pass : run.solver->plan())
-      count += pass.name == "apply_surface_tension";
-    EXPECT_EQ((run.solver->allocated() & sim::column_tension) != 0, tension > 0);
-    return count;
-  };
-  EXPECT_EQ(passes(0), 0);
-  EXPECT_EQ(passes(0.072), 1);
-}
-
 /// A block that falls onto a floor, with or without a sheet 0.5 m away.
 sim::HostState splash(int steps, bool with_cloth) {
   Shot shot = empty_shot();
@@ -145,62 +113,6 @@ TEST(Skip, ProbesAddNoPassAndNoColumnAndChangeNoBit) {
     EXPECT_EQ(a.velocity.y, b.velocity.y);
     EXPECT_EQ(a.pressure_term, b.pressure_term);
     EXPECT_EQ(a.cloth_position.y, b.cloth_position.y);
-  }
-}
-
-// Sinks are part of sorting: no pass, no column, and what they do not meet keeps its bits.
-TEST(Skip, ASinkThatMeetsNothingChangesNoBit) {
-  for (const auto solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
-    Shot shot = empty_shot();
-    shot.fluid.solver = solver;
-    shot.gravity = V3d(0, -9.81, 0);
-    shot.domain.axis[1] = Axis::walls;
-    add_box(shot, V3d(0, -0.98, 0), {8, 8, 8});
-    Stepper without(shot);
-    shot.sink.emplace_back().shape.type = ObstacleType::sphere;
-    shot.sink[0].shape.position = V3d(0, 0.7, 0);
-    Stepper with(shot);
-    ASSERT_EQ(without.solver->plan().size(), with.solver->plan().size());
-    EXPECT_EQ(without.solver->allocated(), with.solver->allocated());
-    for (int k = 0; k < 200; ++k) without.step(5e-4), with.step(5e-4);
-    const sim::HostState a = without.solver->save(), b = with.solver->save();
-    EXPECT_EQ(a.id, b.id);
-    EXPECT_EQ(a.position.x, b.position.x);
-    EXPECT_EQ(a.position.y, b.position.y);
-    EXPECT_EQ(a.velocity.z, b.velocity.z);
-    EXPECT_EQ(a.pressure_term, b.pressure_term);
-  }
-}
-
-// No [wind], or air of no density: no pass, no column, the same bits.
-TEST(Skip, NoAirIsNoPassAndChangesNoBit) {
-  const auto names = [](const Stepper& run) {
-    std::vector<std::string> all;
-    for (const sim::PassInfo& pass : run.solver->plan()) all.push_back(pass.name);
-    return all;
-  };
-  for (const auto solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
-    Shot shot = empty_shot();
-    shot.fluid.solver = solver;
-    shot.gravity = V3d(0, -9.81, 0);
-    add_box(shot, V3d(-0.04, 0.01, -0.04), {8, 8, 8});
-    add_sheet(shot, 0.2, 0, 8);
-    Stepper without(shot);
-    shot.wind.present = true, shot.wind.velocity = V3d(9, 0, 0), shot.wind.gust = 2;
-    shot.wind.air_density = 0;
-    Stepper with(shot);
-    EXPECT_EQ(names(without), names(with));
-    EXPECT_EQ(without.solver->allocated(), with.solver->allocated());
-    for (const std::string& name : names(with)) EXPECT_EQ(name.find("wind"), std::string::npos);
-    for (int k = 0; k < 50; ++k) without.step(3e-4), with.step(3e-4);
-    const sim::HostState a = without.solver->save(), b = with.solver->save();
-    EXPECT_EQ(a.position.x, b.position.x);
-    EXPECT_EQ(a.velocity.x, b.velocity.x);
-    EXPECT_EQ(a.cloth_position.x, b.cloth_position.x);
-    EXPECT_EQ(a.cloth_velocity.y, b.cloth_velocity.y);
-    shot.wind.air_density = 1.2, shot.wind.fluid_drag = solver == FluidSolver::incompressible;
-    size_t more = names(Stepper(shot)).size() - names(without).size();
-    EXPECT_EQ(more, solver == FluidSolver::incompressible ? 2u : 0u);  // explicit sheets: in theirs
   }
 }
 

@@ -1,0 +1,277 @@
+// Every term of the physics, one by one: a shot without it has no pass and no column of it, and
+// the same bits as with its coefficient explicitly zero, or with the thing out of reach.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "sim/simulator.h"
+#include "tests/same_bits.h"
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+using Names = std::set<std::string>;
+
+/// A block of water that falls onto a floor, all that may be left out left out.
+Shot water(FluidSolver solver) {
+  Shot shot = empty_shot();
+  shot.timeline = {1001, 1010, 100};
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.fluid.solver = solver;
+  shot.domain.axis[1] = Axis::walls;
+  shot.fluid.xsph = shot.fluid.kinematic_viscosity = 0;
+  shot.fluid.sound_speed = 20;  // m/s; chosen by itself it is ready for emitters yet to start
+  add_box(shot, V3d(-0.04, -0.985, -0.04), {8, 8, 8}, V3d(0.3, -0.5, 0));
+  return shot;
+}
+/// The same above a sheet that is pinned at its edges.
+Shot on_sheet(FluidSolver solver) {
+  Shot shot = water(solver);
+  pin_edges(add_sheet(shot, 0.2, -0.99, 8));
+  Cloth& sheet = shot.cloth[0];
+  sheet.retardation_time = sheet.damping = sheet.spring_damping = 0;
+  return shot;
+}
+
+enum class Leaves {
+  the_plan,  // a zero: no pass, no column
+  the_bits   // out of reach: its passes are there and find nothing
+};
+
+struct Term {
+  const char* name;
+  FluidSolver solver;
+  Shot (*without)(FluidSolver);
+  void (*with)(Shot&);
+  void (*idle)(Shot&);  // explicitly zero, or out of reach
+  Leaves leaves;
+  Names pass, group;  // that the term brings: names of the plan, and of groups of columns
+};
+
+void blow(Shot& shot) {
+  shot.wind.present = true, shot.wind.velocity = V3d(9, 0, 0), shot.wind.fluid_drag = 0;
+}
+void blow_on_fluid(Shot& shot) { blow(shot), shot.wind.fluid_drag = 1; }
+void still_air(Shot& shot) { blow_on_fluid(shot), shot.wind.air_density = 0; }
+void ball(Shot& shot, const V3d& centre) {
+  Obstacle obstacle;
+  obstacle.name = "ball", obstacle.type = ObstacleType::sphere, obstacle.radius = 0.03;
+  obstacle.position = centre;
+  shot.obstacle.push_back(obstacle);
+}
+void drain(Shot& shot, const V3d& centre) {
+  Sink sink;
+  sink.shape.name = "drain", sink.shape.type = ObstacleType::sphere, sink.shape.radius = 0.03;
+  sink.shape.position = centre;
+  shot.sink.push_back(sink);
+}
+void inlet(Shot& shot, double start) {
+  FluidEmitter emitter;
+  emitter.center = V3d(0, -0.5, 0), emitter.radius = 0.03, emitter.speed = 1, emitter.start = start;
+  shot.fluid.emitter.push_back(emitter);
+}
+
+constexpr FluidSolver projected = FluidSolver::incompressible,
+                      compressible = FluidSolver::weakly_compressible;
+
+const Term terms[] = {
+    {"xsph",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.xsph = 0.05; },
+     [](Shot& s) { s.fluid.xsph = 0; },
+     Leaves::the_plan,
+     {"smooth_velocities"},
+     {}},
+    {"explicit_viscosity",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.fluid.kinematic_viscosity = 0; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {}},
+    {"implicit_viscosity",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.kinematic_viscosity = 1e-2; },
+     [](Shot& s) { s.fluid.kinematic_viscosity = 0; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {"implicit viscosity"}},
+    {"surface_tension",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.surface_tension = 0.072; },
+     [](Shot& s) { s.fluid.surface_tension = 0; },
+     Leaves::the_plan,
+     {"apply_surface_tension"},
+     {"surface tension"}},
+    {"wind_on_fluid",
+     projected,
+     water,
+     blow_on_fluid,
+     still_air,
+     Leaves::the_plan,
+     {"wind_on_fluid"},
+     {}},
+    {"drag_of_fluid",
+     projected,
+     water,
+     blow_on_fluid,
+     blow,
+     Leaves::the_plan,
+     {"wind_on_fluid"},
+     {}},
+    {"wind_on_cloth",
+     projected,
+     on_sheet,
+     blow,
+     still_air,
+     Leaves::the_plan,
+     {"wind_on_cloth"},
+     {}},
+    {"wind_on_explicit_cloth", compressible, on_sheet, blow, still_air, Leaves::the_plan, {}, {}},
+    {"retardation",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].retardation_time = 0.005; },
+     [](Shot& s) { s.cloth[0].retardation_time = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].damping = 20; },
+     [](Shot& s) { s.cloth[0].damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_of_explicit_cloth",
+     compressible,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].damping = 20; },
+     [](Shot& s) { s.cloth[0].damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"emitter",
+     projected,
+     water,
+     [](Shot& s) { inlet(s, 0); },
+     [](Shot& s) { inlet(s, 1e6); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"emitter_weakly_compressible",
+     compressible,
+     water,
+     [](Shot& s) { inlet(s, 0); },
+     [](Shot& s) { inlet(s, 1e6); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"sink",
+     projected,
+     water,
+     [](Shot& s) { drain(s, V3d(0.02, -0.99, 0)); },
+     [](Shot& s) { drain(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {},
+     {"sinks"}},
+    {"sink_weakly_compressible",
+     compressible,
+     water,
+     [](Shot& s) { drain(s, V3d(0.02, -0.99, 0)); },
+     [](Shot& s) { drain(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {},
+     {"sinks"}},
+    {"obstacle",
+     projected,
+     water,
+     [](Shot& s) { ball(s, V3d(0.1, -0.99, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {"predict_around_obstacles", "project_around_obstacles"},
+     {"obstacles"}},
+};
+
+void PrintTo(const Term& term, std::ostream* out) { *out << term.name; }
+
+class SkipTerm : public testing::TestWithParam<Term> {};
+INSTANTIATE_TEST_SUITE_P(All, SkipTerm, testing::ValuesIn(terms),
+                         [](const auto& p) { return p.param.name; });
+
+struct Found {
+  Names pass, group;
+  unsigned allocated = 0;
+};
+/// The plan of a shot and the columns that it has after some steps.
+Found found_in(const Shot& shot) {
+  Stepper run(shot);
+  for (int k = 0; k < 3; ++k) run.step();
+  Found found;
+  for (const sim::PassInfo& pass : run.solver->plan()) found.pass.insert(pass.name);
+  for (const sim::ColumnMemory& group : run.solver->memory()) found.group.insert(group.name);
+  found.allocated = run.solver->allocated();
+  return found;
+}
+Names beyond(const Names& all, const Names& base) {
+  Names more;
+  std::set_difference(all.begin(), all.end(), base.begin(), base.end(),
+                      std::inserter(more, more.end()));
+  return more;
+}
+
+/// Particles and cloth after a tenth of a second.
+struct End {
+  ParticleFrame fluid;
+  std::vector<ClothFrame> cloth;
+};
+End end_of(const Shot& shot) {
+  Simulator simulator(shot, {.device = Device::cpu, .checkpoint_dir = {}, .level_set = {}});
+  for (int k = 0; k < 10; ++k) simulator.advance_frame();
+  return {simulator.particles(), simulator.cloth()};
+}
+bool same(const End& a, const End& b) {
+  bool equal = test::same_bits(a.fluid.position, b.fluid.position) &&
+               test::same_bits(a.fluid.velocity, b.fluid.velocity) &&
+               test::same_bits(a.fluid.density, b.fluid.density) && a.fluid.id == b.fluid.id;
+  for (size_t k = 0; k < a.cloth.size(); ++k) {
+    equal = equal && test::same_bits(a.cloth[k].mesh.position, b.cloth[k].mesh.position) &&
+            test::same_bits(a.cloth[k].mesh.velocity, b.cloth[k].mesh.velocity);
+  }
+  return equal;
+}
+
+TEST_P(SkipTerm, HasPassesAndColumnsOnlyWhereItIs) {
+  const Term& term = GetParam();
+  const Shot without = term.without(term.solver);
+  Shot with = without, idle = without;
+  term.with(with), term.idle(idle);
+  const Found none = found_in(without), zero = found_in(idle), some = found_in(with);
+  EXPECT_EQ(beyond(some.pass, none.pass), term.pass);
+  EXPECT_EQ(beyond(some.group, none.group), term.group);
+  if (term.leaves == Leaves::the_bits) return;
+  EXPECT_EQ(none.pass, zero.pass);
+  EXPECT_EQ(none.group, zero.group);
+  EXPECT_EQ(none.allocated, zero.allocated);
+}
+
+TEST_P(SkipTerm, IdleChangesNoBit) {
+  const Term& term = GetParam();
+  const Shot without = term.without(term.solver);
+  Shot with = without, idle = without;
+  term.with(with), term.idle(idle);
+  const End none = end_of(without);
+  EXPECT_TRUE(same(none, end_of(idle)));
+  EXPECT_FALSE(same(none, end_of(with)));  // the scene does meet the term
+}
+
+}  // namespace
+}  // namespace drench::sim_tests
