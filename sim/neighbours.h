@@ -16,6 +16,7 @@
 // clang-format on
 
 #include <limits>
+#include <vector>
 
 #include "pipeline/contract/error.h"
 #include "sim/pairs.h"
@@ -35,6 +36,10 @@ struct NeighbourLists {
   Column<float> closeness;
   Column<unsigned> begin;  // first block of a particle; on the GPU one past the last one too
   Column<int> blocks;
+  struct Range {
+    int begin, end;
+  };
+  std::vector<Range> visits;  // on the CPU: particles in the order in which passes go over them
 };
 
 struct NeighbourView {
