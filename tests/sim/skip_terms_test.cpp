@@ -22,6 +22,7 @@ Shot water(FluidSolver solver) {
   shot.gravity = V3d(0, -9.81, 0);
   shot.fluid.solver = solver;
   shot.domain.axis[1] = Axis::walls;
+  shot.time_step = solver == FluidSolver::incompressible ? 1e-3 : 2e-4;
   shot.fluid.xsph = shot.fluid.kinematic_viscosity = 0;
   shot.fluid.sound_speed = 20;  // m/s; chosen by itself it is ready for emitters yet to start
   add_box(shot, V3d(-0.04, -0.985, -0.04), {8, 8, 8}, V3d(0.3, -0.5, 0));
@@ -140,6 +141,14 @@ const Term terms[] = {
      on_sheet,
      [](Shot& s) { s.cloth[0].retardation_time = 0.005; },
      [](Shot& s) { s.cloth[0].retardation_time = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_of_springs",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].spring_damping = 0.1; },
+     [](Shot& s) { s.cloth[0].spring_damping = 0; },
      Leaves::the_plan,
      {},
      {}},
