@@ -8,6 +8,7 @@
 #include "sim/passes/measure_density.h"
 #include "sim/passes/obstacle_guard.h"
 #include "sim/passes/probe.h"
+#include "sim/passes/surface_tension.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/state_memory.h"
 #include "sim/step_plan.h"
@@ -198,7 +199,8 @@ class BackendSolver : public Solver {
     const std::vector<long long> stopped = to_host(o.stopped, o.stopped.size());
     std::vector<ObstacleImpulse> impulses(o.count);
     for (int k = 0; k < o.count && state_.dt > 0; ++k) {
-      const Impulse pressure = pressure_impulse(state_, k);
+      Impulse pressure = pressure_impulse(state_, k);
+      if (allocated_ & column_tension) pressure = Impulse{}(pressure, tension_impulse(state_, k));
       const double push[3] = {pressure.x, pressure.y, pressure.z};
       for (int c = 0; c < 3; ++c) {
         impulses[k].impulse[c] = push[c] + double(stopped[4 * k + c]) / ObstacleGuard::unit *

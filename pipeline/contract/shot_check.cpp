@@ -269,15 +269,6 @@ class Checker {
       refuse("the shot's fluid is weakly compressible, which has none",
              "Use fluid.solver = \"incompressible\"");
     }
-    if (!shot_.cloth.empty())
-      refuse("the shot has cloth, which does not know it", "Remove the cloth");
-    if (!shot_.obstacle.empty()) {
-      refuse("the shot has obstacles, which do not know it", "Remove the obstacles");
-    }
-    for (const Axis axis : shot_.domain.axis) {
-      if (axis == Axis::periodic)
-        refuse("an axis is \"periodic\", where it has not been verified", "Use walls or open ends");
-    }
     if (shot_.fluid.support_ratio > 0) {
       refuse(fmt::format("fluid.support_ratio is {}, at which its strength has not been measured",
                          shot_.fluid.support_ratio),

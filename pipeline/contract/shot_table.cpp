@@ -120,8 +120,8 @@ std::vector<Parameter> fluid_rows() {
                                        "of the fluid; water has 1e-6"),
       row<&Fluid::surface_tension>(
           "fluid", "surface_tension", "N/m", {0, 100}, simulate,
-          "of the incompressible solver: surface tension against air; water has 0.072. Not with "
-          "cloth, obstacles or periodic axes"),
+          "of the incompressible solver: surface tension against air; water has 0.072. Surfaces "
+          "meet walls, obstacles and sheets at a right angle"),
       row<&Fluid::artificial_viscosity>(
           "fluid", "artificial_viscosity", "", {0, 10}, simulate,
           "of the weakly compressible solver: alpha of Monaghan 1992; 0 is none"),

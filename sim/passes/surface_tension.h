@@ -6,13 +6,16 @@
 // opposite and along the line between particles: momentum and angular momentum are kept. They
 // vanish inside, where forces between all pairs (Tartakovsky and Panchenko 2016; Akinci, Akinci and
 // Teschner 2013) make a solid of particles at rest; t^2 leaves the surface nearly free of stress
-// along its normal; and w vanishes at the spacing a, where neighbours are.
+// along its normal; and w vanishes at the spacing a, where neighbours are. What each particle gets
+// is averaged over its neighbourhood, equal and opposite between neighbours, as w does not know how
+// these stand: without it a drop at rest stirs twice as much.
 //
 // sigma is N/m by one constant k, measured: a drop's period and its inner pressure meet Rayleigh
 // and Laplace with the same one, at three resolutions (docs/benchmarks.md, fluid_drop).
-// Walls are mirrors: surfaces meet them at a right angle.
+// Walls, obstacles and sheets are mirrors: surfaces meet them at a right angle.
 
 #include "sim/passes/mirror_images.h"
+#include "sim/passes/obstacle_share.h"
 #include "sim/passes/pressure_rows.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -49,8 +52,8 @@ struct ColourGradient {
     gradient[i] = {scale * s.x, scale * s.y, scale * s.z, 0.f};
   }
   /// Of an image.
-  DRENCH_HD Vec3<float> operator()(int, int, int, Vec3<float> x, float u) const {
-    return x * (scale * WendlandC2::slope(u));
+  DRENCH_HD Vec3<float> operator()(int, int, const Image& image) const {
+    return image.x * (scale * WendlandC2::slope(image.u));
   }
 };
 
@@ -83,21 +86,21 @@ struct SmoothNormal {
     const Float4 s = sum.mean;
     normal[i] = {scale * s.x, scale * s.y, scale * s.z, 0.f};
   }
-  DRENCH_HD Vec3<float> operator()(int, int j, int flip, Vec3<float>, float u) const {
-    return mirrored(gradient[j], flip) * (scale * WendlandC2::value(u));
+  DRENCH_HD Vec3<float> operator()(int, int j, const Image& image) const {
+    return image.turned(gradient[j]) * (scale * WendlandC2::value(image.u));
   }
 };
 
-constexpr float tension_constant = 29.f;  // k
+constexpr float tension_constant = 32.f;  // k
 
-/// velocity -= dt times the sum above over m.
+/// kick = -dt times the sum above over m.
 template <class Separation>
 struct TensionForce {
   static constexpr int columns = 2;
   const Float4 *place, *normal;  // normal: unit; w: s
-  VecView velocity;
-  float scale;    // 1/(m^2 s), of the sum
-  float spacing;  // over h
+  Float4* kick;                  // m/s
+  float scale;                   // 1/(m^2 s), of the sum
+  float spacing;                 // over h
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
@@ -125,13 +128,45 @@ struct TensionForce {
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 s = sum.pull;
-    velocity.set(i, velocity[i] - Vec3<float>{s.x, s.y, s.z} * scale);
+    kick[i] = {-scale * s.x, -scale * s.y, -scale * s.z, 0.f};
   }
-  DRENCH_HD Vec3<float> operator()(int i, int j, int flip, Vec3<float> x, float u) const {
-    const float a = dot(mirrored(normal[i], 0), x), b = dot(mirrored(normal[j], flip), x);
-    const float square = length2(x);
+  DRENCH_HD Vec3<float> operator()(int i, int j, const Image& image) const {
+    const Vec3<float> n{normal[i].x, normal[i].y, normal[i].z}, x = image.x;
+    const float a = dot(n, x), b = dot(image.turned(normal[j]), x), square = length2(x);
     const float along = normal[i].w * (square - a * a) + normal[j].w * (square - b * b);
-    return x * (weight(u) * along);
+    return x * (weight(image.u) * along);
+  }
+};
+
+/// velocity += the kicks' mean over the neighbourhood, equal and opposite between neighbours.
+struct SmoothKick {
+  static constexpr int columns = 1;
+  const Float4* kick;
+  VecView velocity;
+  float scale;  // of the sum
+
+  DRENCH_HD bool idle() const { return false; }
+  DRENCH_HD Columns<1> inputs() const { return {{kick}}; }
+  template <class Q>
+  struct Particle {
+    Q kick;
+  };
+  template <class Q>
+  struct Sum {
+    Q change;
+  };
+  template <class T>
+  DRENCH_HD T weight(T u) const {
+    return WendlandC2::value(u);
+  }
+  template <class Q>
+  DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
+    sum.change = multiply_add(j.kick - i.kick, weight, sum.change);
+  }
+  DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
+    const Float4 k = kick[i], c = sum.change;
+    velocity.set(
+        i, velocity[i] + Vec3<float>{k.x + scale * c.x, k.y + scale * c.y, k.z + scale * c.z});
   }
 };
 
@@ -152,23 +187,70 @@ inline void make_unit(State& state) {
 template <class Term>
 void add_images(const char* name, const State& state, Float4* vector, const Term& term) {
   const MirrorImages images = mirror_images_of(state);
-  if (!images.on[0] && !images.on[1] && !images.on[2]) return;
+  if (!images.any) return;
   parallel_for(
       name, state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Vec3<float> s = images.sum(i, term);
+        const Mirrors mirrors = images.of(i);
+        if (mirrors.count == 0) return;
+        const Vec3<float> s = images.sum(i, mirrors, term).total();
         const Float4 v = vector[i];
         vector[i] = {v.x + s.x, v.y + s.y, v.z + s.z, 0.f};
       });
 }
 
-template <class Force>
-void pull_on_walls(State& state, const Force& force) {
+template <class Separation>
+TensionForce<Separation> tension_force(const State& state, Float4* kick, Separation separation) {
+  const Parameters& p = state.parameters;
+  const float a = p.spacing, h = p.support_radius;
+  const float strength = float(state.dt) * tension_constant * p.surface_tension;
+  return {state.pressure.place.data(),
+          state.tension.normal.data(),
+          kick,
+          strength / (p.rest_density * a * a * h * h * h),
+          a / h,
+          separation};
+}
+
+/// Adds what images do to kicks. A sheet owes its part until the next step, as in path_test.h.
+template <class Separation>
+void pull_on_walls(State& state, const TensionForce<Separation>& force) {
   const MirrorImages images = mirror_images_of(state);
-  if (!images.on[0] && !images.on[1] && !images.on[2]) return;
-  const VecView velocity = state.fluid.velocity.view();
+  if (!images.any) return;
+  const VecView owed = state.fluid.owed.view();
+  Float4* kick = force.kick;
+  const float mass = state.parameters.particle_mass;
   parallel_for(
-      "tension: force of walls", state.fluid.count,
-      DRENCH_LAMBDA(int i) { velocity.set(i, velocity[i] - images.sum(i, force) * force.scale); });
+      "tension: force of walls", state.fluid.count, DRENCH_LAMBDA(int i) {
+        const Mirrors mirrors = images.of(i);
+        if (mirrors.count == 0) return;
+        const ImageSums sums = images.sum(i, mirrors, force);
+        const Vec3<float> all = sums.total() * force.scale;
+        kick[i] = {kick[i].x - all.x, kick[i].y - all.y, kick[i].z - all.z, 0.f};
+        for (int k = 0; k < mirrors.count; ++k)
+          if (mirrors.mirror[k].of == nearest_sheet)
+            owed.set(i, owed[i] - sums.by[k] * (force.scale * mass));
+      });
+  state.owes |= images.any_sheet;
+}
+
+/// What surface tension gave to one obstacle in the step that was made, kg m/s.
+inline Impulse tension_impulse(const State& state, int which) {
+  const MirrorImages images = mirror_images_of(state);
+  const auto force = tension_force(state, nullptr, Straight{});
+  const double factor = double(force.scale) * state.parameters.particle_mass;
+  return parallel_reduce(
+      "obstacle: tension", state.fluid.count, Impulse{},
+      DRENCH_LAMBDA(int i) {
+        Impulse impulse;
+        const Mirrors mirrors = images.of(i);
+        for (int k = 0; k < mirrors.count; ++k) {
+          if (mirrors.mirror[k].of != which) continue;
+          const Vec3<float> s = images.sum(i, mirrors, force).by[k];
+          impulse = {factor * s.x, factor * s.y, factor * s.z};
+        }
+        return impulse;
+      },
+      Impulse{});
 }
 
 /// Uses PressureState::vector.
@@ -176,9 +258,8 @@ inline void apply_surface_tension(State& state) {
   const Parameters& p = state.parameters;
   PressureState& s = state.pressure;
   const int n = state.fluid.count;
-  const float a = p.spacing, h = p.support_radius;
-  Float4 *gradient = s.vector.data(), *normal = state.tension.normal.data();
-  const VecView velocity = state.fluid.velocity.view();
+  const float h = p.support_radius;
+  Float4 *gradient = s.vector.data(), *normal = state.tension.normal.data(), *kick = gradient;
   with_separation(p, [&](auto separation) {
     using Separation = decltype(separation);
     const float scale = gradient_scale(p) / p.rest_density;
@@ -189,12 +270,11 @@ inline void apply_surface_tension(State& state) {
     for_each_neighbour("tension: normals", s.lists, n, smooth);
     add_images("tension: normals beyond walls", state, normal, smooth);
     make_unit(state);
-    const float strength = float(state.dt) * tension_constant * p.surface_tension;
-    const TensionForce<Separation> force{
-        s.place.data(), normal,    velocity, strength / (p.rest_density * a * a * h * h * h),
-        a / h,          separation};
+    const TensionForce<Separation> force = tension_force(state, kick, separation);
     for_each_neighbour("tension: force", s.lists, n, force);
     pull_on_walls(state, force);
+    for_each_neighbour("tension: velocities", s.lists, n,
+                       SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
   });
 }
 

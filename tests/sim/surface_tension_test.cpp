@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/sim/obstacle_scenes.h"
 #include "tests/sim/support.h"
 #include "tests/validation/drop.h"
 
@@ -35,6 +36,77 @@ TEST(SurfaceTension, ADropHasThePeriodOfRayleighAndThePressureOfLaplace) {
   EXPECT_GT(drop.kept, 0.35);
 }
 
+/// A cylinder of fluid whose ends are something that its surface meets at a right angle.
+class Cylinder : public testing::TestWithParam<validation::Ends> {};
+INSTANTIATE_TEST_SUITE_P(Ends, Cylinder,
+                         testing::Values(validation::Ends::periodic, validation::Ends::walls,
+                                         validation::Ends::boxes, validation::Ends::sheets));
+
+// In a plane, n = 2: omega^2 = 6 sigma / (rho R^3), jump sigma / R. What is left is measured
+// (docs/benchmarks.md): a cylinder is up to 15 % (period) and 22 % (pressure) off, a ball 2 %.
+TEST_P(Cylinder, HasThePeriodAndThePressureOfADropInAPlane) {
+  const validation::Drop drop = validation::oscillating_cylinder(10, GetParam());
+  RecordProperty("all", std::to_string(drop.period) + " " + std::to_string(drop.jump) + " " +
+                            std::to_string(drop.current) + " " + std::to_string(drop.kept) + " " +
+                            std::to_string(drop.momentum));
+  EXPECT_NEAR(drop.period, 1, 0.2);
+  EXPECT_NEAR(drop.jump, 1, 0.3);
+  EXPECT_LT(drop.current, 0.12);
+  EXPECT_GT(drop.kept, 0.35);
+}
+
+// A block at the edge of a loose sheet, at rest, without gravity: it beads, takes the sheet along,
+// and nothing is lost between them.
+TEST(SurfaceTension, KeepsTheMomentumOfFluidAndSheet) {
+  const double a = 0.001;
+  Shot shot = tense_shot(a);
+  Cloth& sheet = add_sheet(shot, 16 * a, 0, 16);
+  sheet.thickness = 0.0002, sheet.areal_density = 0.2, sheet.damping = 0;
+  add_box(shot, V3d(-3 * a, 0.1 * a, -2 * a), {8, 3, 5});
+  Stepper run(shot);
+  double mass = double(run.scene.start.id.size()) * run.scene.parameters.particle_mass, worst = 0;
+  V3d cloth(0);
+  for (int k = 0; k < 200; ++k) {
+    run.step();
+    const sim::HostState state = run.solver->save();
+    worst = std::max(worst, total_momentum(run.scene, state).length());
+    cloth = V3d(0);
+    for (size_t v = 0; v < state.cloth_velocity.size(); ++v)
+      cloth += at(state.cloth_velocity, v) * double(run.scene.cloth.mass[v]);
+  }
+  const double scale = mass * std::sqrt(0.072 / (1000 * a));
+  RecordProperty("worst", std::to_string(worst / scale * 1e9) + "e-9 " +
+                              std::to_string(cloth.length() / scale));
+  EXPECT_LT(worst, 1e-5 * scale);
+  EXPECT_GT(cloth.length(), 1e-3 * scale);
+}
+
+// A drop that touches a ball and the corner of a box: what they get is what it loses.
+TEST(SurfaceTension, ClosesTheMomentumWithObstacles) {
+  const double a = 0.001;
+  Shot shot = tense_shot(a);
+  add_sphere(shot, V3d(0, -6 * a, 0), 6 * a);
+  add_obstacle(shot, ObstacleType::box, V3d(-8 * a, 3 * a, 0)).size = V3d(10 * a, 20 * a, 9 * a);
+  add_box(shot, V3d(-3 * a, 0.5 * a, -3 * a), {6, 5, 6});
+  Stepper run(shot);
+  const double scale = double(run.scene.start.id.size()) * run.scene.parameters.particle_mass *
+                       std::sqrt(0.072 / (1000 * a));
+  V3d given(0), most(0);
+  double worst = 0;
+  for (int k = 0; k < 200; ++k) {
+    run.step();
+    for (const sim::ObstacleImpulse& i : run.solver->obstacle_impulses())
+      given += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
+    const V3d left = total_momentum(run.scene, run.solver->save());
+    worst = std::max(worst, (left + given).length());
+    for (int c = 0; c < 3; ++c) most[c] = std::max(most[c], std::abs(left[c]));
+  }
+  RecordProperty("worst", std::to_string(worst / scale * 1e9) + "e-9 " +
+                              std::to_string(most.length() / scale));
+  EXPECT_LT(worst, 1e-5 * scale);
+  EXPECT_GT(most.length(), 1e-2 * scale);
+}
+
 // sqrt(3) / 2 of the side over the radius of its ball is 1.396.
 TEST(SurfaceTension, ACubeOfWaterBecomesASphereAndShedsNothing) {
   const validation::Rounding cube = validation::cube_to_sphere(14);
@@ -43,7 +115,8 @@ TEST(SurfaceTension, ACubeOfWaterBecomesASphereAndShedsNothing) {
   EXPECT_LT(cube.spread, 0.05);
 }
 
-// A particle 1.6 spacings above a block's top layer, at rest, without gravity.
+// A particle 1.6 spacings above a block's top layer, at rest, without gravity. It is there after
+// 0.04 s; 0.03 before forces were averaged, which takes from what pulls a single one.
 TEST(SurfaceTension, AStrayParticleIsGathered) {
   const double a = 0.001;
   Shot shot = tense_shot(a);
@@ -55,7 +128,7 @@ TEST(SurfaceTension, AStrayParticleIsGathered) {
     return (at(state.position, size_t(place_of_id(state)[216])) - centre_of_mass(state)).length();
   };
   EXPECT_GT(distance(), 4.5 * a);
-  run.advance(0.03);
+  run.advance(0.05);
   EXPECT_LT(distance(), 4 * a);
 }
 

@@ -14,6 +14,7 @@ namespace {
 using sim_tests::Stepper;
 
 constexpr double sigma = 0.072, rho = 1000, R = 0.01;  // N/m, kg/m^3, m
+constexpr int long_cells = 8;                          // of a cylinder, along its axis
 constexpr double pi = 3.14159265358979323846;
 
 Shot weightless(double spacing) {
@@ -24,6 +25,14 @@ Shot weightless(double spacing) {
   return shot;
 }
 
+/// A ball, or a piece of a cylinder along z.
+struct Body {
+  double radius, omega, jump;  // m; rad/s, of mode 2; Pa
+  bool cylinder;
+
+  V3d across(V3d x) const { return cylinder ? V3d(x.x, x.y, 0) : x; }
+};
+
 /// Radius of a ball of the particles' volume, m.
 double radius_of(const sim::Scene& scene) {
   const double volume =
@@ -32,6 +41,18 @@ double radius_of(const sim::Scene& scene) {
 }
 
 double rayleigh(double radius) { return std::sqrt(8 * sigma / (rho * std::pow(radius, 3))); }
+
+Body ball_of(const sim::Scene& scene) {
+  const double radius = radius_of(scene);
+  return {radius, rayleigh(radius), 2 * sigma / radius, false};
+}
+
+/// Rayleigh 1879, n = 2 in a plane: omega^2 = n (n^2 - 1) sigma / (rho R^3).
+Body cylinder_of(const sim::Scene& scene) {
+  const double a = scene.parameters.spacing;
+  const double radius = a * std::sqrt(double(scene.start.id.size()) / (long_cells * pi));
+  return {radius, std::sqrt(6 * sigma / (rho * std::pow(radius, 3))), sigma / radius, true};
+}
 
 /// Speeds scaled by `share` after every step: a lattice settles.
 void settle(Stepper& run, double seconds, double share) {
@@ -44,13 +65,15 @@ void settle(Stepper& run, double seconds, double share) {
   }
 }
 
-/// Particles more than 1.5 supports below the surface.
-std::vector<size_t> inner(const Stepper& run, const sim::HostState& state, double radius) {
+/// Particles more than 1.5 supports below the surface; of a cylinder in the middle of its length.
+std::vector<size_t> inner(const Stepper& run, const sim::HostState& state, const Body& body) {
   std::vector<size_t> inside;
   const V3d centre = sim_tests::centre_of_mass(state);
   for (size_t i = 0; i < state.id.size(); ++i) {
     const V3d off = sim_tests::at(state.position, i) - centre;
-    if (off.length() < radius - 1.5 * run.scene.parameters.support_radius) inside.push_back(i);
+    const double h = run.scene.parameters.support_radius, a = run.scene.parameters.spacing;
+    if (body.across(off).length() > body.radius - 1.5 * h) continue;
+    if (!body.cylinder || std::abs(off.z) < 0.5 * long_cells * a - h) inside.push_back(i);
   }
   return inside;
 }
@@ -72,14 +95,15 @@ double response(const Stepper& run, const sim::HostState& state,
   return sum / double(inside.size());
 }
 
-void measure_rest(Stepper& run, double radius, double omega, Drop& drop) {
+void measure_rest(Stepper& run, const Body& body, Drop& drop) {
+  const double radius = body.radius, omega = body.omega;
   double pressure = 0, square = 0;
   int count = 0;
   sim::HostState state = run.solver->save();
   for (const double end = run.time + 2 * pi / omega; run.time < end; ++count) {
     run.step();
     state = run.solver->save();
-    const std::vector<size_t> inside = inner(run, state, radius);
+    const std::vector<size_t> inside = inner(run, state, body);
     double q = 0;
     for (const size_t i : inside) q += state.pressure_term[i];
     pressure += rho * rho * q / double(inside.size());
@@ -93,32 +117,36 @@ void measure_rest(Stepper& run, double radius, double omega, Drop& drop) {
     square += speed2 / n;
     drop.momentum = std::max(drop.momentum, sum.length() / (n * radius * omega));
   }
-  pressure *= response(run, state, inner(run, state, radius)) / count;
-  drop.jump = pressure / (2 * sigma / radius);
+  pressure *= response(run, state, inner(run, state, body)) / count;
+  drop.jump = pressure / body.jump;
   drop.current = std::sqrt(square / count) / (radius * omega);
 }
 
-/// Second moment along z less the mean of the others, over that of a ball.
-double elongation(const sim::HostState& state, double radius) {
+/// Second moment along z less the mean of the others, over that of a ball; of a cylinder along y
+/// less that along x.
+double elongation(const sim::HostState& state, const Body& body) {
   const V3d centre = sim_tests::centre_of_mass(state);
   V3d moment(0);
   for (size_t i = 0; i < state.id.size(); ++i) {
     const V3d x = sim_tests::at(state.position, i) - centre;
     moment += V3d(x.x * x.x, x.y * x.y, x.z * x.z);
   }
-  return (moment.z - 0.5 * (moment.x + moment.y)) / double(state.id.size()) /
-         (0.2 * radius * radius);
+  const double long_one =
+      body.cylinder ? moment.y - moment.x : moment.z - 0.5 * (moment.x + moment.y);
+  return long_one / double(state.id.size()) / (0.2 * body.radius * body.radius);
 }
 
-/// Set going by the velocity of mode 2, (-x, -y, 2 z); the period is that between the first and the
-/// third time that it passes through the sphere.
-void measure_period(Stepper& run, double radius, double omega, Drop& drop) {
+/// Set going by the velocity of mode 2, (-x, -y, 2 z) or (-x, y); the period is that between the
+/// first and the third time that it passes through the round shape.
+void measure_period(Stepper& run, const Body& body, Drop& drop) {
+  const double omega = body.omega;
   sim::HostState state = run.solver->save();
   const V3d centre = sim_tests::centre_of_mass(state);
   for (size_t i = 0; i < state.id.size(); ++i) {
     const V3d v = (sim_tests::at(state.position, i) - centre) * (0.1 * omega);
-    state.velocity.x[i] = float(-0.5 * v.x), state.velocity.y[i] = float(-0.5 * v.y);
-    state.velocity.z[i] = float(v.z);
+    state.velocity.x[i] = float(body.cylinder ? -v.x : -0.5 * v.x);
+    state.velocity.y[i] = float(body.cylinder ? v.y : -0.5 * v.y);
+    state.velocity.z[i] = body.cylinder ? 0.f : float(v.z);
   }
   run.solver->load(state);
   const double start = run.time, limit = start + 5 * pi / omega;
@@ -127,7 +155,7 @@ void measure_period(Stepper& run, double radius, double omega, Drop& drop) {
   while (crossing.size() < 3 && run.time < limit) {
     before = run.time;
     run.step();
-    const double now = elongation(run.solver->save(), radius);
+    const double now = elongation(run.solver->save(), body);
     extreme.back() = std::max(extreme.back(), std::abs(now));
     if (run.time > start + 0.3 / omega && last * now < 0) {
       crossing.push_back(before + (run.time - before) * last / (last - now));
@@ -139,6 +167,72 @@ void measure_period(Stepper& run, double radius, double omega, Drop& drop) {
   drop.kept = extreme.size() < 3 ? 0 : extreme[2] / extreme[0];
 }
 
+Drop measure(Stepper& run, const Body& body) {
+  Drop drop;
+  drop.particles = int(run.scene.start.id.size());
+  settle(run, 0.8 * 2 * pi / body.omega, 0.95);
+  measure_rest(run, body, drop);
+  measure_period(run, body, drop);
+  return drop;
+}
+
+/// A cylinder along z, from 0 to `length`, m, between what its ends stand on.
+Shot between(Ends ends, double spacing, double length) {
+  Shot shot = weightless(spacing);
+  const double wide = 3 * R, thick = 0.2 * spacing;
+  shot.domain.min.z = ends == Ends::walls || ends == Ends::periodic ? 0 : -wide;
+  shot.domain.max.z = length - shot.domain.min.z;
+  if (ends == Ends::walls) shot.domain.axis[2] = Axis::walls;
+  if (ends == Ends::periodic) shot.domain.axis[2] = Axis::periodic;
+  for (const int side : {-1, 1}) {
+    const double face = side < 0 ? 0 : length;
+    if (ends == Ends::boxes) {
+      Obstacle slab;
+      slab.type = ObstacleType::box, slab.size = V3d(2 * wide, 2 * wide, wide);
+      slab.position = V3d(0, 0, face + side * wide / 2);
+      slab.name = side < 0 ? "lower" : "upper";
+      shot.obstacle.push_back(slab);
+    }
+    if (ends == Ends::sheets) {
+      Cloth sheet;
+      sheet.name = side < 0 ? "lower" : "upper", sheet.thickness = thick;
+      sheet.corner = V3d(-wide / 2, -wide / 2, face + side * thick / 2);
+      sheet.u = V3d(wide, 0, 0), sheet.v = V3d(0, wide, 0), sheet.cells = V2i(12, 12);
+      ClothPin all;
+      for (uint32_t v = 0; v < 13 * 13; ++v) all.vertices.push_back(v);
+      sheet.pin.push_back(all);
+      shot.cloth.push_back(sheet);
+    }
+  }
+  return shot;
+}
+
+/// The lattice points within the radius, in place of the sources' particles. Shaken: straight rows
+/// along the axis would stay.
+sim::HostState cylinder_of_particles(const sim::Scene& scene) {
+  sim::HostState start;
+  start.cloth_position = scene.start.cloth_position;
+  start.cloth_velocity = scene.start.cloth_velocity;
+  const double a = scene.parameters.spacing;
+  const int reach = int(R / a) + 1;
+  sim_tests::Random random(7);
+  const auto shake = [&] { return 0.3 * (random() - 0.5); };
+  for (int k = 0; k < long_cells; ++k) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int x = -reach; x <= reach; ++x) {
+        if (V3d(x + 0.13, y + 0.1, 0).length() * a > R) continue;
+        const V3d p = V3d(x + 0.13 + shake(), y + 0.1 + shake(), k + 0.5 + shake()) * a;
+        start.position.push(scene.frame.to_local(0, p.x), scene.frame.to_local(1, p.y),
+                            scene.frame.to_local(2, p.z));
+        start.velocity.push(0, 0, 0), start.owed.push(0, 0, 0);
+        start.id.push_back(int(start.id.size()));
+        start.memory_triangle.push_back(-1), start.memory_side.push_back(1);
+      }
+    }
+  }
+  return start;
+}
+
 }  // namespace
 
 Drop oscillating_drop(double radius_in_spacings) {
@@ -147,13 +241,17 @@ Drop oscillating_drop(double radius_in_spacings) {
   ball.center = V3d(0.00013, 0.0001, 0.00007), ball.radius = R;  // no symmetry with the lattice
   shot.fluid.sphere = {ball};
   Stepper run(shot);
-  const double radius = radius_of(run.scene), omega = rayleigh(radius);
-  Drop drop;
-  drop.particles = int(run.scene.start.id.size());
-  settle(run, 0.8 * 2 * pi / omega, 0.95);
-  measure_rest(run, radius, omega, drop);
-  measure_period(run, radius, omega, drop);
-  return drop;
+  return measure(run, ball_of(run.scene));
+}
+
+Drop oscillating_cylinder(double radius_in_spacings, Ends ends) {
+  const double a = R / radius_in_spacings;
+  Shot shot = between(ends, a, long_cells * a);
+  sim_tests::add_box(shot, V3d(0), {1, 1, long_cells});
+  sim::Scene scene = sim::build_scene(shot, {});
+  scene.start = cylinder_of_particles(scene);
+  Stepper run(std::move(scene));
+  return measure(run, cylinder_of(run.scene));
 }
 
 Rounding cube_to_sphere(int side) {

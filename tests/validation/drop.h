@@ -14,6 +14,11 @@ struct Drop {
 /// @param radius  in spacings; R is that of a ball of the particles' volume.
 Drop oscillating_drop(double radius);
 
+/// The same in a plane: a cylinder between ends that its surface meets at a right angle, or without
+/// any. Over sqrt(rho R^3 / (6 sigma)) and sigma / R.
+enum class Ends { periodic, walls, boxes, sheets };
+Drop oscillating_cylinder(double radius, Ends ends);
+
 /// A cube of side^3 particles left alone for four periods of its drop: what became of it.
 struct Rounding {
   double farthest = 0;  // particle centre from the centre of mass, plus half a spacing, over R
