@@ -205,6 +205,7 @@ ObstaclePlacement ObstacleSet::placement(Entry& entry, double begin, double end)
   // A level set has convex corners rounded off by up to half a voxel.
   const bool field = p.shape == ObstacleShape::field;
   p.clearance = float((field ? 0.5 * voxel : 0.1) * shot_.fluid.spacing);
+  p.friction = float(o.friction);
   if (entry.deforms) {
     const Bracket& bracket = *entry.bracket;
     const double length = bracket.end - bracket.begin;

@@ -11,11 +11,11 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
   };
   const double h = p.support_radius, a = p.spacing;
   const double viscosity = double(p.dynamic_viscosity) / p.rest_density;
-  if (p.fluid && p.incompressible) {
+  if (sheets_are_implicit(p)) {
     const double g = std::hypot(p.gravity[0], p.gravity[1], p.gravity[2]);
     // What has not moved yet may be about to: the sound speed is ten times what is expected.
     const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
-    consider(0.4 * a / speed, "speed");
+    if (speed > 0) consider(0.4 * a / speed, "speed");
     if (p.surface_tension > 0)
       consider(0.25 * std::sqrt(p.rest_density * a * a * a / (2 * M_PI * p.surface_tension)),
                "surface tension");

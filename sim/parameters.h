@@ -53,6 +53,12 @@ inline bool viscosity_is_implicit(const Parameters& p, double dt) {
   return p.incompressible && viscous_strength(p, dt) > 0.01f;
 }
 
+/// Whether sheets make implicit steps (sim/passes/cloth_implicit.h), or explicit substeps: these
+/// have nothing that holds a vertex at an obstacle.
+inline bool sheets_are_implicit(const Parameters& p) {
+  return p.fluid ? p.incompressible : p.obstacles > 0;
+}
+
 /// Bounds that rule the next step, from the state at the end of a step.
 struct Limits {
   float max_speed = 0;         // m/s, fluid and cloth
@@ -72,7 +78,8 @@ struct Limits {
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
 /// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003, and
 /// a step follows the one before: half of it when its solve was cut short; surface tension 0.25
-/// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none.
+/// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none. Implicit sheets alone
+/// keep to the two of speed and gravity.
 struct StepLimit {
   double dt;
   const char* name;

@@ -424,6 +424,25 @@ void check_overlap(const Shot& shot, const Scene& scene) {
   }
 }
 
+/// Refuses free vertices farther inside an obstacle than the first step may move them out.
+void check_cloth_outside(const Shot& shot, Scene& scene) {
+  if (scene.obstacles.count() == 0) return;
+  for (size_t s = 0; s < scene.sheet.size(); ++s) {
+    const Sheet& sheet = scene.sheet[s];
+    for (size_t v = 0; v < sheet.position.size(); ++v) {
+      const V3d p = sheet.position[v];
+      if (sheet.pinned[v]) continue;
+      const double distance = scene.obstacles.distance(p, -shot.preroll);
+      if (distance > -0.25 * shot.fluid.spacing) continue;
+      throw Error(
+          fmt::format("{}: cloth \"{}\" starts inside an obstacle: vertex {} at ({:.4g}, {:.4g}, "
+                      "{:.4g}) m is {:.2g} m deep in it. Move the cloth or the obstacle, or pin "
+                      "the vertex: pinned ones may be inside",
+                      shot.file.string(), sheet.name, v, p.x, p.y, p.z, -distance));
+    }
+  }
+}
+
 }  // namespace
 
 bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
@@ -475,8 +494,9 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   }
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
-      scene.parameters.incompressible ? 1e30f : float(std::min(dt_limit, 1e-3));
+      sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
   check_overlap(shot, scene);
+  check_cloth_outside(shot, scene);
   return scene;
 }
 

@@ -6,9 +6,8 @@
 #include <map>
 
 #include "sim/passes/measure_density.h"
-#include "sim/passes/obstacle_guard.h"
+#include "sim/passes/obstacle_impulse.h"
 #include "sim/passes/probe.h"
-#include "sim/passes/surface_tension.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/state_memory.h"
 #include "sim/step_plan.h"
@@ -200,11 +199,14 @@ class BackendSolver : public Solver {
     std::vector<ObstacleImpulse> impulses(o.count);
     for (int k = 0; k < o.count && state_.dt > 0; ++k) {
       Impulse pressure = pressure_impulse(state_, k);
-      if (allocated_ & column_tension) pressure = Impulse{}(pressure, tension_impulse(state_, k));
+      if (allocated_ & column_tension) pressure = pressure(pressure, tension_impulse(state_, k));
+      if (state_.contact.near > 0) {
+        pressure = pressure(pressure, pressure_impulse_near_sheets(state_, k));
+      }
       const double push[3] = {pressure.x, pressure.y, pressure.z};
       for (int c = 0; c < 3; ++c) {
-        impulses[k].impulse[c] = push[c] + double(stopped[4 * k + c]) / ObstacleGuard::unit *
-                                               state_.parameters.particle_mass;
+        impulses[k].impulse[c] =
+            push[c] + double(stopped[4 * k + c]) / StopSums::unit * state_.parameters.particle_mass;
       }
       impulses[k].stopped = stopped[4 * k + 3];
     }
@@ -326,6 +328,7 @@ class BackendSolver : public Solver {
                          &s.image, &s.direction, &s.direction_image})
       v->resize(c.padded);
     s.control.resize(1);
+    if (state_.parameters.obstacles > 0) s.normal.resize(c.padded), s.grip.resize(c.padded);
   }
 
   /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices

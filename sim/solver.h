@@ -54,9 +54,9 @@ struct ClothTopology {
   int triangles() const { return int(sheet.size()); }
 };
 
-/// What an obstacle received from the fluid in one step.
+/// What an obstacle received from fluid and sheets in one step.
 struct ObstacleImpulse {
-  double impulse[3] = {0, 0, 0};  // kg m/s, by pressure and by stopped particles
+  double impulse[3] = {0, 0, 0};  // kg m/s, by pressure, by stopped particles and by sheets
   int64_t stopped = 0;            // particles that pressure did not stop
 };
 

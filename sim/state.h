@@ -127,6 +127,8 @@ struct ClothSystem {
   VecColumn free;    // 1 along axes that a vertex may move on, 0 where a pin or a wall holds it
   VecColumn change;  // m, off the place where its velocity takes it: the unknown
   VecColumn answer;  // m, to the same pressure all over the sheets
+  VecColumn normal;  // unit, of the obstacle that holds a vertex; 0 where none. Only with obstacles
+  Column<int> grip;  // that obstacle; -1 none, -2 let go in this step. Only with obstacles
   VecColumn residual, scaled, image, direction, direction_image;
   Column<ClothControl> control;
 };
@@ -206,7 +208,7 @@ struct ObstacleState {
   int count = 0;
   Column<ObstacleView> view;
   std::vector<Field> field;   // two an obstacle
-  Column<long long> stopped;  // 4 an obstacle: see ObstacleGuard
+  Column<long long> stopped;  // 4 an obstacle: see StopSums
   ObstacleViews views() const { return {view.data(), count}; }
 };
 

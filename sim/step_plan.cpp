@@ -97,6 +97,14 @@ void exact_nearest(State& state) {
 }
 void exact_sides(State& state) { find_sheet_sides(state, beside_sheets(state)); }
 void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
+void settle_cloth_alone(State& state) {
+  state.contact.near = 0;
+  if (state.parameters.air_density > 0) wind_on_cloth(state);
+  linearise_cloth(state);
+  settle_sheets(state);
+  finish_sheets(state);
+  finish_substep(state.cloth);
+}
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.
 void paper_grid(State& state) { build_polygon_grid(state, 0.f); }
 void paper_reaction(State& state) {
@@ -117,9 +125,7 @@ bool around_obstacles(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.obstacles > 0;
 }
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
-bool tense(const Parameters& p, bool cloth) {
-  return projected(p, cloth) && p.surface_tension > 0;
-}
+bool tense(const Parameters& p, bool cloth) { return projected(p, cloth) && p.surface_tension > 0; }
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
@@ -136,6 +142,12 @@ bool strong_in_wind(const Parameters& p, bool cloth) {
 bool paper(const Parameters& p, bool cloth) { return p.fluid && cloth && p.paper; }
 bool fluid_alone(const Parameters& p, bool cloth) { return compressible(p, cloth) && !cloth; }
 bool cloth_alone(const Parameters& p, bool cloth) { return !p.fluid && cloth; }
+bool explicit_alone(const Parameters& p, bool cloth) {
+  return cloth_alone(p, cloth) && !sheets_are_implicit(p);
+}
+bool implicit_alone(const Parameters& p, bool cloth) {
+  return cloth_alone(p, cloth) && sheets_are_implicit(p);
+}
 
 constexpr unsigned moving = column_position | column_velocity;
 
@@ -182,7 +194,9 @@ const Pass all_passes[] = {
      column_velocity | column_contact | column_cloth, solve_contacts},
     {"paper_reaction", paper, column_contact, column_cloth, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
-    {"move_cloth", cloth_alone, column_cloth, column_cloth, move_cloth},
+    {"move_cloth", explicit_alone, column_cloth, column_cloth, move_cloth},
+    {"settle_cloth", implicit_alone, column_cloth, column_cloth | column_cloth_system,
+     settle_cloth_alone},
     {"move_with_sheets", strong, moving | column_cloth | column_cloth_system,
      moving | column_cloth | column_contact, move_with_sheets},
     {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact,
@@ -216,15 +230,7 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
 
 void step_cloth_alone(State& state) {
   state.cloth.force.clear();
-  if (state.parameters.incompressible) {
-    state.contact.near = 0;
-    if (state.parameters.air_density > 0) wind_on_cloth(state);
-    linearise_cloth(state);
-    settle_sheets(state);
-    finish_sheets(state);
-    return finish_substep(state.cloth);
-  }
-  move_cloth(state);
+  state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
 }
 
 Limits measure_limits(State& state) {

@@ -165,6 +165,7 @@ struct Obstacle {
   double radius = 0.5;                 // sphere, m
   std::filesystem::path mesh_file;     // mesh: PLY or OBJ, or a sequence: see obstacle.h
   double scale = 1;                    // mesh: of its coordinates, to m
+  double friction = 0.3;               // Coulomb's coefficient of cloth on it
   std::string material = "ground";
   bool visible = true;
 };

@@ -394,11 +394,6 @@ class Checker {
   void check_obstacle(size_t i) const {
     const Obstacle& obstacle = shot_.obstacle[i];
     const std::string path = fmt::format("obstacle[{}]", i);
-    if (!shot_.cloth.empty()) {
-      fail(path,
-           "cloth with obstacles is not supported yet; remove the [[cloth]] or the "
-           "[[obstacle]]");
-    }
     if (shot_.fluid.solver == FluidSolver::weakly_compressible) {
       fail("fluid.solver",
            "fluid.solver is \"weakly_compressible\" but the shot has obstacles, which only the "

@@ -237,6 +237,8 @@ std::vector<Parameter> obstacle_rows() {
       row<&Obstacle::scale>("obstacle", "scale", "", {1e-6, 1e6}, both,
                             "metres for a unit of the file")
           .only(mesh_type),
+      row<&Obstacle::friction>("obstacle", "friction", "", {0, 100}, simulate,
+                               "Coulomb's coefficient of cloth on it; fluid slips"),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
   };

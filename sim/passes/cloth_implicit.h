@@ -7,7 +7,8 @@
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
 // pressures give (sheet_pressure.h). Solved by conjugate gradients scaled by the 3 x 3 blocks of
 // the vertices. B is the drag of the air (wind_on_cloth.h), whose push joins f. Pinned vertices
-// stay at w = 0, and vertices that a wall of the domain holds up have the w that takes them there.
+// stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h) holds up
+// have the w that takes them there.
 
 #include "sim/passes/cloth_springs.h"
 
@@ -19,16 +20,41 @@ DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
   return {free.x * v.x, free.y * v.y, free.z * v.z};
 }
 
-/// The matrix A, by slots of springs, on free axes alone.
+/// The ways that a vertex may go: its free axes, and of these not along the normal of an obstacle.
+struct FreeWays {
+  VecView axis, normal;
+  bool obstacles;
+
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> of(Index i, Vec3<T> v) const {
+    const Vec3<T> may = along(axis.at(i), v);
+    if (!obstacles) return may;
+    const Vec3<T> n = normal.at(i);
+    return may - n * dot(n, may);
+  }
+};
+
+inline FreeWays free_ways(const State& state) {
+  const ClothSystem& s = state.cloth_system;
+  return {s.free.view(), s.normal.view(), state.parameters.obstacles > 0};
+}
+
+/// The matrix A, by slots of springs, on free ways alone.
 struct ClothMatrix {
   SpringEnds ends;
   const float *tension, *inertia;
-  VecView axis, free;
+  VecView axis;
+  FreeWays free;
   AirDrag air;
   float dt;  // s
 
   template <class Index>
   DRENCH_HD auto times(const VecView& view, Index i) const {
+    return free.of(i, whole(view, i));
+  }
+  /// On all axes: less the right side it is what holds a vertex.
+  template <class Index>
+  DRENCH_HD auto whole(const VecView& view, Index i) const {
     using T = decltype(load(inertia, i));
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
@@ -38,15 +64,19 @@ struct ClothMatrix {
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
       y = y + d * load(tension, at) + e * dot(e, d);
     }
-    return along(free.at(i), y);
+    return y;
   }
 };
 
 inline ClothMatrix cloth_matrix(const State& state) {
   const ClothSystem& s = state.cloth_system;
-  return {
-      spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(), s.axis.view(), s.free.view(),
-      air_drag_of(state),          float(state.dt)};
+  return {spring_ends_of(state.cloth),
+          s.tension.data(),
+          s.inertia.data(),
+          s.axis.view(),
+          free_ways(state),
+          air_drag_of(state),
+          float(state.dt)};
 }
 
 /// Inverses of the blocks on A's diagonal, as L D L^T.
@@ -176,7 +206,8 @@ DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
 /// s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
 struct ClothSweep {
   BlockInverse block;
-  VecView w, free, residual, scaled, image, direction, direction_image;
+  FreeWays free;
+  VecView w, residual, scaled, image, direction, direction_image;
   ClothControl* control;
   float tolerance;  // of r . z, over the reference
 
@@ -203,7 +234,7 @@ struct ClothSweep {
     direction.put(i, p), direction_image.put(i, s);
     w.put(i, w.at(i) + p * step);
     residual.put(i, left);
-    scaled.put(i, along(free.at(i), block.times(i, left)));
+    scaled.put(i, free.of(i, block.times(i, left)));
   }
 };
 
@@ -228,11 +259,11 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
   const ClothMatrix matrix = cloth_matrix(state);
   const BlockInverse block = block_inverse(state);
   ClothControl* control = s.control.data();
-  const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view(),
-                free = s.free.view();
+  const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view();
+  const FreeWays free = free_ways(state);
   const ClothSweep sweep{block,
-                         w,
                          free,
+                         w,
                          residual,
                          scaled,
                          image,
@@ -245,9 +276,9 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
       "cloth: start", 1, DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
   for_each_lane(
       "cloth: residual", n, DRENCH_LAMBDA(auto i) {
-        const auto r = along(free.at(i), right.at(i)) - matrix.times(w, i);
+        const auto r = free.of(i, right.at(i)) - matrix.times(w, i);
         residual.put(i, r);
-        scaled.put(i, along(free.at(i), block.times(i, r)));
+        scaled.put(i, free.of(i, block.times(i, r)));
       });
   for (int k = 0;; ++k) {
     sum_lanes_then(
@@ -277,7 +308,7 @@ struct SheetLack {
 /// Springs push no sheet as a whole: where nothing holds it a shift by the sum over its mass, on
 /// which they do not act, closes its momentum.
 inline void balance_loose_sheets(State& state, const VecView& w, const VecView& right) {
-  const VecView free = state.cloth_system.free.view();
+  const FreeWays free = free_ways(state);
   const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
   for (const VertexRange& sheet : state.cloth.loose) {
@@ -286,8 +317,10 @@ inline void balance_loose_sheets(State& state, const VecView& w, const VecView& 
         "cloth: lack", sheet.count, SheetLack{},
         DRENCH_LAMBDA(int k) {
           const int i = first + k;
-          const Vec3<float> left = right[i] - matrix.times(w, i), may = free[i];
-          return SheetLack{left.x, left.y, left.z, matrix.inertia[i], 3. - may.x - may.y - may.z};
+          const Vec3<float> left = right[i] - matrix.times(w, i), may = free.axis[i];
+          const double gripped = free.obstacles && length2(free.normal[i]) > 0.f ? 1. : 0.;
+          return SheetLack{left.x, left.y, left.z, matrix.inertia[i],
+                           3. - may.x - may.y - may.z + gripped};
         },
         SheetLack{},
         DRENCH_LAMBDA(const SheetLack& lack) {

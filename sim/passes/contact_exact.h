@@ -105,8 +105,8 @@ struct ContactView {
   }
 };
 
-inline ContactView contact_rows(State& state) {
-  ContactState& c = state.contact;
+inline ContactView contact_rows(const State& state) {
+  const ContactState& c = state.contact;
   const auto ints = [&](int k) { return c.index.data() + k * c.stride; };
   const auto floats = [&](int k) { return c.field.data() + size_t(k) * c.stride; };
   const auto vectors = [&](int k) { return VecView{floats(k), floats(k + 1), floats(k + 2)}; };

@@ -1,68 +1,10 @@
 #pragma once
 // The end of a step: particles and cloth move to their new places.
 
-#include "sim/passes/cloth_springs.h"
+#include "sim/passes/cloth_obstacles.h"
 #include "sim/passes/path_test.h"
-#include "sim/periodic.h"
 
 namespace drench::sim::DRENCH_BACKEND {
-
-/// Symplectic Euler inside the walls: velocity first, then position. A particle that still reaches
-/// the last tenth of a spacing before a wall stops there (the wall's pressure has failed it). One
-/// that leaves through a periodic side comes in at the other.
-struct Mover {
-  float low[3], high[3];
-  bool wall[3], periodic[3];
-  float dt;
-
-  DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
-    float p[3] = {x.x + dt * v.x, x.y + dt * v.y, x.z + dt * v.z}, u[3] = {v.x, v.y, v.z};
-    for (int k = 0; k < 3; ++k) {
-      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
-      if (!wall[k]) continue;
-      if (p[k] < low[k]) p[k] = low[k], u[k] = max0(u[k]);
-      if (p[k] > high[k]) p[k] = high[k], u[k] = -max0(-u[k]);
-    }
-    v = {u[0], u[1], u[2]};
-    return {p[0], p[1], p[2]};
-  }
-  DRENCH_HD Vec3<float> wrapped(Vec3<float> x) const {
-    float p[3] = {x.x, x.y, x.z};
-    for (int k = 0; k < 3; ++k)
-      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
-    return {p[0], p[1], p[2]};
-  }
-  DRENCH_HD Vec3<float> inside(Vec3<float> x) const {
-    float p[3] = {x.x, x.y, x.z};
-    for (int k = 0; k < 3; ++k)
-      if (wall[k]) p[k] = minimum(maximum(p[k], low[k]), high[k]);
-    return {p[0], p[1], p[2]};
-  }
-};
-
-inline Mover mover_of(const Parameters& p, float dt) {
-  Mover mover{{}, {}, {}, {}, dt};
-  for (int k = 0; k < 3; ++k) {
-    const float margin = p.periodic[k] ? 0.f : 0.1f * p.spacing;
-    mover.wall[k] = p.wall[k], mover.periodic[k] = p.periodic[k];
-    mover.low[k] = p.low[k] + margin, mover.high[k] = p.high[k] - margin;
-  }
-  return mover;
-}
-
-/// The same without periodic sides, for paths: they go on beyond the seam, where the images of
-/// triangles are, and `wrap_positions` ends them.
-inline Mover path_mover_of(const Parameters& p, float dt) {
-  Mover mover = mover_of(p, dt);
-  for (bool& axis : mover.periodic) axis = false;
-  return mover;
-}
-inline void wrap_positions(State& state) {
-  const Mover mover = mover_of(state.parameters, 0.f);
-  const VecView x = state.fluid.position.view();
-  parallel_for(
-      "wrap", state.fluid.count, DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
-}
 
 inline void move_particles(State& state) {
   FluidState& f = state.fluid;
@@ -162,12 +104,15 @@ inline Tested tested_of(const State& state, float cloth_moved) {
           all ? state.fluid.count : state.contact.guard_count, all};
 }
 
+DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
 /// One round: where each particle ends, into f.impulse.
 inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
   const Drift drift = drift_of(state);
   const Mover mover = path_mover_of(state.parameters, dt);
+  const ObstacleGuard guard = obstacle_guard_of(state, 0);
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
   return parallel_reduce(
@@ -181,12 +126,22 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
         GuardCount result;
         if (triangle[i] < 0 || test.in_reach(i, to)) {
           const Vec3<float> wanted = to;
-          if (!test.resolve(i, x[i], to)) {
+          bool clear = test.resolve(i, x[i], to);
+          // What the sheet has turned aside may now meet an obstacle, and the other way round.
+          for (int turn = 0; guard.obstacles.count > 0 && turn < 4; ++turn) {
+            if (!clear || (!held[i] && same(to, wanted))) break;
+            Vec3<float> u = v[i];
+            const Vec3<float> out = guard(x[i], to, u);
+            if (same(out, to)) break;
+            v.set(i, u);
+            to = out;
+            clear = test.resolve(i, x[i], to);
+          }
+          if (!clear) {
             result.unresolved = 1;
             held[i] = held[i] || test.stopped[i] < 0;  // nothing left to stop but itself
           }
-          result.hits =
-              result.unresolved || to.x != wanted.x || to.y != wanted.y || to.z != wanted.z;
+          result.hits = result.unresolved || !same(to, wanted);
         }
         end.set(i, to);
         return result;
@@ -229,6 +184,7 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
         hold[v] = 1;
         next.set(v, x[v]);
       });
+  if (state.parameters.obstacles > 0) carry_held_vertices(state);
 }
 
 /// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice

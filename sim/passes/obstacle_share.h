@@ -84,6 +84,17 @@ struct ObstacleShare {
     return share;
   }
 
+  /// The same beside a sheet at `distance` m against its normal, as ImageWalls::share: not seen
+  /// through it.
+  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> sheet_normal,
+                           float distance, const ImageWalls& walls) const {
+    const WallShare share = of(o, x);
+    if (share.value == 0.f) return share;
+    const Vec3<float> own = o.to_own(1, x), n = o.turn(1, o.normal(own, o.blend[1]));
+    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, sheet_normal) - distance);
+    return {share.value * shown, share.gradient * shown};
+  }
+
   /// Both replace density: 1 - (1 - S)(1 - S'), as walls among themselves.
   static DRENCH_HD WallShare both(WallShare a, WallShare b) {
     return {1.f - (1.f - a.value) * (1.f - b.value),
@@ -121,38 +132,6 @@ inline void add_obstacle_shares(State& state) {
                      rest * all.value};
         }
       });
-}
-
-struct Impulse {
-  double x = 0, y = 0, z = 0;
-  DRENCH_HD Impulse operator()(const Impulse& a, const Impulse& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-  }
-};
-
-/// What pressure gave to one obstacle in the step that was made, kg m/s: the reaction to its part
-/// of -D^T q (pressure_rows.h).
-inline Impulse pressure_impulse(const State& state, int which) {
-  const Parameters& p = state.parameters;
-  const ObstacleShare law = obstacle_share_of(p);
-  const ImageWalls walls = image_walls_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const Float4* place = state.pressure.place.data();
-  const double factor = double(p.particle_mass) * p.rest_density / state.dt;
-  return parallel_reduce(
-      "obstacle: impulse", state.fluid.count, Impulse{},
-      DRENCH_LAMBDA(int i) {
-        const Float4 at = place[i];
-        const Vec3<float> x{at.x, at.y, at.z};
-        const WallShare own = law.of(obstacles.obstacle[which], x);
-        if (at.w == 0.f || own.value == 0.f) return Impulse{};
-        WallShare others = walls.share(x);
-        for (int k = 0; k < obstacles.count; ++k)
-          if (k != which) others = law.both(others, law.of(obstacles.obstacle[k], x));
-        const double push = factor * at.w * (1.f - others.value);
-        return Impulse{push * own.gradient.x, push * own.gradient.y, push * own.gradient.z};
-      },
-      Impulse{});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,9 +8,9 @@
 // (cloth_implicit.h): stiffness, damping and pins are in it. Particles of both sides push with
 // pressures of their own.
 
-#include "sim/passes/cloth_implicit.h"
+#include "sim/passes/cloth_obstacles.h"
 #include "sim/passes/contact_exact.h"
-#include "sim/passes/image_walls.h"
+#include "sim/passes/obstacle_share.h"
 #include "sim/passes/pressure_rows.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -31,6 +31,7 @@ struct SheetRows {
   VecView load;       // kg m, what the row gives to its vertices
   float* way;         // m, that the row may ask for in this step
   float* compliance;  // kg^2/m^8
+  float *gap, *open;  // m; share that the sheet leaves: kept for obstacles alone
   int rows;
 
   /// The weighted mean of the vertices.
@@ -41,7 +42,7 @@ struct SheetRows {
   }
 };
 
-inline SheetRows sheet_rows(State& state) {
+inline SheetRows sheet_rows(const State& state) {
   const ContactView c = contact_rows(state);
   return {c.particle,
           {c.vertex[0], c.vertex[1], c.vertex[2]},
@@ -50,6 +51,8 @@ inline SheetRows sheet_rows(State& state) {
           c.change,
           c.least,
           c.drag_rate,
+          c.lambda,
+          c.drag_scale,
           c.rows};
 }
 
@@ -84,6 +87,8 @@ inline void add_sheets_to_walls(State& state) {
   Float4* wall = state.pressure.wall.data();
   const float rest = p.rest_density, dt = float(state.dt);
   const ImageWalls walls = image_walls_of(p);
+  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleViews obstacles = state.obstacles.views();
   const float recovery = dt * 0.1f * p.sound_speed;
   const SheetShare blank{p.wall_scale, 1.f / p.support_radius, p.spacing, 0.f, 0.f};
   parallel_for(
@@ -91,13 +96,19 @@ inline void add_sheets_to_walls(State& state) {
         const int i = c.particle[row];
         c.gradient.set(row, {0.f, 0.f, 0.f});
         c.compliance[row] = 0.f;
+        if (obstacles.count > 0) c.gap[row] = 1e30f, c.open[row] = 1.f;
         if (i < 0 || edge[i] <= 0.f) return;
         const Vec3<float> n = normal[i], foot = c.at_foot(row, cloth_velocity) * dt;
         const float nearer = -dot(n, x[i] - start[i] - foot),
                     gap = distance[i] - half_thickness[triangle[i]] - nearer;
         SheetShare share = blank;
         share.at(gap, edge[i]);
-        const WallShare w = walls.share(x[i], n, gap);
+        WallShare w = walls.share(x[i], n, gap);
+        if (obstacles.count > 0) {
+          c.gap[row] = gap, c.open[row] = max0(1.f - share.value);
+          for (int k = 0; k < obstacles.count; ++k)
+            w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));
+        }
         const float open = 1.f - w.value, left = max0(1.f - share.value);
         const Vec3<float> g = n * (rest * open * share.slope), all = w.gradient * (rest * left) + g;
         c.gradient.set(row, g);
@@ -144,12 +155,12 @@ inline void sum_loads(State& state, Base base) {
 /// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts.
 inline void add_to_reference(State& state, const VecView& of, float keep) {
   const BlockInverse block = block_inverse(state);
-  const VecView free = state.cloth_system.free.view();
+  const FreeWays free = free_ways(state);
   ClothControl* control = state.cloth_system.control.data();
   reduce_then(
       "cloth: reference", state.cloth.vertices, 0.,
       DRENCH_LAMBDA(int i) {
-        const Vec3<float> r = along(free[i], of[i]);
+        const Vec3<float> r = free.of(i, of[i]);
         return dot_double(r, block.times(i, r));
       },
       AddDoubles{},
@@ -205,6 +216,7 @@ inline void start_sheets(State& state) {
   load_by_pressures(state);
   sum_loads(state, Base::none);
   hold_at_walls(state);
+  if (state.parameters.obstacles > 0) hold_at_obstacles(state);
   add_sheets_to_diagonal(state);
   load_by_pressures(state);
   sum_loads(state, Base::none);
@@ -229,9 +241,12 @@ inline void settle_sheets(State& state) {
   } else {
     s.right.clear();
     hold_at_walls(state);
+    if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, given, 0.f);
     sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
+  if (state.parameters.obstacles > 0)
+    settle_at_obstacles(state, given, last_sweeps, last_tolerance);
   balance_loose_sheets(state, s.change.view(), given);
 }
 
@@ -292,6 +307,7 @@ inline void finish_sheets(State& state) {
         next_velocity.put(i, velocity);
         predicted.put(i, velocity);
       });
+  if (state.parameters.obstacles > 0) rub_on_obstacles(state, near ? right : base);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

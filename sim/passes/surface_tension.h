@@ -233,26 +233,6 @@ void pull_on_walls(State& state, const TensionForce<Separation>& force) {
   state.owes |= images.any_sheet;
 }
 
-/// What surface tension gave to one obstacle in the step that was made, kg m/s.
-inline Impulse tension_impulse(const State& state, int which) {
-  const MirrorImages images = mirror_images_of(state);
-  const auto force = tension_force(state, nullptr, Straight{});
-  const double factor = double(force.scale) * state.parameters.particle_mass;
-  return parallel_reduce(
-      "obstacle: tension", state.fluid.count, Impulse{},
-      DRENCH_LAMBDA(int i) {
-        Impulse impulse;
-        const Mirrors mirrors = images.of(i);
-        for (int k = 0; k < mirrors.count; ++k) {
-          if (mirrors.mirror[k].of != which) continue;
-          const Vec3<float> s = images.sum(i, mirrors, force).by[k];
-          impulse = {factor * s.x, factor * s.y, factor * s.z};
-        }
-        return impulse;
-      },
-      Impulse{});
-}
-
 /// Uses PressureState::vector.
 inline void apply_surface_tension(State& state) {
   const Parameters& p = state.parameters;

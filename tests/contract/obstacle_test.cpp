@@ -52,8 +52,6 @@ TEST(ObstacleShot, LocksToTheSame) {
 
 TEST(ObstacleShot, SaysWhatCannotBe) {
   const std::string box = "[[obstacle]]\ntype = \"box\"\n";
-  EXPECT_NE(error_of(box + "[[cloth]]\n").find("cloth with obstacles is not supported yet"),
-            std::string::npos);
   EXPECT_NE(error_of("[[obstacle]]\ntype = \"box\"\nradius = 1\n").find("type sphere"),
             std::string::npos);
   EXPECT_NE(error_of("[[obstacle]]\ntype = \"mesh\"\n").find("mesh is missing"), std::string::npos);

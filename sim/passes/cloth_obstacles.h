@@ -1,0 +1,218 @@
+#pragma once
+// Sheets on obstacles. A vertex keeps a distance to every surface; one that forces would take
+// nearer is held in the solve of the sheets (cloth_implicit.h): it may go along the surface, and
+// along its normal goes where the surface does. Who is held is found twice: before the pressures by
+// what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
+// what still comes too near is held. Vertices are held, not triangles: between two of them, e
+// apart, a surface of radius R comes e^2 / 8R nearer. What the solve needs to hold a vertex is the
+// normal force; it rubs with Coulomb's friction, at most as much as stops it (as Bridson, Fedkiw
+// and Anderson 2002 have it: after the solve, on the vertex alone). Last comes the guard that
+// particles have: no path passes through a surface, whatever the solve says.
+
+#include "sim/passes/cloth_implicit.h"
+#include "sim/passes/obstacle_path.h"
+#include "sim/passes/polygon_grid.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// What holds vertices at obstacles reads.
+struct ClothHold {
+  ObstacleViews obstacles;
+  ClothWalls walls;
+  const float* half_thickness;
+  const int *fan_start, *fan_entry;
+  VecView free, normal;
+  int* grip;
+  StopSums stopped;
+  float room;                      // m, between sheet and surface beyond what particles keep
+  float inverse_dt, inverse_mass;  // 1/s, of a particle, 1/kg
+
+  /// m, of a vertex to a surface: as to a wall of the domain, and half the thickness.
+  DRENCH_HD float distance_to(const ObstacleView& o, int vertex) const {
+    return o.clearance + room + half_thickness[fan_entry[fan_start[vertex]] / 3];
+  }
+
+  /// Where the first obstacle stops a vertex that would go from x0 to x1; -1 if none does.
+  /// @param slack  share of the distance that may be missing
+  DRENCH_HD int stop(int vertex, Vec3<float> x0, Vec3<float> x1, float slack,
+                     Vec3<float>& own) const {
+    for (int k = 0; k < obstacles.count; ++k) {
+      const ObstacleView& o = obstacles.obstacle[k];
+      const float keep = distance_to(o, vertex);
+      if (PathStop{0, (1.f - slack) * keep, keep}.stops(o, x0, x1, own)) return k;
+    }
+    return -1;
+  }
+
+  /// Holds a vertex, straight way `straight`, where an obstacle stops it from going to `to`.
+  DRENCH_HD bool hold(int vertex, Vec3<float> from, Vec3<float> straight, Vec3<float> to,
+                      Vec3<float>& w) const {
+    Vec3<float> own;
+    const int k = stop(vertex, from, to, 0.f, own);
+    if (k < 0) return false;
+    const ObstacleView& o = obstacles.obstacle[k];
+    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), may = along(free[vertex], n);
+    const float size2 = length2(may);
+    if (size2 < 0.01f) return false;  // a wall holds it that way
+    const Vec3<float> way = may * (1.f / sqrtf(size2));
+    w = w + way * (dot(n, o.to_frame(1, own) - straight - w) / dot(n, way));
+    normal.set(vertex, way);
+    grip[vertex] = k;
+    return true;
+  }
+
+  /// The velocity that the surface has there along its normal, and the solid's own across it, m/s.
+  DRENCH_HD Vec3<float> surface_velocity(const ObstacleView& o, Vec3<float> x,
+                                         Vec3<float> n) const {
+    const Vec3<float> own = o.to_own(1, x);
+    const Vec3<float> carried = (x - o.to_frame(0, own)) * inverse_dt;
+    const float grown = o.distance(own, o.blend[0]) - o.distance(own, o.blend[1]);
+    return carried + n * (grown * inverse_dt);
+  }
+
+  /// @param given  kg m/s, to the vertex
+  DRENCH_HD void react(int k, Vec3<float> given) const { stopped.add(k, given * -inverse_mass); }
+
+  /// The last guard: where a vertex ends that would go from x0 to x1 with velocity u.
+  DRENCH_HD void guard(int vertex, float mass, Vec3<float> x0, Vec3<float>& x1,
+                       Vec3<float>& u) const {
+    for (int round = 0; round < 4; ++round) {
+      Vec3<float> own, unused{0.f, 0.f, 0.f};
+      const int k = stop(vertex, x0, x1, 0.02f, own);
+      if (k < 0) return;
+      const ObstacleView& o = obstacles.obstacle[k];
+      const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
+      x1 = o.to_frame(1, own);
+      const float inward = dot(u - surface_velocity(o, x1, n), n);
+      if (inward < 0.f) {
+        react(k, n * (-inward * mass));
+        u = u - n * inward;
+      }
+      walls.stop(x1, unused);
+    }
+  }
+};
+
+inline ClothHold cloth_hold_of(const State& state) {
+  const ClothState& c = state.cloth;
+  const ClothSystem& s = state.cloth_system;
+  const Parameters& p = state.parameters;
+  return {state.obstacles.views(), cloth_walls_of(p),   c.half_thickness.data(),
+          c.fan_start.data(),      c.fan_entry.data(),  s.free.view(),
+          s.normal.view(),         s.grip.data(),       {state.obstacles.stopped.data()},
+          0.15f * p.spacing,       float(1 / state.dt), 1.f / p.particle_mass};
+}
+
+/// As hold_at_walls, whose axes it takes into account.
+inline void hold_at_obstacles(State& state) {
+  const ClothState& c = state.cloth;
+  const ClothSystem& s = state.cloth_system;
+  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
+                right = s.right.view(), change = s.change.view();
+  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  const BlockInverse block = block_inverse(state);
+  const ClothHold hold = cloth_hold_of(state);
+  state.cloth_system.normal.clear();
+  parallel_for(
+      "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        hold.grip[i] = -1;
+        if (inverse_mass[i] == 0.f) return;
+        const Vec3<float> straight = x[i] + v[i] * dt;
+        Vec3<float> w = change[i];
+        const Vec3<float> to = straight + block.times(i, base[i] + right[i]);
+        if (hold.hold(i, x[i], straight, to, w)) change.set(i, w);
+      });
+}
+
+/// Lets go what pulls off and holds what comes too near by the solve that was made; how many these
+/// are. What was let go is not held again in the step: the guard stops it.
+inline int revise_holds(State& state, const VecView& given) {
+  const ClothState& c = state.cloth;
+  const VecView x = c.position.view(), v = c.velocity.view(),
+                change = state.cloth_system.change.view();
+  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ClothHold hold = cloth_hold_of(state);
+  // The springs of a vertex reach others, whose ways must not change meanwhile.
+  const VecView push = state.cloth_system.residual.view();
+  parallel_for(
+      "cloth: push of obstacles", c.vertices,
+      DRENCH_LAMBDA(int i) { push.set(i, matrix.whole(change, i) - given[i]); });
+  return parallel_reduce(
+      "cloth: revise", c.vertices, 0,
+      DRENCH_LAMBDA(int i) {
+        if (hold.grip[i] >= 0) {
+          if (dot(hold.normal[i], push[i]) >= 0.f) return 0;
+          hold.grip[i] = -2;
+          hold.normal.set(i, {0.f, 0.f, 0.f});
+          return 1;
+        }
+        if (hold.grip[i] == -2 || inverse_mass[i] == 0.f) return 0;
+        const Vec3<float> straight = x[i] + v[i] * dt;
+        Vec3<float> w = change[i];
+        if (!hold.hold(i, x[i], straight, straight + w, w)) return 0;
+        change.set(i, w);
+        return 1;
+      },
+      Larger{});
+}
+
+/// The solve of the sheets was made: again with other vertices held, until these are the right
+/// ones, or nearly.
+inline void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance) {
+  constexpr int most_rounds = 4;
+  const VecView change = state.cloth_system.change.view();
+  for (int round = 0; round < most_rounds && revise_holds(state, given) > 0; ++round)
+    sweep_cloth(state, change, given, sweeps, tolerance);
+}
+
+/// What obstacles make of the step's end in ClothState::next: friction, the surface's velocity, and
+/// the guard.
+inline void rub_on_obstacles(State& state, const VecView& given) {
+  const ClothState& c = state.cloth;
+  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view(),
+                predicted = c.predicted.view(), change = state.cloth_system.change.view();
+  const float dt = float(state.dt), inverse_dt = 1.f / dt, *mass = c.mass.data(),
+              *inverse_mass = c.inverse_mass.data();
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        const int k = hold.grip[i];
+        if (k >= 0) {
+          const ObstacleView& o = hold.obstacles.obstacle[k];
+          const Vec3<float> n = hold.normal[i];
+          const float push = dot(n, matrix.whole(change, i) - given[i]) * inverse_dt;
+          const Vec3<float> slip = u - hold.surface_velocity(o, to, n);
+          const Vec3<float> across = slip - n * dot(slip, n);
+          const float speed = length(across), most = o.friction * max0(push) * inverse_mass[i];
+          const Vec3<float> rub = across * (speed > most ? -most / speed : -1.f);
+          const Vec3<float> kick = rub - n * dot(slip, n);
+          hold.react(k, n * push + kick * mass[i]);
+          u = u + kick;
+          to = to + rub * dt;
+        }
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u), predicted.set(i, u);
+      });
+}
+
+/// The path test has stopped vertices where they were: obstacles carry them on.
+inline void carry_held_vertices(State& state) {
+  const ClothState& c = state.cloth;
+  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view();
+  const float *mass = c.mass.data(), *inverse_mass = c.inverse_mass.data();
+  const int* held = c.held.data();
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
+        if (!held[i] || inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u);
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

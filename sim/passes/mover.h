@@ -1,0 +1,67 @@
+#pragma once
+// Where a particle goes that nothing but the domain's walls stops.
+
+#include "sim/parallel.h"
+#include "sim/periodic.h"
+#include "sim/state.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// Symplectic Euler inside the walls: velocity first, then position. A particle that still reaches
+/// the last tenth of a spacing before a wall stops there (the wall's pressure has failed it). One
+/// that leaves through a periodic side comes in at the other.
+struct Mover {
+  float low[3], high[3];
+  bool wall[3], periodic[3];
+  float dt;
+
+  DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
+    float p[3] = {x.x + dt * v.x, x.y + dt * v.y, x.z + dt * v.z}, u[3] = {v.x, v.y, v.z};
+    for (int k = 0; k < 3; ++k) {
+      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
+      if (!wall[k]) continue;
+      if (p[k] < low[k]) p[k] = low[k], u[k] = max0(u[k]);
+      if (p[k] > high[k]) p[k] = high[k], u[k] = -max0(-u[k]);
+    }
+    v = {u[0], u[1], u[2]};
+    return {p[0], p[1], p[2]};
+  }
+  DRENCH_HD Vec3<float> wrapped(Vec3<float> x) const {
+    float p[3] = {x.x, x.y, x.z};
+    for (int k = 0; k < 3; ++k)
+      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
+    return {p[0], p[1], p[2]};
+  }
+  DRENCH_HD Vec3<float> inside(Vec3<float> x) const {
+    float p[3] = {x.x, x.y, x.z};
+    for (int k = 0; k < 3; ++k)
+      if (wall[k]) p[k] = minimum(maximum(p[k], low[k]), high[k]);
+    return {p[0], p[1], p[2]};
+  }
+};
+
+inline Mover mover_of(const Parameters& p, float dt) {
+  Mover mover{{}, {}, {}, {}, dt};
+  for (int k = 0; k < 3; ++k) {
+    const float margin = p.periodic[k] ? 0.f : 0.1f * p.spacing;
+    mover.wall[k] = p.wall[k], mover.periodic[k] = p.periodic[k];
+    mover.low[k] = p.low[k] + margin, mover.high[k] = p.high[k] - margin;
+  }
+  return mover;
+}
+
+/// The same without periodic sides, for paths: they go on beyond the seam, where the images of
+/// triangles are, and `wrap_positions` ends them.
+inline Mover path_mover_of(const Parameters& p, float dt) {
+  Mover mover = mover_of(p, dt);
+  for (bool& axis : mover.periodic) axis = false;
+  return mover;
+}
+inline void wrap_positions(State& state) {
+  const Mover mover = mover_of(state.parameters, 0.f);
+  const VecView x = state.fluid.position.view();
+  parallel_for(
+      "wrap", state.fluid.count, DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
