@@ -328,7 +328,11 @@ class BackendSolver : public Solver {
                          &s.image, &s.direction, &s.direction_image})
       v->resize(c.padded);
     s.control.resize(1);
-    if (state_.parameters.obstacles > 0) s.normal.resize(c.padded), s.grip.resize(c.padded);
+    if (state_.parameters.obstacles > 0) {
+      s.normal.resize(c.padded), s.rub.resize(c.padded);
+      s.grip.resize(c.padded), s.slides.resize(c.padded);
+      s.free_factor.resize(size_t(6) * c.padded);
+    }
   }
 
   /// Rows of springs to slots of all vertices. A slot takes springs of one offset between vertices

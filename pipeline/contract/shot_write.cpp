@@ -309,7 +309,7 @@ std::string reference_shot(const std::string& name) {
                            value_column(p), p.description);
       });
   return text + commented("fluid.volume", "Not without its file.") +
-         commented("obstacle", "Not together with cloth yet.") +
+         commented("obstacle", "At its defaults it would stand in the fluid above.") +
          commented("sink", "At its defaults it would take the fluid above.");
 }
 

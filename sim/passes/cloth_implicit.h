@@ -20,9 +20,11 @@ DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
   return {free.x * v.x, free.y * v.y, free.z * v.z};
 }
 
-/// The ways that a vertex may go: its free axes, and of these not along the normal of an obstacle.
+/// The ways that a vertex may go: its free axes, and of these not along the normal of an obstacle,
+/// nor across it where friction holds it.
 struct FreeWays {
   VecView axis, normal;
+  const float* slides;
   bool obstacles;
 
   template <class Index, class T>
@@ -30,13 +32,13 @@ struct FreeWays {
     const Vec3<T> may = along(axis.at(i), v);
     if (!obstacles) return may;
     const Vec3<T> n = normal.at(i);
-    return may - n * dot(n, may);
+    return (may - n * dot(n, may)) * load(slides, i);
   }
 };
 
 inline FreeWays free_ways(const State& state) {
   const ClothSystem& s = state.cloth_system;
-  return {s.free.view(), s.normal.view(), state.parameters.obstacles > 0};
+  return {s.free.view(), s.normal.view(), s.slides.data(), state.parameters.obstacles > 0};
 }
 
 /// The matrix A, by slots of springs, on free ways alone.
@@ -97,6 +99,34 @@ struct BlockInverse {
     const T value[6] = {d0, d1, d2, l10, l20, l21};
     for (int k = 0; k < 6; ++k) store(field(k), i, value[k]);
   }
+  /// The block of `from` on the ways that are perpendicular to `held` and along `may`; the rest of
+  /// it is any.
+  DRENCH_HD void put_free(int i, const BlockInverse& from, Vec3<float> may, Vec3<float> held,
+                          float least) const {
+    const float d0 = 1.f / from.field(0)[i], d1 = 1.f / from.field(1)[i],
+                d2 = 1.f / from.field(2)[i], l10 = from.field(3)[i], l20 = from.field(4)[i],
+                l21 = from.field(5)[i];
+    const auto whole = [=](Vec3<float> v) {  // L D L^T v
+      const float a = d0 * (v.x + l10 * v.y + l20 * v.z), b = d1 * (v.y + l21 * v.z), c = d2 * v.z;
+      return Vec3<float>{a, l10 * a + b, l20 * a + l21 * b + c};
+    };
+    const auto project = [=](Vec3<float> v) {
+      const Vec3<float> m{may.x * v.x, may.y * v.y, may.z * v.z};
+      return m - held * dot(held, m);
+    };
+    const float fill = d0 + d1 + d2;
+    const auto column = [=](Vec3<float> e) {
+      const Vec3<float> p = project(e);
+      return project(whole(p)) + (e - p) * fill;
+    };
+    const Vec3<float> x = column({1.f, 0.f, 0.f}), y = column({0.f, 1.f, 0.f}),
+                      z = column({0.f, 0.f, 1.f});
+    const float b[6] = {x.x, x.y, x.z, y.y, y.z, z.z};
+    put(i, b, least);
+  }
+  DRENCH_HD void copy(int i, const BlockInverse& from) const {
+    for (int k = 0; k < 6; ++k) field(k)[i] = from.field(k)[i];
+  }
   template <class Index, class T>
   DRENCH_HD Vec3<T> times(Index i, Vec3<T> r) const {
     const T l10 = load(field(3), i), l20 = load(field(4), i), l21 = load(field(5), i);
@@ -108,6 +138,12 @@ struct BlockInverse {
 
 inline BlockInverse block_inverse(const State& state) {
   return {state.cloth_system.factor.data(), state.cloth.padded};
+}
+/// Of the blocks on free ways. With the whole blocks, soft across a sheet and stiff along it, a
+/// surface askew to the sheet makes conjugate gradients diverge.
+inline BlockInverse free_block_inverse(const State& state) {
+  if (state.parameters.obstacles == 0) return block_inverse(state);
+  return {state.cloth_system.free_factor.data(), state.cloth.padded};
 }
 
 /// The matrix at the positions and the right side without loads; w = 0.
@@ -257,7 +293,7 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
   const int n = state.cloth.vertices;
   ClothSystem& s = state.cloth_system;
   const ClothMatrix matrix = cloth_matrix(state);
-  const BlockInverse block = block_inverse(state);
+  const BlockInverse block = free_block_inverse(state);
   ClothControl* control = s.control.data();
   const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view();
   const FreeWays free = free_ways(state);

@@ -4,10 +4,10 @@
 // along its normal goes where the surface does. Who is held is found twice: before the pressures by
 // what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
 // what still comes too near is held. Vertices are held, not triangles: between two of them, e
-// apart, a surface of radius R comes e^2 / 8R nearer. What the solve needs to hold a vertex is the
-// normal force; it rubs with Coulomb's friction, at most as much as stops it (as Bridson, Fedkiw
-// and Anderson 2002 have it: after the solve, on the vertex alone). Last comes the guard that
-// particles have: no path passes through a surface, whatever the solve says.
+// apart, a surface of radius R comes e^2 / 8R nearer. The force that holds a vertex is in the
+// solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one that it cannot
+// feels it as a force. Last comes the guard that particles have: no path passes through a surface,
+// whatever the solve says.
 
 #include "sim/passes/cloth_implicit.h"
 #include "sim/passes/obstacle_path.h"
@@ -22,6 +22,8 @@ struct ClothHold {
   const float* half_thickness;
   const int *fan_start, *fan_entry;
   VecView free, normal;
+  BlockInverse block, free_block;
+  const float* inertia;
   int* grip;
   StopSums stopped;
   float room;                      // m, between sheet and surface beyond what particles keep
@@ -57,6 +59,7 @@ struct ClothHold {
     const Vec3<float> way = may * (1.f / sqrtf(size2));
     w = w + way * (dot(n, o.to_frame(1, own) - straight - w) / dot(n, way));
     normal.set(vertex, way);
+    free_block.put_free(vertex, block, free[vertex], way, inertia[vertex]);
     grip[vertex] = k;
     return true;
   }
@@ -97,10 +100,11 @@ inline ClothHold cloth_hold_of(const State& state) {
   const ClothState& c = state.cloth;
   const ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
-  return {state.obstacles.views(), cloth_walls_of(p),   c.half_thickness.data(),
-          c.fan_start.data(),      c.fan_entry.data(),  s.free.view(),
-          s.normal.view(),         s.grip.data(),       {state.obstacles.stopped.data()},
-          0.15f * p.spacing,       float(1 / state.dt), 1.f / p.particle_mass};
+  return {state.obstacles.views(), cloth_walls_of(p),    c.half_thickness.data(),
+          c.fan_start.data(),      c.fan_entry.data(),   s.free.view(),
+          s.normal.view(),         block_inverse(state), free_block_inverse(state),
+          s.inertia.data(),        s.grip.data(),        {state.obstacles.stopped.data()},
+          0.15f * p.spacing,       float(1 / state.dt),  1.f / p.particle_mass};
 }
 
 /// As hold_at_walls, whose axes it takes into account.
@@ -110,12 +114,14 @@ inline void hold_at_obstacles(State& state) {
   const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
                 right = s.right.view(), change = s.change.view();
   const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  float* slides = s.slides.data();
   const BlockInverse block = block_inverse(state);
   const ClothHold hold = cloth_hold_of(state);
   state.cloth_system.normal.clear();
   parallel_for(
       "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
-        hold.grip[i] = -1;
+        hold.grip[i] = -1, slides[i] = 1.f;
+        hold.free_block.copy(i, hold.block);
         if (inverse_mass[i] == 0.f) return;
         const Vec3<float> straight = x[i] + v[i] * dt;
         Vec3<float> w = change[i];
@@ -124,55 +130,127 @@ inline void hold_at_obstacles(State& state) {
       });
 }
 
-/// Lets go what pulls off and holds what comes too near by the solve that was made; how many these
-/// are. What was let go is not held again in the step: the guard stops it.
-inline int revise_holds(State& state, const VecView& given) {
+/// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
+struct HoldRevision {
+  ClothHold hold;
+  VecView position, velocity, change, given, right, reaction, rub;
+  float* slides;
+  const float *mass, *inverse_mass;
+  float dt;
+  int round;
+
+  DRENCH_HD bool free_too_near(int i) const {
+    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    Vec3<float> w = change[i];
+    if (!hold.hold(i, position[i], straight, straight + w, w)) return false;
+    change.set(i, w);
+    return true;
+  }
+  DRENCH_HD bool let_go(int i) const {
+    hold.grip[i] = -2, slides[i] = 1.f;
+    hold.normal.set(i, {0.f, 0.f, 0.f});
+    hold.free_block.copy(i, hold.block);
+    right.set(i, given[i]);
+    return true;
+  }
+  /// The obstacle takes the vertex with it.
+  DRENCH_HD bool stick(int i, const ObstacleView& o, Vec3<float> n) const {
+    const Vec3<float> x = position[i], straight = x + velocity[i] * dt, w = change[i];
+    const Vec3<float> off = along(hold.free[i], o.to_frame(1, o.to_own(0, x)) - straight - w);
+    slides[i] = 0.f;
+    right.set(i, given[i]);
+    change.set(i, w + off - n * dot(n, off));
+    return true;
+  }
+  DRENCH_HD bool slide(int i, Vec3<float> friction) const {
+    slides[i] = 1.f;
+    rub.set(i, friction), right.set(i, given[i] + friction);
+    return true;
+  }
+
+  /// Whether anything is to change.
+  DRENCH_HD bool operator()(int i) const {
+    const int k = hold.grip[i];
+    if (k < 0) return k == -1 && inverse_mass[i] > 0.f && free_too_near(i);
+    const ObstacleView& o = hold.obstacles.obstacle[k];
+    const Vec3<float> n = hold.normal[i], all = reaction[i];
+    const float normal = dot(n, all), most = o.friction * normal;
+    if (normal < 0.f) return let_go(i);
+    if (o.friction == 0.f) return false;
+    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    const Vec3<float> solid = hold.surface_velocity(o, straight, n);
+    if (round == 0) {  // hold what is slow enough for friction to stop it
+      const Vec3<float> slip = across(velocity[i] - solid, n);
+      const float size = length(slip);
+      if (size * mass[i] * dt <= most) return stick(i, o, n);
+      return slide(i, slip * (-most / size));
+    }
+    if (slides[i] == 0.f) {
+      const Vec3<float> pull = across(all, n);
+      const float size = length(pull);
+      return size > most && slide(i, pull * (most / size));
+    }
+    const Vec3<float> slip = across(velocity[i] + change[i] * (1.f / dt) - solid, n);
+    const float now = length(rub[i]);
+    if (round < 3 && dot(slip, rub[i]) > 0.f) return stick(i, o, n);
+    return fabsf(now - most) > 0.02f * most && now > 0.f && slide(i, rub[i] * (most / now));
+  }
+  DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
+};
+
+/// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
+/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
+/// the guard stops it.
+inline bool revise_holds(State& state, const VecView& given, int round) {
   const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), v = c.velocity.view(),
-                change = state.cloth_system.change.view();
-  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  ClothSystem& s = state.cloth_system;
   const ClothMatrix matrix = cloth_matrix(state);
-  const ClothHold hold = cloth_hold_of(state);
+  const VecView change = s.change.view(), reaction = s.residual.view();
   // The springs of a vertex reach others, whose ways must not change meanwhile.
-  const VecView push = state.cloth_system.residual.view();
   parallel_for(
-      "cloth: push of obstacles", c.vertices,
-      DRENCH_LAMBDA(int i) { push.set(i, matrix.whole(change, i) - given[i]); });
+      "cloth: reactions", c.vertices,
+      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
+  const HoldRevision revise{cloth_hold_of(state),
+                            c.position.view(),
+                            c.velocity.view(),
+                            change,
+                            given,
+                            s.answer.view(),
+                            reaction,
+                            s.rub.view(),
+                            s.slides.data(),
+                            c.mass.data(),
+                            c.inverse_mass.data(),
+                            float(state.dt),
+                            round};
   return parallel_reduce(
-      "cloth: revise", c.vertices, 0,
-      DRENCH_LAMBDA(int i) {
-        if (hold.grip[i] >= 0) {
-          if (dot(hold.normal[i], push[i]) >= 0.f) return 0;
-          hold.grip[i] = -2;
-          hold.normal.set(i, {0.f, 0.f, 0.f});
-          return 1;
-        }
-        if (hold.grip[i] == -2 || inverse_mass[i] == 0.f) return 0;
-        const Vec3<float> straight = x[i] + v[i] * dt;
-        Vec3<float> w = change[i];
-        if (!hold.hold(i, x[i], straight, straight + w, w)) return 0;
-        change.set(i, w);
-        return 1;
-      },
-      Larger{});
+             "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
+             Larger{}) > 0;
 }
 
-/// The solve of the sheets was made: again with other vertices held, until these are the right
-/// ones, or nearly.
+/// The solve of the sheets was made: on with friction and with other vertices held, until these are
+/// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
+/// momentum of a sheet that is held.
 inline void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance) {
-  constexpr int most_rounds = 4;
-  const VecView change = state.cloth_system.change.view();
-  for (int round = 0; round < most_rounds && revise_holds(state, given) > 0; ++round)
-    sweep_cloth(state, change, given, sweeps, tolerance);
+  constexpr int most_rounds = 6;
+  ClothSystem& s = state.cloth_system;
+  const VecView change = s.change.view(), right = s.answer.view();
+  parallel_for(
+      "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
+  for (int round = 0;; ++round) {
+    sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
+    if (round == most_rounds || !revise_holds(state, given, round)) break;
+  }
 }
 
-/// What obstacles make of the step's end in ClothState::next: friction, the surface's velocity, and
-/// the guard.
-inline void rub_on_obstacles(State& state, const VecView& given) {
+/// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
+/// and their own impulse.
+inline void finish_at_obstacles(State& state, const VecView& given) {
   const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view(),
-                predicted = c.predicted.view(), change = state.cloth_system.change.view();
-  const float dt = float(state.dt), inverse_dt = 1.f / dt, *mass = c.mass.data(),
+  const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
+                velocity = c.next_velocity.view(), predicted = c.predicted.view(),
+                change = state.cloth_system.change.view();
+  const float inverse_dt = 1.f / float(state.dt), *mass = c.mass.data(),
               *inverse_mass = c.inverse_mass.data();
   const ClothMatrix matrix = cloth_matrix(state);
   const ClothHold hold = cloth_hold_of(state);
@@ -182,17 +260,13 @@ inline void rub_on_obstacles(State& state, const VecView& given) {
         Vec3<float> to = next[i], u = velocity[i];
         const int k = hold.grip[i];
         if (k >= 0) {
-          const ObstacleView& o = hold.obstacles.obstacle[k];
-          const Vec3<float> n = hold.normal[i];
-          const float push = dot(n, matrix.whole(change, i) - given[i]) * inverse_dt;
-          const Vec3<float> slip = u - hold.surface_velocity(o, to, n);
-          const Vec3<float> across = slip - n * dot(slip, n);
-          const float speed = length(across), most = o.friction * max0(push) * inverse_mass[i];
-          const Vec3<float> rub = across * (speed > most ? -most / speed : -1.f);
-          const Vec3<float> kick = rub - n * dot(slip, n);
-          hold.react(k, n * push + kick * mass[i]);
+          const Vec3<float> n = hold.normal[i], w = change[i];
+          u = v[i] + w * inverse_dt;
+          const Vec3<float> solid = hold.surface_velocity(hold.obstacles.obstacle[k], to, n);
+          const Vec3<float> kick = n * dot(solid - u, n);
+          const Vec3<float> reaction = along(hold.free[i], matrix.whole(change, i) - given[i]);
+          hold.react(k, reaction * inverse_dt + kick * mass[i]);
           u = u + kick;
-          to = to + rub * dt;
         }
         hold.guard(i, mass[i], x[i], to, u);
         next.set(i, to), velocity.set(i, u), predicted.set(i, u);

@@ -154,7 +154,7 @@ inline void sum_loads(State& state, Base base) {
 
 /// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts.
 inline void add_to_reference(State& state, const VecView& of, float keep) {
-  const BlockInverse block = block_inverse(state);
+  const BlockInverse block = free_block_inverse(state);
   const FreeWays free = free_ways(state);
   ClothControl* control = state.cloth_system.control.data();
   reduce_then(
@@ -307,7 +307,7 @@ inline void finish_sheets(State& state) {
         next_velocity.put(i, velocity);
         predicted.put(i, velocity);
       });
-  if (state.parameters.obstacles > 0) rub_on_obstacles(state, near ? right : base);
+  if (state.parameters.obstacles > 0) finish_at_obstacles(state, near ? right : base);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND
