@@ -176,7 +176,7 @@ struct HoldRevision {
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;
     if (normal < 0.f) return let_go(i);
-    if (o.friction == 0.f) return false;
+    if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + velocity[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight, n);
     if (round == 0) {  // hold what is slow enough for friction to stop it
@@ -237,10 +237,8 @@ inline void settle_at_obstacles(State& state, const VecView& given, int sweeps, 
   const VecView change = s.change.view(), right = s.answer.view();
   parallel_for(
       "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
-  for (int round = 0;; ++round) {
+  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
     sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
-    if (round == most_rounds || !revise_holds(state, given, round)) break;
-  }
 }
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
