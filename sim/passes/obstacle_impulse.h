@@ -71,7 +71,8 @@ inline Impulse pressure_impulse_near_sheets(const State& state, int which) {
 
 /// What surface tension gave to one obstacle in the step that was made, kg m/s.
 inline Impulse tension_impulse(const State& state, int which) {
-  const MirrorImages images = mirror_images_of(state);
+  MirrorImages images = mirror_images_of(state);
+  images.sheets.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
   const auto force = tension_force(state, nullptr, Straight{});
   const double factor = double(force.scale) * state.parameters.particle_mass;
   return parallel_reduce(

@@ -15,7 +15,6 @@
 // Walls, obstacles and sheets are mirrors: surfaces meet them at a right angle.
 
 #include "sim/passes/mirror_images.h"
-#include "sim/passes/obstacle_share.h"
 #include "sim/passes/pressure_rows.h"
 
 namespace drench::sim::DRENCH_BACKEND {

@@ -107,6 +107,39 @@ TEST(SurfaceTension, ClosesTheMomentumWithObstacles) {
   EXPECT_GT(most.length(), 1e-2 * scale);
 }
 
+// A block on a loose sheet, against a ball that the sheet meets as well: what all three get is
+// nothing.
+TEST(SurfaceTension, ClosesTheMomentumWithSheetAndObstacleAtOnce) {
+  const double a = 0.001;
+  Shot shot = tense_shot(a);
+  Cloth& sheet = add_sheet(shot, 16 * a, 0, 16);
+  sheet.thickness = 0.0002, sheet.areal_density = 0.2, sheet.damping = 0;
+  add_sphere(shot, V3d(7 * a, 3.4 * a, 0), 3 * a);
+  add_box(shot, V3d(-3 * a, 0.5 * a, -2 * a), {7, 4, 5});
+  Stepper run(shot);
+  const double scale = double(run.scene.start.id.size()) * run.scene.parameters.particle_mass *
+                       std::sqrt(0.072 / (1000 * a));
+  V3d given(0), cloth(0);
+  double worst = 0, most = 0;
+  for (int k = 0; k < 100; ++k) {
+    run.step();
+    for (const sim::ObstacleImpulse& i : run.solver->obstacle_impulses())
+      given += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
+    const sim::HostState state = run.solver->save();
+    worst = std::max(worst, (total_momentum(run.scene, state) + given).length());
+    most = std::max(most, given.length());
+    cloth = V3d(0);
+    for (size_t v = 0; v < state.cloth_velocity.size(); ++v)
+      cloth += at(state.cloth_velocity, v) * double(run.scene.cloth.mass[v]);
+  }
+  RecordProperty("worst", std::to_string(worst / scale * 1e9) + "e-9 " +
+                              std::to_string(most / scale) + " " +
+                              std::to_string(cloth.length() / scale));
+  EXPECT_LT(worst, 1e-5 * scale);
+  EXPECT_GT(most, 1e-2 * scale);
+  EXPECT_GT(cloth.length(), 1e-3 * scale);
+}
+
 // sqrt(3) / 2 of the side over the radius of its ball is 1.396.
 TEST(SurfaceTension, ACubeOfWaterBecomesASphereAndShedsNothing) {
   const validation::Rounding cube = validation::cube_to_sphere(14);
