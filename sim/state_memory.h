@@ -25,8 +25,8 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("acceleration", f.acceleration));
   all.push_back(memory_of("density and pressure", f.density, f.pressure_term, f.inverse_density));
   all.push_back(memory_of("cells and sorting", f.cell, f.order, f.cell_start, state.swap_float,
- state.scratch.histogram, state.scratch.order_in,
-                          state.scratch.key_out, state.scratch.bytes));
+                          state.scratch.histogram, state.scratch.order_in, state.scratch.key_out,
+                          state.scratch.bytes));
   all.push_back(memory_of("neighbour lists", p.lists.index, p.lists.closeness, p.lists.begin,
                           p.lists.blocks));
   all.push_back(memory_of("rows of the pressure solve", p.place, p.vector, p.wall, p.correction,
@@ -58,6 +58,7 @@ inline void add_cloth_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("implicit step of sheets", s.tension, s.axis, s.inertia, s.factor, s.base,
                           s.right, s.free, s.change, s.answer, s.residual, s.scaled, s.image,
                           s.direction, s.direction_image, s.control));
+  all.push_back(memory_of("sheets at obstacles", s.normal, s.grip, s.free_factor, s.slides, s.rub));
 }
 
 /// Groups that take anything, in the order of the state.

@@ -208,6 +208,14 @@ const Term terms[] = {
      Leaves::the_bits,
      {"predict_around_obstacles", "project_around_obstacles"},
      {"obstacles"}},
+    {"obstacle_under_cloth",
+     projected,
+     on_sheet,
+     [](Shot& s) { ball(s, V3d(0, -1.035, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {"predict_around_obstacles", "project_around_obstacles"},
+     {"obstacles", "sheets at obstacles"}},
 };
 
 void PrintTo(const Term& term, std::ostream* out) { *out << term.name; }
