@@ -429,8 +429,8 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
   if (scene.obstacles.count() == 0) return;
   for (size_t s = 0; s < scene.sheet.size(); ++s) {
     const Sheet& sheet = scene.sheet[s];
-    for (size_t v = 0; v < sheet.position.size(); ++v) {
-      const V3d p = sheet.position[v];
+    for (size_t v = 0; v < sheet.point.size(); ++v) {
+      const V3d p = sheet.position[sheet.point[v]];
       if (sheet.pinned[v]) continue;
       const double distance = scene.obstacles.distance(p, -shot.preroll);
       if (distance > -0.25 * shot.fluid.spacing) continue;
@@ -438,7 +438,7 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
           fmt::format("{}: cloth \"{}\" starts inside an obstacle: vertex {} at ({:.4g}, {:.4g}, "
                       "{:.4g}) m is {:.2g} m deep in it. Move the cloth or the obstacle, or pin "
                       "the vertex: pinned ones may be inside",
-                      shot.file.string(), sheet.name, v, p.x, p.y, p.z, -distance));
+                      shot.file.string(), sheet.name, sheet.point[v], p.x, p.y, p.z, -distance));
     }
   }
 }
