@@ -130,8 +130,8 @@ struct ClothSystem {
   VecColumn normal;  // unit, of the obstacle that holds a vertex; 0 where none. Only with obstacles
   Column<int> grip;  // that obstacle; -1 none, -2 let go in this step. Only with obstacles
   Column<float> free_factor;  // as factor, of what may move. Only with obstacles
-  Column<float> slides;  // 0 where friction holds a vertex, else 1. Only with obstacles
-  VecColumn rub;         // kg m, friction of what slides on them. Only with obstacles
+  Column<float> slides;       // 0 where friction holds a vertex, else 1. Only with obstacles
+  VecColumn rub;              // kg m, friction of what slides on them. Only with obstacles
   VecColumn residual, scaled, image, direction, direction_image;
   Column<ClothControl> control;
 };

@@ -5,9 +5,9 @@
 // what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
 // what still comes too near is held. Vertices are held, not triangles: between two of them, e
 // apart, a surface of radius R comes e^2 / 8R nearer. The force that holds a vertex is in the
-// solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one that it cannot
-// feels it as a force. Last comes the guard that particles have: no path passes through a surface,
-// whatever the solve says.
+// solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one
+// that it cannot feels it as a force. Last comes the guard that particles have: no path passes
+// through a surface, whatever the solve says.
 
 #include "sim/passes/cloth_implicit.h"
 #include "sim/passes/obstacle_path.h"
