@@ -14,7 +14,7 @@ struct Checkpoint {
   double time = 0;  // s since the first frame
   uint64_t steps = 0;
   int next_id = 0;
-  std::vector<uint64_t> emitted;  // layers that left each emitter
+  std::vector<uint64_t> emitted;  // layers that left each emitter, particles of a mesh
   HostState state;
   std::vector<double> probes;  // rows so far, ProbeSeries
   Digest layout;               // of the shot's settings and the file's layout

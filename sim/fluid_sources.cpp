@@ -186,7 +186,8 @@ class Occupancy {
 
 EmitterLayer emitter_layer(const FluidEmitter& emitter, double a) {
   const double area = inlet_area(emitter), eps = 1e-6;
-  EmitterLayer layer;
+  EmitterLayer layer{};
+  if (emitter.type == EmitterType::mesh) return layer;
   if (emitter.type == EmitterType::disc) {  // the lattice points nearest to the centre
     const int reach = int(std::ceil(emitter.radius / a)) + 1;
     for (int j = -reach; j <= reach; ++j) {

@@ -73,7 +73,8 @@ double fastest(const Animated<V3d>& track, const Timeline& time) {
 
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
-double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double obstacle_speed) {
+double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid,
+                             const std::vector<MeshEmitter>& emitters, double obstacle_speed) {
   const double g = shot.gravity.length();
   double speed2 = obstacle_speed * obstacle_speed, top = -1e300, bottom = 1e300;
   const V3d down = g > 0 ? shot.gravity / g : V3d(0, -1, 0);
@@ -86,6 +87,10 @@ double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid, double
   for (const FluidEmitter& e : shot.fluid.emitter) {
     for (const auto& [frame, center] : e.center.keys)
       see(center, e.speed + fastest(e.center, shot.timeline));
+  }
+  for (const MeshEmitter& e : emitters) {
+    const double fastest = e.fastest();
+    for (const V3d& corner : e.corners()) see(corner, fastest);
   }
   for (const Cloth& c : shot.cloth) speed2 = std::max(speed2, c.velocity.length2());
   for (int k = 0; k < 3; ++k) {  // the floor, if gravity points at a wall
@@ -132,6 +137,7 @@ void set_viscosity(const Shot& shot, Parameters& p) {
 }
 
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
+                            const std::vector<MeshEmitter>& emitters,
                             const ObstacleSet& obstacles) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
@@ -147,7 +153,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
                    : calibrate<cpu::Spiky>(a, h, p);
   const bool chosen = shot.fluid.sound_speed > 0 && !is_incompressible(shot);
   p.sound_speed = float(chosen ? shot.fluid.sound_speed
-                               : automatic_sound_speed(shot, fluid, obstacles.fastest()));
+                               : automatic_sound_speed(shot, fluid, emitters, obstacles.fastest()));
   p.obstacles = obstacles.count(), p.sinks = int(shot.sink.size());
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
@@ -462,7 +468,9 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   scene.obstacles = ObstacleSet(shot, scene.frame, make_level_set);
   if (shot.wind.present) scene.wind = Wind(shot, scene.frame);
   scene.sinks = sinks_of(shot, scene.frame, make_level_set);
-  scene.parameters = build_parameters(shot, scene.frame, fluid, scene.obstacles);
+  scene.mesh_emitter = mesh_emitters(shot, make_level_set);
+  scene.parameters =
+      build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles);
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
+#include "sim/mesh_emitter.h"
 #include "sim/obstacles.h"
 #include "sim/solver.h"
 #include "sim/wind.h"
@@ -68,10 +69,10 @@ void join_at_seams(Sheet& sheet, const Seams& seams);
 /// vertex, a pin that holds nothing, or as join_at_seams.
 Sheet build_sheet(const Cloth& cloth, const Seams& seams = {});
 
-/// What leaves an emitter at once, again and again. A layer holds the volume that passes the inlet
-/// in one interval, so that the flow is area times speed. Its places are a spacing apart and cover
-/// the inlet or a little more; layers are a spacing apart or more by as much: never denser than at
-/// rest, which would push the next layers back into the inlet.
+/// What leaves a disc or rectangle at once, again and again. A layer holds the volume that passes
+/// the inlet in one interval, so that the flow is area times speed. Its places are a spacing apart
+/// and cover the inlet or a little more; layers are a spacing apart or more by as much: never
+/// denser than at rest, which would push the next layers back into the inlet.
 struct EmitterLayer {
   std::vector<std::array<double, 2>> place;  // m, in the plane of the inlet, about its centre
   double interval;                           // s from layer to layer
@@ -110,6 +111,7 @@ struct Scene {
   std::vector<int> first_vertex, first_triangle;  // of each sheet, and one past the end
   ClothTopology cloth;
   ObstacleSet obstacles, sinks;
+  std::vector<MeshEmitter> mesh_emitter;
   Wind wind;
   HostState start;
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
@@ -123,8 +125,8 @@ struct Scene {
 bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
 
 /// @param make_level_set  see ObstacleSet.
-/// @throws Error as build_sheet and ObstacleSet, if nothing is to be simulated, or if fluid starts
-/// inside cloth.
+/// @throws Error as build_sheet, ObstacleSet and MeshEmitter, if nothing is to be simulated, or if
+/// fluid starts inside cloth.
 Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set = {});
 
 }  // namespace drench::sim

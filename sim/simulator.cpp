@@ -57,6 +57,7 @@ struct Simulator::Implementation {
   int next_id = 0;
   std::vector<uint64_t> emitted;
   std::vector<uint64_t> reported;  // HostState::removed of the last report
+  int reported_id = 0;             // next_id of the last report
   sim::ProbeSeries probes;
   sim::Limits limits;
   std::filesystem::path last_checkpoint;
@@ -74,7 +75,7 @@ struct Simulator::Implementation {
     Hasher hasher;
     layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 4").finish();
     frame = shot.timeline.first;
-    next_id = int(scene.start.id.size());
+    next_id = reported_id = int(scene.start.id.size());
     solver->load(scene.start);
     limits = solver->measure();
     time = 0 - shot.preroll;  // no -0
@@ -99,16 +100,12 @@ struct Simulator::Implementation {
   void emit(double until) {
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& source = shot.fluid.emitter[e];
+      if (source.type == EmitterType::mesh) continue;
       for (;; ++emitted[e]) {
         const double leaves =
             source.start - shot.preroll + (double(emitted[e]) + 0.5) * layer[e].interval;
         if (leaves > until || leaves > source.stop - shot.preroll) break;
-        if (solver->particles() + layer[e].place.size() > max_particles) {
-          throw Error(fmt::format(
-              "{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or "
-              "stop the emitter earlier",
-              shot.file.string(), e + 1, max_particles, until));
-        }
+        check_room(e, layer[e].place.size(), until);
         const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
         sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
         limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
@@ -116,6 +113,34 @@ struct Simulator::Implementation {
         add_layer(layer[e], inlet, until);
       }
     }
+    for (sim::MeshEmitter& e : scene.mesh_emitter) {
+      if (e.active(until)) fill(e, until);
+    }
+  }
+
+  void check_room(size_t emitter, size_t more, double now) const {
+    if (solver->particles() + more <= max_particles) return;
+    throw Error(fmt::format(
+        "{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or stop the "
+        "emitter earlier",
+        shot.file.string(), emitter + 1, max_particles, now));
+  }
+
+  /// What a mesh that is kept full lacks, less what would appear inside an obstacle.
+  void fill(sim::MeshEmitter& emitter, double now) {
+    sim::HostVec position, velocity;
+    std::vector<int> id;
+    for (const auto& [p, u] : emitter.missing(scene, solver->positions(), now)) {
+      if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
+      position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
+      velocity.push(float(u.x), float(u.y), float(u.z));
+      limits.max_speed = std::max(limits.max_speed, float(u.length()));
+      id.push_back(next_id++);
+    }
+    if (id.empty()) return;
+    check_room(emitter.index(), id.size(), now);
+    solver->append(position, velocity, id);
+    emitted[emitter.index()] += id.size();
   }
 
   /// Less what would appear inside an obstacle.
@@ -211,12 +236,13 @@ struct Simulator::Implementation {
                                         : ", a softer cloth or a larger fluid.sound_speed"));
   }
 
-  /// What sinks took and open sides let go since the last report.
-  void count_removed(StepReport& report, const std::vector<uint64_t>& removed) {
+  /// What emitters added, sinks took and open sides let go since the last report.
+  void count_particles(StepReport& report, const std::vector<uint64_t>& removed) {
     for (size_t k = 0; k < shot.sink.size(); ++k)
       report.drained.emplace_back(shot.sink[k].shape.name, removed[k] - reported[k]);
     report.lost = removed.back() - reported.back();
-    reported = removed;
+    report.emitted = uint64_t(next_id - reported_id);
+    reported = removed, reported_id = next_id;
   }
 
   void describe(StepReport& report) {
@@ -266,7 +292,7 @@ struct Simulator::Implementation {
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
     for (const sim::ColumnMemory& group : solver->memory()) report.memory += group.bytes;
-    count_removed(report, state.removed);
+    count_particles(report, state.removed);
   }
 
   ParticleFrame particles() const {
@@ -372,7 +398,7 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   s.scene.obstacles.place(*s.solver, s.time, s.time);
   s.scene.sinks.place(*s.solver, s.time, s.time);
   s.solver->refresh();
-  s.reported = checkpoint.state.removed;
+  s.reported = checkpoint.state.removed, s.reported_id = s.next_id;
   s.last_checkpoint = path;
 }
 

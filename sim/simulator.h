@@ -43,6 +43,7 @@ struct StepReport {
   uint64_t guard_hits = 0;            // particles that the path test held back
   uint64_t memory = 0;                // bytes of the state on its device, room to grow included
   std::vector<std::pair<std::string, uint64_t>> drained;  // particles that each sink took
+  uint64_t emitted = 0;                                   // particles that emitters added
   uint64_t lost = 0;  // particles that left the domain through an open side
 };
 

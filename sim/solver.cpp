@@ -88,6 +88,7 @@ class BackendSolver : public Solver {
     return host;
   }
 
+  HostVec positions() const override { return download(state_.fluid.position, state_.fluid.count); }
   std::vector<float> density() const override {
     return to_host(state_.fluid.density, state_.fluid.count);
   }

@@ -94,6 +94,7 @@ class Solver {
   virtual ~Solver() = default;
   virtual void load(const HostState& state) = 0;
   virtual HostState save() const = 0;
+  virtual HostVec positions() const = 0;  // of the particles, m local
   /// Fluid density of every particle, kg/m^3, and nearest triangles (-1 none), as of refresh() or
   /// step().
   virtual std::vector<float> density() const = 0;
@@ -127,7 +128,7 @@ class Solver {
   /// step. What the numbers are: sim/probe_query.h.
   virtual std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) = 0;
   virtual std::vector<PassInfo> plan() const = 0;
-  virtual unsigned allocated() const = 0;  // ColumnGroup of the columns in memory
+  virtual unsigned allocated() const = 0;                // ColumnGroup of the columns in memory
   virtual std::vector<ColumnMemory> memory() const = 0;  // of the groups that take anything
   virtual int particles() const = 0;
 };

@@ -75,15 +75,22 @@ struct FluidSphere {
   double radius = 0;
   V3d velocity{0, 0, 0};
 };
-enum class EmitterType { disc, rectangle };
+enum class EmitterType { disc, rectangle, mesh };
 
-struct FluidEmitter {  // an inlet; particles leave as lattice layers
+/// An inlet, which particles leave as lattice layers, or a closed mesh that is kept full. As in
+/// Obstacle, the mesh's own frame has the origin at `center`.
+struct FluidEmitter {
   EmitterType type = EmitterType::disc;
   Animated<V3d> center{V3d(0)};            // m; the fluid takes on its velocity
   Animated<V3d> direction{V3d(0, -1, 0)};  // disc: any length but 0
   double radius = 0.05;                    // disc, m
   V3d u{0.1, 0, 0}, v{0, 0, 0.1};          // rectangle: half edges, m; fluid leaves along u x v
-  double speed = 0;                        // m/s, relative to the inlet
+  double speed = 0;                        // disc, rectangle: m/s, relative to the inlet
+  std::filesystem::path mesh_file;         // mesh: PLY or OBJ, absolute after reading
+  Animated<V3d> rotation_deg{V3d(0)};      // mesh: about x, then y, then z of the world
+  double scale = 1;                        // mesh: of its coordinates, to m
+  double inset = 0.5;                      // mesh: as of FluidVolume, spacings
+  V3d velocity{0, 0, 0};                   // mesh: m/s, besides the mesh's own
   double start = 0, stop = 1e9;            // s after the simulation's start
 };
 /// A closed mesh filled with lattice particles at the start. As in Obstacle, its own frame has the

@@ -145,7 +145,7 @@ class Reader {
       }
       void* const object = section.at(owner, index);
       read_table(section, object, own, *item.as_table());
-      check_required(section, own, *item.as_table(), where);
+      check_required(section, object, own, *item.as_table(), where);
       if (section.name_of && !item.as_table()->contains("name"))
         name_by_number(section, object, index);
     }
@@ -179,10 +179,11 @@ class Reader {
     if (index > 0) name = fmt::format("{}{}", section.name, index + 1);
   }
 
-  void check_required(const Section& section, const std::string& path, const toml::table& table,
-                      const std::string& where) const {
+  void check_required(const Section& section, void* object, const std::string& path,
+                      const toml::table& table, const std::string& where) const {
     for (const Parameter* p : shot_table::parameters_of(section.name)) {
       if (!p->required || table.contains(p->key)) continue;
+      if (!shot_table::applies(*p, section, object)) continue;
       fail(where, fmt::format("{} has no {}; add {} = ... ({}; {})", path, p->key, p->key,
                               shot_table::kind_text(*p), p->description));
     }
@@ -258,6 +259,7 @@ class Reader {
     if (section.name == "fluid.emitter") {
       FluidEmitter& emitter = *static_cast<FluidEmitter*>(object);
       emitter.direction.interpolation = emitter.center.interpolation;
+      emitter.rotation_deg.interpolation = emitter.center.interpolation;
     }
   }
 

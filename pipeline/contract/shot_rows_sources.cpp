@@ -4,23 +4,24 @@ namespace drench::shot_table {
 
 namespace {
 
-constexpr unsigned disc = 1, rectangle = 2;  // bits of EmitterType
-constexpr Limits turns{-360000, 360000};     // deg
+constexpr unsigned disc = 1, rectangle = 2, body = 4;  // bits of EmitterType
+constexpr Limits turns{-360000, 360000};               // deg
 
 std::vector<Parameter> emitter_rows() {
   return {
-      row<&FluidEmitter::type>("fluid.emitter", "type", "", none, simulate, "shape of the inlet")
-          .one_of({"disc", "rectangle"})
+      row<&FluidEmitter::type>("fluid.emitter", "type", "", none, simulate,
+                               "an inlet, or a closed mesh that is kept full")
+          .one_of({"disc", "rectangle", "mesh"})
           .identity(),
       row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
-                                 "centre of the inlet; may be animated: the fluid takes on its "
-                                 "velocity")
+                                 "centre of the inlet, or where the origin of the mesh stands; may "
+                                 "be animated: the fluid takes on its velocity")
           .needed(),
       row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
                                     "the way the fluid leaves; any length but 0; may be animated")
           .only(disc),
       row<&FluidEmitter::center>("fluid.emitter", "interp", "", none, simulate,
-                                 "between the keys of center and direction")
+                                 "between the keys of center, direction and rotation_deg")
           .as(Kind::track_mode)
           .one_of({"linear", "smooth"}),
       row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
@@ -33,7 +34,25 @@ std::vector<Parameter> emitter_rows() {
           .only(rectangle),
       row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
                                 "relative to the inlet")
+          .only(disc | rectangle)
           .needed(),
+      row<&FluidEmitter::mesh_file>("fluid.emitter", "mesh", "", none, simulate,
+                                    "closed PLY or OBJ: every place in it of the lattice that "
+                                    "begins at domain.min is filled whenever it is free")
+          .only(body)
+          .needed(),
+      row<&FluidEmitter::rotation_deg>("fluid.emitter", "rotation_deg", "deg", turns, simulate,
+                                       "about x, then y, then z through center; may be animated")
+          .only(body),
+      row<&FluidEmitter::scale>("fluid.emitter", "scale", "", {1e-6, 1e6}, simulate,
+                                "metres for a unit of the file")
+          .only(body),
+      row<&FluidEmitter::inset>("fluid.emitter", "inset", "", {0, 1}, simulate,
+                                "how deep inside the surface particles appear at least / spacing")
+          .only(body),
+      row<&FluidEmitter::velocity>("fluid.emitter", "velocity", "m/s", speed, simulate,
+                                   "of new fluid, added to that of the mesh where it appears")
+          .only(body),
       row<&FluidEmitter::start>("fluid.emitter", "start", "s", {0, 1e9}, simulate,
                                 "after the simulation's start"),
       row<&FluidEmitter::stop>("fluid.emitter", "stop", "s", {0, 1e9}, simulate,

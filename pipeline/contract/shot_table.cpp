@@ -486,8 +486,10 @@ const std::vector<Section>& sections() {
       single<&Shot::fluid>("fluid", "The fluid. Without sources there is none."),
       repeated<&Fluid::box>("fluid.box", "fluid", "A block of fluid at the start."),
       repeated<&Fluid::sphere>("fluid.sphere", "fluid", "A ball of fluid at the start."),
-      emitters(repeated<&Fluid::emitter>("fluid.emitter", "fluid",
-                                         "An inlet, standing or moving as its keys say.")),
+      emitters(repeated<&Fluid::emitter>(
+          "fluid.emitter", "fluid",
+          "An inlet, or a mesh that is kept full, standing or moving as its "
+          "keys say.")),
       repeated<&Fluid::drops>("fluid.drops", "fluid",
                               "Drops with centres drawn evenly in a box and kept apart."),
       repeated<&Fluid::volume>("fluid.volume", "fluid",

@@ -282,12 +282,14 @@ std::string described_shot(
   return text + quality_text;
 }
 
-/// Every key of a section, as a comment: for what the reference cannot have, and why.
-std::string commented(const char* name, const char* why) {
+/// Every key of a section, or of one of its objects, as a comment: for what the reference cannot
+/// have, and why.
+std::string commented(const char* name, const char* why, void* object = nullptr) {
   const Section& section = *shot_table::find_section(name);
   std::string text = fmt::format("\n# {} {}\n# {}\n", section.description, why, header_of(section));
   for (const Parameter* p : shot_table::parameters_of(section.name)) {
-    const std::string value = default_text(*p);
+    if (object && !shot_table::applies(*p, section, object)) continue;
+    const std::string value = object && p->fixed ? shown_value(*p, object) : default_text(*p);
     text += fmt::format("# {} = {}  # {}{}: {}\n", p->key,
                         value.empty() || value[0] == '*' ? "..." : value,
                         p->required ? "required; " : "", value_column(*p), p->description);
@@ -308,7 +310,10 @@ std::string reference_shot(const std::string& name) {
         return fmt::format("{}  # {}{}: {}\n", line, p.required ? "required; " : "",
                            value_column(p), p.description);
       });
-  return text + commented("fluid.volume", "Not without its file.") +
+  FluidEmitter mesh;
+  mesh.type = EmitterType::mesh;
+  return text + commented("fluid.emitter", "A mesh not without its file.", &mesh) +
+         commented("fluid.volume", "Not without its file.") +
          commented("obstacle", "At its defaults it would stand in the fluid above.") +
          commented("sink", "At its defaults it would take the fluid above.");
 }

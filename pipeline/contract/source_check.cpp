@@ -21,6 +21,8 @@ class SourceChecker {
       : shot_(shot), sources_(sources), path_(std::move(path)) {}
 
   void check(const FluidEmitter& emitter) const {
+    check_window(emitter.start, emitter.stop);
+    if (emitter.type == EmitterType::mesh) return check_mesh(emitter.mesh_file);
     if (emitter.type == EmitterType::disc) {
       check_positive("radius", emitter.radius, " m", "the inlet has no area");
       for (const double frame : frames_of(emitter.direction))
@@ -29,14 +31,10 @@ class SourceChecker {
       check_edges(emitter);
     }
     check_positive("speed", emitter.speed, " m/s", "nothing would flow");
-    check_window(emitter.start, emitter.stop);
     for (const double frame : frames_of(emitter.center)) check_inside(emitter.center.at(frame));
   }
 
-  void check(const FluidVolume& volume) const {
-    if (volume.mesh_file.empty()) fail("mesh", path_ + ".mesh is empty; name a closed PLY or OBJ");
-    check_single_file(volume.mesh_file);
-  }
+  void check(const FluidVolume& volume) const { check_mesh(volume.mesh_file); }
 
   void check(const Sink& sink) const {
     const Obstacle& shape = sink.shape;
@@ -107,6 +105,11 @@ class SourceChecker {
     }
   }
 
+  void check_mesh(const std::filesystem::path& file) const {
+    if (file.empty()) fail("mesh", path_ + ".mesh is empty; name a closed PLY or OBJ");
+    check_single_file(file);
+  }
+
   void check_single_file(const std::filesystem::path& file) const {
     if (!is_sequence(file)) return;
     fail("mesh", fmt::format("{}.mesh is {}, a sequence; only an [[obstacle]] may deform. Name one "
@@ -122,6 +125,7 @@ class SourceChecker {
 }  // namespace
 
 double inlet_area(const FluidEmitter& emitter) {
+  if (emitter.type == EmitterType::mesh) return 0;
   if (emitter.type == EmitterType::rectangle) return 4 * emitter.u.cross(emitter.v).length();
   return std::numbers::pi * emitter.radius * emitter.radius;
 }

@@ -6,7 +6,7 @@
 
 namespace drench {
 
-/// m^2
+/// m^2; of a disc or rectangle, else 0.
 double inlet_area(const FluidEmitter& emitter);
 
 /// @throws Error with place, keys, values, reason and remedy for the first emitter, volume, sink or

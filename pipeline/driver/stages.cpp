@@ -46,6 +46,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"sheets_cut_short", step.sheets_cut_short},
                      {"viscous_unconverged", step.viscous_unconverged},
                      {"drained", drained},
+                     {"emitted", step.emitted},
                      {"lost", step.lost},
                      {"state_mib", double(step.memory) / (1 << 20)},
                      {"guard_hits", step.guard_hits}}
@@ -53,6 +54,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
   report.line =
       fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
                   step.steps, step.cloth_substeps, step.limit, step.particles, step.max_speed);
+  if (step.emitted > 0) report.line += fmt::format(" emitted={}", step.emitted);
   for (const auto& [sink, count] : step.drained) {
     if (count > 0) report.line += fmt::format(" {}={}", sink, count);
   }

@@ -73,6 +73,7 @@ void add_obstacle_meshes(const Shot& shot, StageKeyBuilder& builder) {
 }
 
 void add_source_meshes(const Shot& shot, StageKeyBuilder& builder) {
+  for (const FluidEmitter& emitter : shot.fluid.emitter) builder.file(emitter.mesh_file);
   for (const FluidVolume& volume : shot.fluid.volume) builder.file(volume.mesh_file);
   for (const Sink& sink : shot.sink) builder.file(sink.shape.mesh_file);
 }

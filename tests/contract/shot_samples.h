@@ -56,6 +56,14 @@ speed = 1
 stop = 0.2
 interp = "smooth"
 
+[[fluid.emitter]]
+type = "mesh"
+mesh = "drop.obj"
+center = [0.2, 1.5, 0]
+rotation_deg = [[1001, [0, 0, 0]], [1012, [0, 90, 0]]]
+scale = 0.2
+velocity = [0, -1, 0]
+
 [[fluid.volume]]
 mesh = "drop.obj"
 position = [0, 1.4, 0]
