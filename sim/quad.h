@@ -54,6 +54,10 @@ DRENCH_HD Quad rotate(Quad a) { return {a.y, a.z, a.x, a.w}; }
 /// z, x, y, w.
 DRENCH_HD Quad rotate_back(Quad a) { return {a.z, a.x, a.y, a.w}; }
 DRENCH_HD Quad both(const Float4& a) { return {a.x, a.y, a.z, a.w}; }
+DRENCH_HD Quad splat(float a) { return {a, a, a, a}; }
+DRENCH_HD Quad positive(Quad a) {
+  return {fmaxf(a.x, 0.f), fmaxf(a.y, 0.f), fmaxf(a.z, 0.f), fmaxf(a.w, 0.f)};
+}
 DRENCH_HD Quad nearest_integer(Quad a) { return {rintf(a.x), rintf(a.y), rintf(a.z), rintf(a.w)}; }
 
 #else
@@ -95,6 +99,10 @@ DRENCH_HD Quad spread_last(Quad a) {
   return Quad(Quad::Native(_mm256_permutevar_ps(a.v, _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3))));
 }
 DRENCH_HD Quad both(const Float4& a) { return both(&a.x); }
+DRENCH_HD Quad splat(float a) { return Quad(a); }
+DRENCH_HD Quad positive(Quad a) {
+  return Quad(Quad::Native(_mm256_max_ps(a.v, _mm256_setzero_ps())));
+}
 DRENCH_HD Quad side_by_side(const Float4& a, const Float4& b) {
   return Quad(Quad::Native(
       _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(&a.x)), _mm_load_ps(&b.x), 1)));

@@ -134,7 +134,7 @@ class BackendSolver : public Solver {
     Limits limits = measure_limits(state_);
     if (state_.parameters.incompressible && state_.fluid.count > 0) {
       const SolveControl solve = value_at(state_.pressure.control, 0);
-      limits.residual = solve.residual, limits.iterations = solve.iterations;
+      limits.residual = solve.residual, limits.iterations = std::max(solve.spent, solve.iterations);
       limits.step = float(dt);
       if (allocated_ & column_cloth_system) {
         const ClothControl sheets = value_at(state_.cloth_system.control, 0);

@@ -157,6 +157,7 @@ struct SolveControl {
   float relaxation = 0.4f;  // below 1 / the largest eigenvalue of the scaled matrix: 0.5 diverges
   float momentum = 1.f, extrapolation = 0.f;
   float mean = 0.f;  // kg/m^3, of the source; only where the fluid is full
+  int spent = 0;     // iterations of a solve before in the same step
 };
 
 /// Scalars of a viscous solve.
@@ -185,11 +186,12 @@ struct PressureState {
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
   Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
   Column<Float4> push;  // m^4/(kg s^2) a unit of q of the particle itself: acceleration
+  Column<Float4> way;   // m, see MeanWay
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
 
   void resize(size_t n) {
-    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push})
+    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push, &way})
       c->resize(n);
     for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
     control.resize(1);

@@ -30,7 +30,7 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("neighbour lists", p.lists.index, p.lists.closeness, p.lists.begin,
                           p.lists.blocks));
   all.push_back(memory_of("rows of the pressure solve", p.place, p.vector, p.wall, p.correction,
-                          p.correction_cross, p.push));
+                          p.correction_cross, p.push, p.way));
   all.push_back(memory_of("unknowns of the pressure solve", p.inverse_diagonal, p.source, p.before,
                           p.next, p.product, p.control));
   all.push_back(memory_of("implicit viscosity", v.solution, v.residual, v.direction, v.product,

@@ -3,6 +3,7 @@
 #include "sim/passes/contact_exact.h"
 #include "sim/passes/contact_paper.h"
 #include "sim/passes/density.h"
+#include "sim/passes/full_box.h"
 #include "sim/passes/incompressible.h"
 #include "sim/passes/move.h"
 #include "sim/passes/obstacle_guard.h"
@@ -121,6 +122,12 @@ bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; 
 bool free_of_obstacles(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.obstacles == 0;
 }
+bool with_surface(const Parameters& p, bool cloth) {
+  return free_of_obstacles(p, cloth) && !p.full;
+}
+bool without_surface(const Parameters& p, bool cloth) {
+  return free_of_obstacles(p, cloth) && p.full;
+}
 bool around_obstacles(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.obstacles > 0;
 }
@@ -170,7 +177,9 @@ const Pass all_passes[] = {
      column_velocity | column_projection | column_tension, apply_surface_tension},
     {"smooth_velocities", smoothed, column_velocity | column_projection,
      column_velocity | column_projection, smooth_velocities},
-    {"project_density", free_of_obstacles, moving | column_density | column_projection,
+    {"project_full_box", without_surface, moving | column_density | column_projection,
+     moving | column_density | column_projection, project_full_box},
+    {"project_density", with_surface, moving | column_density | column_projection,
      moving | column_density | column_projection, project_density},
     {"project_around_obstacles", around_obstacles, moving | column_density | column_projection,
      moving | column_density | column_projection, project_around_obstacles},

@@ -62,6 +62,21 @@ struct GradientMoments {
   }
 };
 
+/// L of M, both with diagonal and cross entries, M times diagonal.w; 1 where there is none or where
+/// M is far from 1.
+DRENCH_HD void invert_moments(const Float4& d, const Float4& c, Float4& diagonal, Float4& cross) {
+  diagonal = {1.f, 1.f, 1.f, 0.f}, cross = {0.f, 0.f, 0.f, 0.f};
+  if (d.w == 0.f) return;
+  const float w = 1.f / d.w, x = w * d.x, y = w * d.y, z = w * d.z;
+  const float xy = w * c.x, yz = w * c.y, zx = w * c.z;
+  const float xx = y * z - yz * yz, xxy = yz * zx - xy * z, xzx = xy * yz - y * zx;  // cofactors
+  const float determinant = x * xx + xy * xxy + zx * xzx;
+  if (determinant < 0.5f) return;  // flattened by an impact
+  const float f = (x + y + z) / (3.f * determinant);
+  diagonal = {f * xx, f * (x * z - zx * zx), f * (x * y - xy * xy), 0.f};
+  cross = {f * xxy, f * (xy * zx - x * yz), f * xzx, 0.f};
+}
+
 /// L of the mean of M.
 struct GradientCorrection {
   static constexpr int columns = 2;
@@ -89,18 +104,20 @@ struct GradientCorrection {
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 d = sum.diagonal, c = sum.cross;
-    diagonal[i] = {1.f, 1.f, 1.f, 0.f}, cross[i] = {0.f, 0.f, 0.f, 0.f};
-    if (d.w == 0.f || wall[i].w > 0.f) return;
-    const float w = 1.f / d.w, x = w * d.x, y = w * d.y, z = w * d.z;
-    const float xy = w * c.x, yz = w * c.y, zx = w * c.z;
-    const float xx = y * z - yz * yz, xxy = yz * zx - xy * z, xzx = xy * yz - y * zx;  // cofactors
-    const float determinant = x * xx + xy * xxy + zx * xzx;
-    if (determinant < 0.5f) return;  // flattened by an impact
-    const float f = (x + y + z) / (3.f * determinant);
-    diagonal[i] = {f * xx, f * (x * z - zx * zx), f * (x * y - xy * xy), 0.f};
-    cross[i] = {f * xxy, f * (xy * zx - x * yz), f * xzx, 0.f};
+    const float seen = wall[i].w > 0.f ? 0.f : d.w;
+    invert_moments({d.x, d.y, d.z, seen}, c, diagonal[i], cross[i]);
   }
 };
+
+/// L of each M by itself, where nothing boils: the domain is full (full_box.h).
+inline void correct_alone(State& state) {
+  PressureState& s = state.pressure;
+  const Float4 *moment = s.vector.data(), *cross = s.push.data();
+  Float4 *own = s.correction.data(), *own_cross = s.correction_cross.data();
+  parallel_for(
+      "neighbours: own correction", state.fluid.count,
+      DRENCH_LAMBDA(int i) { invert_moments(moment[i], cross[i], own[i], own_cross[i]); });
+}
 
 /// L of every particle, from positions, walls and densities. Uses PressureState::vector and push.
 inline void correct_gradients(State& state) {
@@ -115,6 +132,7 @@ inline void correct_gradients(State& state) {
                                                              s.vector.data(), s.push.data(), scale,
                                                              0.95f * p.rest_density, separation});
   });
+  if (p.full) return correct_alone(state);
   for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
                      GradientCorrection{s.vector.data(), s.push.data(), s.wall.data(),
                                         s.correction.data(), s.correction_cross.data()});

@@ -27,6 +27,7 @@ struct PressureIteration {
   SolveControl* control;
   float tolerance, scale;  // of the residual's mean; 1 / (n rest_density)
   int most_iterations;
+  float least;  // pressures are not below
 
   /// A projected step from the extrapolated pressures; what is left of the residual there, over-
   /// and underdense: pressure that is too high makes energy.
@@ -34,9 +35,9 @@ struct PressureIteration {
     if (control->done) return {};
     const float y = place[i].w, d = inverse_diagonal[i];
     const float gradient = -product[i] - source[i];
-    const float x = d == 0.f ? 0.f : max0(y - control->relaxation * d * gradient);
+    const float x = d == 0.f ? 0.f : maximum(y - control->relaxation * d * gradient, least);
     next[i] = x;
-    const float left = d == 0.f ? 0.f : y > 0.f ? fabsf(gradient) : max0(-gradient);
+    const float left = d == 0.f ? 0.f : y > least ? fabsf(gradient) : max0(-gradient);
     const double change = double(x) - before[i];
     return {double(left), d == 0.f ? 0. : double(y - x) * change / d};
   }
@@ -64,7 +65,7 @@ struct PressureIteration {
   DRENCH_HD void extrapolate(int i) const {
     if (control->done) return;
     const float x = next[i];
-    place[i].w = max0(x + control->extrapolation * (x - before[i]));
+    place[i].w = maximum(x + control->extrapolation * (x - before[i]), least);
     before[i] = x;
   }
 };
@@ -83,10 +84,8 @@ inline bool solve_ended(const PressureState& s, int iteration) {
 
 /// A fluid without a free surface has nowhere to go: its mean density is what it is (the kernel's
 /// sum over particles out of order is above rest), and no pressure changes it. What pressures can
-/// do is to make it even. They need not pull for that: their level is arbitrary and rises until
-/// they push everywhere. Against rest density they would rise without end: Taylor and Green's
-/// vortices decayed 56 % too fast at 50 particles to the side in place of 18.6 %. Pressures of
-/// either sign were tried and dropped: 79 % against 27 % by t U/L = 0.2.
+/// do is to make it even. Against rest density they would rise without end: Taylor and Green's
+/// vortices decayed 56 % too fast at 50 particles to the side in place of 18.6 %.
 inline void remove_mean(State& state) {
   PressureState& s = state.pressure;
   SolveControl* control = s.control.data();
@@ -99,32 +98,69 @@ inline void remove_mean(State& state) {
       "solve: source", n, DRENCH_LAMBDA(int i) { source[i] -= control->mean; });
 }
 
-/// Solves for dt^2 p / rho^2 from the warm start in FluidState::pressure_term, until the mean
-/// residual is `tolerance` of the rest density. Leaves it in s.place, -D^T of it, a displacement,
-/// in s.vector.
-inline void solve_pressure(State& state, float tolerance, int most_iterations) {
-  PressureState& s = state.pressure;
-  const int n = state.fluid.count;
-  if (n == 0) return;  // the last ones have just left an open domain
+constexpr float no_pull = 0.f, any_pressure = -1e30f;  // least pressures
+
+/// Before the first solve of a step ...
+inline void begin_solve(PressureState& s) {
   SolveControl* control = s.control.data();
-  Float4* place = s.place.data();
-  float *term = state.fluid.pressure_term.data(), *before = s.before.data();
-  const float dt2 = float(state.dt * state.dt), inverse_dt2 = float(1 / (state.dt * state.dt));
-  const PressureIteration iteration{place,
-                                    before,
+  parallel_for(
+      "solve: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+}
+/// ... and before another one.
+inline void begin_next_solve(PressureState& s) {
+  SolveControl* control = s.control.data();
+  parallel_for(
+      "solve: control", 1, DRENCH_LAMBDA(int) {
+        const int spent = control->iterations;
+        *control = {};
+        control->spent = spent;
+      });
+}
+
+/// First guess: the pressures of the last step, in FluidState::pressure_term, ...
+inline void start_from_last_step(State& state) {
+  Float4* place = state.pressure.place.data();
+  float *term = state.fluid.pressure_term.data(), *before = state.pressure.before.data();
+  const float dt2 = float(state.dt * state.dt);
+  parallel_for(
+      "solve: warm start", state.fluid.count,
+      DRENCH_LAMBDA(int i) { place[i].w = before[i] = dt2 * term[i]; });
+}
+/// ... or none.
+inline void start_from_nothing(State& state) {
+  Float4* place = state.pressure.place.data();
+  float* before = state.pressure.before.data();
+  parallel_for(
+      "solve: cold start", state.fluid.count,
+      DRENCH_LAMBDA(int i) { place[i].w = before[i] = 0.f; });
+}
+inline void keep_pressures(State& state) {
+  const Float4* place = state.pressure.place.data();
+  float* term = state.fluid.pressure_term.data();
+  const float inverse_dt2 = float(1 / (state.dt * state.dt));
+  parallel_for(
+      "solve: end", state.fluid.count,
+      DRENCH_LAMBDA(int i) { term[i] = place[i].w * inverse_dt2; });
+}
+
+/// Solves for dt^2 p / rho^2 from the first guess in s.place, until the mean residual is
+/// Parameters::tolerance of the rest density. Leaves it there, and -D^T of it, a displacement, in
+/// s.vector.
+inline void find_pressures(State& state, float least) {
+  PressureState& s = state.pressure;
+  const int n = state.fluid.count, most_iterations = state.parameters.most_iterations;
+  const PressureIteration iteration{s.place.data(),
+                                    s.before.data(),
                                     s.next.data(),
                                     s.source.data(),
                                     s.inverse_diagonal.data(),
                                     s.product.data(),
-                                    control,
-                                    tolerance,
+                                    s.control.data(),
+                                    state.parameters.tolerance,
                                     1.f / (float(n) * state.parameters.rest_density),
-                                    most_iterations};
-  parallel_for(
-      "solve: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+                                    most_iterations,
+                                    least};
   if (state.parameters.full) remove_mean(state);
-  parallel_for(
-      "solve: warm start", n, DRENCH_LAMBDA(int i) { place[i].w = before[i] = dt2 * term[i]; });
   const bool sheets = state.contact.near > 0;
   if (sheets) start_sheets(state);
   for (int k = 0; k <= most_iterations && !solve_ended(s, k - 1); ++k) {
@@ -140,8 +176,15 @@ inline void solve_pressure(State& state, float tolerance, int most_iterations) {
     parallel_for(
         "solve: extrapolate", n, DRENCH_LAMBDA(int i) { iteration.extrapolate(i); });
   }
-  parallel_for(
-      "solve: end", n, DRENCH_LAMBDA(int i) { term[i] = place[i].w * inverse_dt2; });
+}
+
+/// Pressures that push fluid apart to rest density.
+inline void solve_pressure(State& state) {
+  if (state.fluid.count == 0) return;  // the last ones have just left an open domain
+  begin_solve(state.pressure);
+  start_from_last_step(state);
+  find_pressures(state, no_pull);
+  keep_pressures(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

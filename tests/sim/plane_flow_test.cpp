@@ -16,19 +16,18 @@ TEST(PlaneFlow, ADropInAStrainingFlowBecomesTheEllipse) {
                                    fine = validation::elliptical_drop(25, 1e-4, 0.8);
   EXPECT_LT(coarse.axis, 0.02);
   EXPECT_LT(fine.axis, 0.01);
-  EXPECT_LT(fine.energy, 0.025);
-  EXPECT_LT(fine.energy, 0.7 * coarse.energy);
+  EXPECT_LT(coarse.energy, 0.005);  // measured 0.0013
+  EXPECT_LT(fine.energy, 0.005);    // 0.0019
   EXPECT_LT(fine.thickness, 0.01);
 }
 
-// Particles out of order add a friction of their own: the decay rate is 38 % too large at 25
-// particles to the side (to t U/L = 0.5), 18.6 % at 50 and 14.4 % at 100 (to 1).
-TEST(PlaneFlow, VorticesDecayTooFastAndLessSoOnceFiner) {
-  const validation::TaylorGreen coarse = validation::taylor_green(25, 1e-4, 0.5),
-                                fine = validation::taylor_green(50, 1e-4, 0.5);
-  EXPECT_LT(std::abs(coarse.rate), 0.45);
-  EXPECT_LT(std::abs(fine.rate), 0.7 * std::abs(coarse.rate));
-  EXPECT_LT(fine.thickness, 0.01);
+TEST(PlaneFlow, VorticesDecayByTheirViscosity) {
+  for (const int across : {25, 50}) {
+    const validation::TaylorGreen flow = validation::taylor_green(across, 1e-4, 0.5);
+    EXPECT_LT(std::abs(flow.rate), 0.025) << across;
+    EXPECT_LT(flow.speed, 0.02) << across;
+    EXPECT_LT(flow.thickness, 0.01) << across;
+  }
 }
 
 // The period of two swings was 0.44 % off; height is not kept (docs/benchmarks.md).
@@ -36,7 +35,7 @@ TEST(PlaneFlow, AStandingWaveHasThePeriodOfLinearTheory) {
   const validation::StandingWave wave = validation::standing_wave(20, 1e-4, 2);
   EXPECT_LT(std::abs(wave.period), 0.02);  // measured -0.44 %
   EXPECT_LT(wave.amplitude, 1);
-  EXPECT_GT(wave.amplitude, 0.3);  // measured 0.57
+  EXPECT_GT(wave.amplitude, 0.6);  // measured 0.75
 }
 
 /// A box without a free surface whose particles are out of order: more than half a spacing apart
@@ -81,7 +80,7 @@ TEST(FullDomain, DensityIsMadeEven) {
   for (const float rho : density) spread += std::abs(rho - mean) / double(density.size());
   EXPECT_LT(run.limits.iterations, run.scene.parameters.most_iterations);
   EXPECT_GT(mean, 1000);
-  EXPECT_LT(spread, 0.01 * mean);
+  EXPECT_LT(spread, 1e-3 * mean);
 }
 
 }  // namespace
