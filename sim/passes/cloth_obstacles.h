@@ -118,6 +118,7 @@ inline void hold_at_obstacles(State& state) {
   const BlockInverse block = block_inverse(state);
   const ClothHold hold = cloth_hold_of(state);
   state.cloth_system.normal.clear();
+  state.cloth_system.rub.clear();  // what is held in a later round would feel the last step's
   parallel_for(
       "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
         hold.grip[i] = -1, slides[i] = 1.f;

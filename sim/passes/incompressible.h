@@ -82,7 +82,6 @@ inline void find_neighbours(State& state) {
 template <class Move>
 void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
   solve_pressure(state);
   if (state.cloth.vertices > 0) settle_sheets(state);
   find_kick(state, float(state.dt));
