@@ -233,7 +233,10 @@ class BackendSolver : public Solver {
       for (Column<float>* c : {&f.density, &f.pressure_term}) c->resize(n);
       if (!state_.parameters.incompressible) f.inverse_density.resize(n);
     }
-    if (allocated_ & column_projection) state_.pressure.resize(n);
+    if (allocated_ & column_projection) {
+      state_.pressure.resize(n);
+      if (state_.parameters.full) state_.pressure.way.resize(n);
+    }
     if (allocated_ & column_tension) state_.tension.normal.resize(n);
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,

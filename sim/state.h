@@ -186,12 +186,12 @@ struct PressureState {
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
   Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
   Column<Float4> push;  // m^4/(kg s^2) a unit of q of the particle itself: acceleration
-  Column<Float4> way;   // m, see MeanWay
+  Column<Float4> way;   // m, see MeanWay; only in a full box
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
 
   void resize(size_t n) {
-    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push, &way})
+    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push})
       c->resize(n);
     for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
     control.resize(1);

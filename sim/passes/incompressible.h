@@ -10,7 +10,6 @@
 #include "sim/passes/image_walls.h"
 #include "sim/passes/move.h"
 #include "sim/passes/obstacle_share.h"
-#include "sim/passes/pressure_kick.h"
 #include "sim/passes/pressure_solve.h"
 #include "sim/passes/sheet_filter.h"
 #include "sim/passes/velocity_smoothing.h"
@@ -84,17 +83,15 @@ void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   solve_pressure(state);
   if (state.cloth.vertices > 0) settle_sheets(state);
-  find_kick(state, float(state.dt));
   const VecView x = f.position.view(), v = f.velocity.view();
-  const Float4 *displacement = state.pressure.vector.data(), *kick = state.pressure.push.data();
+  const Float4* displacement = state.pressure.vector.data();
   const float inverse_dt = float(1 / state.dt);
   parallel_for(
       "project", f.count, DRENCH_LAMBDA(int i) {
-        const Float4 d = displacement[i], k = kick[i];
-        const Vec3<float> pushed = Vec3<float>{d.x, d.y, d.z} * inverse_dt;
-        Vec3<float> change = pushed;
+        const Vec3<float> d{displacement[i].x, displacement[i].y, displacement[i].z};
+        Vec3<float> change = d * inverse_dt;
         x.set(i, move(x[i], change));
-        v.set(i, v[i] + Vec3<float>{k.x, k.y, k.z} * inverse_dt + (change - pushed));
+        v.set(i, v[i] + change);
       });
 }
 inline void project_density(State& state) {

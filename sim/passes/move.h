@@ -47,12 +47,6 @@ struct Drift {
 inline Drift drift_of(const State& state) {
   return {state.fluid.drift.view(), state.fluid.drift.x.size() > 0};
 }
-/// Where a path ends. Paths with a drift are those of places that walls have stopped already: asked
-/// again they would stop velocities by rounding, once more in every round that tests a path.
-DRENCH_HD Vec3<float> path_end(const Mover& mover, const Drift& drift, int i, Vec3<float> x,
-                               Vec3<float>& v) {
-  return drift.any ? mover.inside(x + drift[i] + v * mover.dt) : mover(x, v);
-}
 
 struct GuardCount {
   int hits = 0, unresolved = 0;
@@ -127,7 +121,7 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
         const int i = tested[k];
         const bool still = held[i] || moved[i];
         Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-        Vec3<float> to = still ? x[i] : path_end(mover, drift, i, x[i], velocity);
+        Vec3<float> to = still ? x[i] : mover(x[i] + drift[i], velocity);
         if (!still) v.set(i, velocity);
         GuardCount result;
         if (triangle[i] < 0 || test.in_reach(i, to)) {
@@ -238,7 +232,7 @@ inline void move_unguarded_particles(State& state) {
           if (!near) far_by[i] -= path;
           return near ? 0 : 1;
         }
-        x.set(i, path_end(mover, drift, i, x[i], velocity));
+        x.set(i, mover(x[i] + drift[i], velocity));
         v.set(i, velocity);
         far_by[i] -= length(x[i] - start[i]);
         return 0;

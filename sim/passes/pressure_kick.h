@@ -1,18 +1,14 @@
 #pragma once
-// What the pressures of a step do to velocities. They are found at the positions that the step ends
-// with; pushed from there, particles follow an implicit Euler step, which takes dt |grad p / rho|^2
-// out of every unit of mass and second: of a wave of frequency omega the share dt omega^2 / 2 of
-// its amplitude a second, a third of a wave in five periods at 20 layers, of Taylor and Green's
-// vortices at 50 to the side 8 % of their rate. Pushed from where neighbours stood before the step,
-// with the same pressures, they follow Verlet's (SHAKE's, where pressures are what holds a
-// constraint: Ryckaert, Ciccotti, Berendsen 1977), which loses nothing; with pressures that make
-// velocities free of divergence at the end of a step, and not positions even, that is half of the
-// way back. Positions keep the displacements of the solve, so that density is what it was asked to
-// be.
+// What the pressures of a step do to velocities in a full box. They are found at the positions that
+// the step ends with; pushed from there, particles follow an implicit Euler step, which takes
+// dt^2 |grad p / rho|^2 / 2 out of every unit of mass in a step: of Taylor and Green's vortices at
+// 50 to the side 8 % of their rate. Pushed from where neighbours stood half a step before, with the
+// same pressures, velocities that are free of divergence at the ends of steps lose nothing (the
+// trapezoidal rule). With a free surface the same, a whole step back (Verlet's), keeps more of a
+// wave but is not stable (docs/benchmarks.md).
 //
 // Back they go by the mean velocity around them: what a neighbourhood does together is kept, what a
-// particle does by itself stays damped. By their own velocities a column at rest keeps 1.3 times
-// the noise, and a drop in a straining flow drifts by 0.5 % of its energy and not by 0.2.
+// particle does by itself stays damped.
 
 #include "sim/passes/pressure_rows.h"
 

@@ -37,7 +37,7 @@ TEST(Memory, OfAllColumnsIsWhatTheHeapGave) {
   EXPECT_NEAR(told, heap, 0.03 * heap);
 }
 
-// What an incompressible fluid alone takes, lists aside: 10 columns of 4 bytes and 7 of 16, the
+// What an incompressible fluid alone takes, lists aside: 10 columns of 4 bytes and 6 of 16, the
 // ends of columns and the cells.
 TEST(Memory, OfFluidAloneIsThatOfItsColumns) {
   Shot shot = empty_shot();
@@ -50,7 +50,7 @@ TEST(Memory, OfFluidAloneIsThatOfItsColumns) {
     if (group.name == "neighbour lists") lists = double(group.bytes);
   }
   EXPECT_GT(lists, 0);
-  EXPECT_NEAR((sum(run.solver->memory()) - lists) / (30 * 30 * 30), 181, 3);
+  EXPECT_NEAR((sum(run.solver->memory()) - lists) / (30 * 30 * 30), 165, 3);
 }
 
 }  // namespace

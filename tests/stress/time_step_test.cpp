@@ -33,7 +33,7 @@ TEST_P(TimeStep, OfTheSolverStaysBounded) {
   Gates gates;
   if (GetParam() > 1) {
     gates = squeezed();
-    gates.energy = not_gated, gates.speed = 2.1;
+    gates.energy = not_gated, gates.speed = 1.5;
   }
   report("time step", fmt::format("solver at {}x", GetParam()), watch, gates);
 }
