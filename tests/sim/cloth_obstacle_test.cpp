@@ -10,6 +10,7 @@
 #include "pipeline/contract/error.h"
 #include "tests/sim/crossings.h"
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -281,16 +282,6 @@ TEST(ClothOnObstacles, MomentumIsKept) {
   EXPECT_LT((end + given - start).length(), 1e-5 * scale);
 }
 
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  EXPECT_EQ(a.position.x, b.position.x);
-  EXPECT_EQ(a.position.y, b.position.y);
-  EXPECT_EQ(a.velocity.y, b.velocity.y);
-  EXPECT_EQ(a.cloth_position.x, b.cloth_position.x);
-  EXPECT_EQ(a.cloth_position.y, b.cloth_position.y);
-  EXPECT_EQ(a.cloth_velocity.z, b.cloth_velocity.z);
-}
-
 TEST(ClothOnObstacles, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
   const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
   const Shot shot = punched(5);
@@ -303,13 +294,13 @@ TEST(ClothOnObstacles, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
       state.push_back(run.solver->save());
     });
   }
-  expect_same(state[0], state[1]);
+  expect_same_state(state[0], state[1]);
   Stepper first(shot), second(shot);
   for (int k = 0; k < 15; ++k) first.step(7e-4);
   second.solver->load(first.solver->save());
   second.time = first.time;
   for (int k = 0; k < 15; ++k) second.step(7e-4);
-  expect_same(state[0], second.solver->save());
+  expect_same_state(state[0], second.solver->save());
 }
 
 TEST(ClothOnObstacles, FarAwayChangesNoBit) {
@@ -319,7 +310,7 @@ TEST(ClothOnObstacles, FarAwayChangesNoBit) {
   add_sphere(with, V3d(3, 0, 0), 0.2);
   Stepper a(plain), b(with);
   for (int k = 0; k < 40; ++k) a.step(2e-3), b.step(2e-3);
-  expect_same(a.solver->save(), b.solver->save());
+  expect_same_state(a.solver->save(), b.solver->save());
 }
 
 TEST(ClothOnObstacles, AddNoPassToOtherShots) {

@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/error.h"
 #include "sim/simulator.h"
+#include "tests/sim/same_state.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -25,24 +26,6 @@ Shot splash(double shift = 0) {
   add_box(shot, V3d(shift - 0.08, 0.01, -0.08), {16, 8, 16}, V3d(0, -1, 0));
   add_sheet(shot, 0.3, 0, 24).corner.x += shift;
   return shot;
-}
-
-void expect_same(const sim::HostVec& a, const sim::HostVec& b) {
-  EXPECT_EQ(a.x, b.x);
-  EXPECT_EQ(a.y, b.y);
-  EXPECT_EQ(a.z, b.z);
-}
-
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  EXPECT_EQ(a.memory_triangle, b.memory_triangle);
-  EXPECT_EQ(a.memory_side, b.memory_side);
-  EXPECT_EQ(a.guard_hits, b.guard_hits);
-  expect_same(a.position, b.position);
-  expect_same(a.velocity, b.velocity);
-  expect_same(a.owed, b.owed);
-  expect_same(a.cloth_position, b.cloth_position);
-  expect_same(a.cloth_velocity, b.cloth_velocity);
 }
 
 sim::HostState after_steps(const Shot& shot, int steps) {
@@ -65,8 +48,8 @@ TEST(Determinism, AnyNumberOfThreadsGivesTheSameBits) {
       tbb::task_arena arena(threads);
       arena.execute([&] { state.push_back(after_steps(shot, 60)); });
     }
-    expect_same(state[0], state[1]);
-    expect_same(state[0], state[2]);
+    expect_same_state(state[0], state[1]);
+    expect_same_state(state[0], state[2]);
   }
 }
 
@@ -75,7 +58,7 @@ TEST(Determinism, ALatticeShiftOfTenKilometresGivesTheSameBits) {
   for (FluidSolver solver : {FluidSolver::weakly_compressible, FluidSolver::incompressible}) {
     Shot here = splash(), there = splash(1e4);
     here.fluid.solver = there.fluid.solver = solver;
-    expect_same(after_steps(here, 60), after_steps(there, 60));
+    expect_same_state(after_steps(here, 60), after_steps(there, 60));
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "sim/passes/measure_density.h"
 #include "tests/sim/listed.h"
+#include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -354,14 +355,6 @@ sim::HostState after(const Shot& shot, int steps, bool refreshed = false) {
   return run.solver->save();
 }
 
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  EXPECT_EQ(a.position.x, b.position.x);
-  EXPECT_EQ(a.position.y, b.position.y);
-  EXPECT_EQ(a.velocity.z, b.velocity.z);
-  EXPECT_EQ(a.pressure_term, b.pressure_term);
-}
-
 TEST(Incompressible, AnyNumberOfThreadsGivesTheSameBits) {
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
   std::vector<sim::HostState> state;
@@ -369,12 +362,12 @@ TEST(Incompressible, AnyNumberOfThreadsGivesTheSameBits) {
     tbb::task_arena arena(threads);
     arena.execute([&] { state.push_back(after(column(90, 1e-4), 30)); });
   }
-  expect_same(state[0], state[1]);
-  expect_same(state[0], state[2]);
+  expect_same_state(state[0], state[1]);
+  expect_same_state(state[0], state[2]);
 }
 
 TEST(Incompressible, LookingBetweenStepsChangesNoBit) {
-  expect_same(after(column(12, 1e-4), 40), after(column(12, 1e-4), 40, true));
+  expect_same_state(after(column(12, 1e-4), 40), after(column(12, 1e-4), 40, true));
 }
 
 TEST(Incompressible, ASavedStateGoesOnWithTheSameBits) {
@@ -384,7 +377,7 @@ TEST(Incompressible, ASavedStateGoesOnWithTheSameBits) {
   Stepper second(shot);
   second.solver->load(first.solver->save());
   for (int k = 0; k < 20; ++k) whole.step(2e-3), second.step(2e-3);
-  expect_same(whole.solver->save(), second.solver->save());
+  expect_same_state(whole.solver->save(), second.solver->save());
 }
 
 TEST(Incompressible, WithoutXsphNothingIsSmoothed) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -161,16 +162,6 @@ Shot stirred() {
   return shot;
 }
 
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  EXPECT_EQ(a.position.x, b.position.x);
-  EXPECT_EQ(a.position.y, b.position.y);
-  EXPECT_EQ(a.position.z, b.position.z);
-  EXPECT_EQ(a.velocity.x, b.velocity.x);
-  EXPECT_EQ(a.velocity.y, b.velocity.y);
-  EXPECT_EQ(a.velocity.z, b.velocity.z);
-}
-
 TEST(ObstacleMotion, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
   const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
   std::vector<sim::HostState> state;
@@ -182,13 +173,13 @@ TEST(ObstacleMotion, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
       state.push_back(run.solver->save());
     });
   }
-  expect_same(state[0], state[1]);
+  expect_same_state(state[0], state[1]);
   Stepper first(stirred()), second(stirred());
   for (int k = 0; k < 30; ++k) first.step(2e-3);
   second.solver->load(first.solver->save());
   second.time = first.time;
   for (int k = 0; k < 30; ++k) second.step(2e-3);
-  expect_same(state[0], second.solver->save());
+  expect_same_state(state[0], second.solver->save());
 }
 
 TEST(ObstacleMotion, FarAwayChangesNoBit) {
@@ -197,7 +188,7 @@ TEST(ObstacleMotion, FarAwayChangesNoBit) {
   Stepper a(plain), b(with);
   for (int k = 0; k < 60; ++k) a.step(2e-3), b.step(2e-3);
   a.solver->refresh(), b.solver->refresh();
-  expect_same(a.solver->save(), b.solver->save());
+  expect_same_state(a.solver->save(), b.solver->save());
   EXPECT_EQ(a.solver->density(), b.solver->density());
 }
 

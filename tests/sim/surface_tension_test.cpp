@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/same_state.h"
 #include "tests/sim/support.h"
 #include "tests/validation/drop.h"
 
@@ -200,14 +201,6 @@ Shot block_in_a_corner() {
   return shot;
 }
 
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  for (auto axis : {&sim::HostVec::x, &sim::HostVec::y, &sim::HostVec::z}) {
-    EXPECT_EQ(a.position.*axis, b.position.*axis);
-    EXPECT_EQ(a.velocity.*axis, b.velocity.*axis);
-  }
-}
-
 TEST(SurfaceTension, AnyNumberOfThreadsGivesTheSameBits) {
   const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
   std::vector<sim::HostState> state;
@@ -219,7 +212,7 @@ TEST(SurfaceTension, AnyNumberOfThreadsGivesTheSameBits) {
       state.push_back(run.solver->save());
     });
   }
-  expect_same(state[0], state[1]);
+  expect_same_state(state[0], state[1]);
 }
 
 TEST(SurfaceTension, ASavedStateGoesOnWithTheSameBits) {
@@ -228,7 +221,7 @@ TEST(SurfaceTension, ASavedStateGoesOnWithTheSameBits) {
   for (int k = 0; k < 20; ++k) whole.step(3e-4), first.step(3e-4);
   second.solver->load(first.solver->save());
   for (int k = 0; k < 20; ++k) whole.step(3e-4), second.step(3e-4);
-  expect_same(whole.solver->save(), second.solver->save());
+  expect_same_state(whole.solver->save(), second.solver->save());
 }
 
 TEST(SurfaceTension, LimitsTheStep) {

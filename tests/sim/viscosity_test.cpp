@@ -9,6 +9,7 @@
 
 #include "sim/passes/viscosity_solve.h"
 #include "tests/sim/listed.h"
+#include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -267,13 +268,6 @@ sim::HostState after(const Shot& shot, int steps) {
   for (int k = 0; k < steps; ++k) run.step(2e-3);
   return run.solver->save();
 }
-void expect_same(const sim::HostState& a, const sim::HostState& b) {
-  EXPECT_EQ(a.id, b.id);
-  EXPECT_EQ(a.position.x, b.position.x);
-  EXPECT_EQ(a.position.y, b.position.y);
-  EXPECT_EQ(a.velocity.z, b.velocity.z);
-}
-
 TEST(Viscosity, AnyNumberOfThreadsGivesTheSameBits) {
   Shot shot = glass(2e-2);
   shot.domain.max = V3d(0.4, 0.4, 0.2);
@@ -285,8 +279,8 @@ TEST(Viscosity, AnyNumberOfThreadsGivesTheSameBits) {
     tbb::task_arena arena(threads);
     arena.execute([&] { state.push_back(after(shot, 15)); });
   }
-  expect_same(state[0], state[1]);
-  expect_same(state[0], state[2]);
+  expect_same_state(state[0], state[1]);
+  expect_same_state(state[0], state[2]);
 }
 
 TEST(Viscosity, ASavedStateGoesOnWithTheSameBits) {
@@ -297,7 +291,7 @@ TEST(Viscosity, ASavedStateGoesOnWithTheSameBits) {
   Stepper second(shot);
   second.solver->load(first.solver->save());
   for (int k = 0; k < 20; ++k) whole.step(2e-3), second.step(2e-3);
-  expect_same(whole.solver->save(), second.solver->save());
+  expect_same_state(whole.solver->save(), second.solver->save());
 }
 
 }  // namespace
