@@ -70,6 +70,7 @@ struct Limits {
   float viscous_residual = 0;  // RMS that a viscous solve cut short left, over that of the velocity
   int viscous_iterations = 0;  // of the viscous solve
   float step = 0;              // s, of the step that was made
+  float pressure = 0;          // peak of the pressure solve, over rest density, m^2/s^2
   int bad_particle = -1;       // index of the first particle that is not finite or absurdly fast
   int bad_vertex = -1;
 };

@@ -158,6 +158,7 @@ struct SolveControl {
   float momentum = 1.f, extrapolation = 0.f;
   float mean = 0.f;  // kg/m^3, of the source; only where the fluid is full
   int spent = 0;     // iterations of a solve before in the same step
+  float peak = 0.f;  // p / rho_0, m^2/s^2: the greatest of a column at rest with the same moments
 };
 
 /// Scalars of a viscous solve.
@@ -177,6 +178,45 @@ struct ViscosityState {
   Column<ViscousControl> control;
 };
 
+/// Nodes of a coarse level of the pressure solve along one axis.
+struct NodeAxis {
+  int n;       // 1: functions are constant along the axis
+  int wraps;   // 1 on a periodic axis
+  int halved;  // 1: half as many as on the finer level, which stand at its even nodes
+  float edge;  // m, between nodes
+
+  /// The nodes among which k of the finer level lies, b of weight 1 - a; it may be the same one.
+  struct Parents {
+    int a, b;
+  };
+  DRENCH_HD Parents parents(int k) const {
+    if (!halved) return {k, k};
+    if (n == 1) return {0, 0};
+    const int a = k / 2, b = a + k % 2;
+    return {a, b == n ? 0 : b};
+  }
+};
+
+/// Nodes of a coarse level of the pressure solve (passes/multilevel.h), x fastest.
+struct NodeLevel {
+  NodeAxis x, y, z;
+  int first;  // place of the first node in the columns
+
+  DRENCH_HD int count() const { return x.n * y.n * z.n; }
+  DRENCH_HD int index(int i, int j, int k) const { return (k * y.n + j) * x.n + i; }
+  DRENCH_HD Vec3<int> place(int n) const { return {n % x.n, n / x.n % y.n, n / (x.n * y.n)}; }
+};
+
+/// Coarse levels of the pressure solve, rebuilt every solve.
+struct Hierarchy {
+  static constexpr int most = 12;
+  int levels = 0;
+  NodeLevel level[most];
+  Vec3<int> shift, blocks;        // log2 of the cells along a block of the finest level; blocks
+  Column<float> partial;          // 8 a block
+  Column<float> answer, inverse;  // of the nodes of all levels: z, and 1 / stiffness
+};
+
 /// Columns of the incompressible solver, rebuilt every step (passes/pressure_rows.h). Its warm
 /// start is FluidState::pressure_term.
 struct PressureState {
@@ -189,6 +229,7 @@ struct PressureState {
   Column<Float4> way;   // m, see MeanWay; only in a full box
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
+  Hierarchy hierarchy;
 
   void resize(size_t n) {
     for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push})

@@ -33,6 +33,8 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
                           p.correction_cross, p.push, p.way));
   all.push_back(memory_of("unknowns of the pressure solve", p.inverse_diagonal, p.source, p.before,
                           p.next, p.product, p.control));
+  all.push_back(memory_of("coarse levels of the pressure solve", p.hierarchy.partial,
+                          p.hierarchy.answer, p.hierarchy.inverse));
   all.push_back(memory_of("implicit viscosity", v.solution, v.residual, v.direction, v.product,
                           v.diagonal, v.cross, v.control));
   all.push_back(memory_of("surface tension", state.tension.normal));
