@@ -206,7 +206,8 @@ inline void linearise_cloth(State& state) {
 }
 
 /// Vertices that forces would take through a wall end at it, and what pushes them stands on it: a
-/// sheet on the floor bears its water.
+/// sheet on the floor bears its water. Their blocks are those of what is left free: see
+/// free_block_inverse (a wrinkled sheet on a floor was thrown along it at 26 m/s).
 inline void hold_at_walls(State& state) {
   const ClothState& c = state.cloth;
   const ClothSystem& s = state.cloth_system;
@@ -216,6 +217,7 @@ inline void hold_at_walls(State& state) {
   const BlockInverse block = block_inverse(state);
   const ClothWalls walls = cloth_walls_of(state.parameters);
   const float reach = state.parameters.spacing;  // a step is not to end farther off
+  const float* inertia = s.inertia.data();
   parallel_for(
       "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
         const Vec3<float> straight = x[i] + v[i] * dt,
@@ -230,7 +232,10 @@ inline void hold_at_walls(State& state) {
         hold(stop.x, to.x, x.x[i], straight.x, may.x, w.x);
         hold(stop.y, to.y, x.y[i], straight.y, may.y, w.y);
         hold(stop.z, to.z, x.z[i], straight.z, may.z, w.z);
+        const Vec3<float> before = free[i];
+        if (may.x == before.x && may.y == before.y && may.z == before.z) return;
         free.set(i, may), change.set(i, w);
+        block.put_free(i, block, may, {0.f, 0.f, 0.f}, inertia[i]);
       });
 }
 
@@ -238,11 +243,33 @@ DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
   return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
 }
 
+/// A matrix, what scales its residual, and the ways that it acts on.
+struct ScaledClothMatrix {
+  ClothMatrix matrix;
+  BlockInverse block;
+
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> moving(Index i, Vec3<T> v) const {
+    return matrix.free.of(i, v);
+  }
+  template <class Index>
+  DRENCH_HD auto times(const VecView& view, Index i) const {
+    return matrix.times(view, i);
+  }
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> scaled(Index i, Vec3<T> r) const {
+    return moving(i, block.times(i, r));
+  }
+};
+inline ScaledClothMatrix scaled_cloth_matrix(const State& state) {
+  return {cloth_matrix(state), free_block_inverse(state)};
+}
+
 /// What a sweep of conjugate gradients reads and writes: z is the scaled residual, p the direction,
 /// s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
+template <class Matrix>
 struct ClothSweep {
-  BlockInverse block;
-  FreeWays free;
+  Matrix matrix;
   VecView w, residual, scaled, image, direction, direction_image;
   ClothControl* control;
   float tolerance;  // of r . z, over the reference
@@ -270,7 +297,7 @@ struct ClothSweep {
     direction.put(i, p), direction_image.put(i, s);
     w.put(i, w.at(i) + p * step);
     residual.put(i, left);
-    scaled.put(i, free.of(i, block.times(i, left)));
+    scaled.put(i, matrix.scaled(i, left));
   }
 };
 
@@ -288,33 +315,30 @@ inline bool cloth_ended(const State& state, int sweep) {
 
 /// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
 /// tolerance^2 of ClothControl::reference.
-inline void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps,
-                        float tolerance) {
+template <class Matrix>
+void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const VecView& right,
+                  int sweeps, float tolerance) {
   const int n = state.cloth.vertices;
   ClothSystem& s = state.cloth_system;
-  const ClothMatrix matrix = cloth_matrix(state);
-  const BlockInverse block = free_block_inverse(state);
   ClothControl* control = s.control.data();
   const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view();
-  const FreeWays free = free_ways(state);
-  const ClothSweep sweep{block,
-                         free,
-                         w,
-                         residual,
-                         scaled,
-                         image,
-                         s.direction.view(),
-                         s.direction_image.view(),
-                         control,
-                         tolerance * tolerance};
+  const ClothSweep<Matrix> sweep{matrix,
+                                 w,
+                                 residual,
+                                 scaled,
+                                 image,
+                                 s.direction.view(),
+                                 s.direction_image.view(),
+                                 control,
+                                 tolerance * tolerance};
   s.direction.clear(), s.direction_image.clear();
   parallel_for(
       "cloth: start", 1, DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
   for_each_lane(
       "cloth: residual", n, DRENCH_LAMBDA(auto i) {
-        const auto r = free.of(i, right.at(i)) - matrix.times(w, i);
+        const auto r = matrix.moving(i, right.at(i)) - matrix.times(w, i);
         residual.put(i, r);
-        scaled.put(i, free.of(i, block.times(i, r)));
+        scaled.put(i, matrix.scaled(i, r));
       });
   for (int k = 0;; ++k) {
     sum_lanes_then(
@@ -329,6 +353,10 @@ inline void sweep_cloth(State& state, const VecView& w, const VecView& right, in
     for_each_lane(
         "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
   }
+}
+inline void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps,
+                        float tolerance) {
+  sweep_matrix(state, scaled_cloth_matrix(state), w, right, sweeps, tolerance);
 }
 
 /// What a sheet's way leaves of what it is given, kg m, its mass, and how many of its axes

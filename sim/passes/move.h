@@ -67,6 +67,7 @@ inline PathTest path_test_of(State& state, float moved) {
       "path test: cloth motion", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
+  const ClothWalls walls = cloth_walls_of(p);
   return {polygons_of(state),
           c.position.view(),
           next,
@@ -79,6 +80,8 @@ inline PathTest path_test_of(State& state, float moved) {
           c.held.data(),
           c.stop_sum.data(),
           f.stopped.data(),
+          f.triangle.data(),
+          f.edge.data(),
           f.sheet_distance.data(),
           c.mass.data(),
           c.inverse_mass.data(),
@@ -86,7 +89,8 @@ inline PathTest path_test_of(State& state, float moved) {
           p.particle_mass,
           path_clearance * p.spacing,
           std::max(std::sqrt(moved2), moved),
-          4};
+          4,
+          {free_ways(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
 }
 
 /// The particles that are tested: the guarded ones, or all once cloth has come farther than they

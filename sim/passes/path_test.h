@@ -8,6 +8,7 @@
 // free place is held; if all is held nothing moves, which is free of crossings whatever the tangle.
 
 #include "sim/geometry.h"
+#include "sim/passes/cloth_implicit.h"
 #include "sim/passes/polygon_grid.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -69,6 +70,29 @@ DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<do
   return -1;
 }
 
+/// What walls and obstacles hold of implicit sheets does not give way to what presses it on them.
+struct ClothGround {
+  FreeWays free;
+  Vec3<float> middle;  // m, between the walls
+  bool holds;
+
+  /// Share of a vertex' inverse mass that a push meets. @param push  unit
+  DRENCH_HD float gives(int vertex, Vec3<float> x, Vec3<float> push) const {
+    if (!holds) return 1.f;
+    const Vec3<float> may = free.axis[vertex];
+    const auto open = [](float may, float push, float off) {
+      return may == 0.f && push * off > 0.f ? 0.f : push;  // off the middle: into the wall
+    };
+    Vec3<float> way{open(may.x, push.x, x.x - middle.x), open(may.y, push.y, x.y - middle.y),
+                    open(may.z, push.z, x.z - middle.z)};
+    if (!free.obstacles) return length2(way);
+    const Vec3<float> n = free.normal[vertex];
+    const float in = dot(n, way);
+    if (in >= 0.f) return length2(way);
+    return free.slides[vertex] == 0.f ? 0.f : length2(way - n * in);
+  }
+};
+
 constexpr float path_clearance = 1e-3f;  // spacings off the triangle where a path that met it ends
 
 struct PathTest {
@@ -79,10 +103,12 @@ struct PathTest {
   long long* stop_sum;  // by vertex, 4: how many particles stop it in this round, sum of their
                         // velocities in units of velocity_unit
   int* stopped;         // by particle: triangle it stopped in this round, -1 none
-  const float *distance, *cloth_mass, *inverse_mass, *vertex_share;
+  const int* nearest;   // by particle: its triangle, and how far inside a free edge of it (0..1)
+  const float *edge, *distance, *cloth_mass, *inverse_mass, *vertex_share;
   float mass, clearance;
   float cloth_moved;  // m, farthest that a vertex has been from its place at the step's start
   int attempts;       // 0: the particle is held at once
+  ClothGround ground;
 
   struct Hit {
     int triangle = -1;
@@ -118,6 +144,18 @@ struct PathTest {
     return (cloth_mass[k[0]] + cloth_mass[k[1]] + cloth_mass[k[2]]) / 3.f < mass;
   }
 
+  /// Does a triangle stop for a particle? A light one that comes at it, if that frees the path: a
+  /// particle that would also pass through the triangle where it stands has to be turned aside
+  /// anyway, and a triangle stopped for it hangs on the particle, step by step, while its springs
+  /// stretch (to 60 J in a sheet of 16 g). So does one at a free edge of the particle's own
+  /// triangle, where no pressure tells it of the springs.
+  DRENCH_HD bool triangle_stops(int i, Vec3<float> from, Vec3<float> to, const Hit& hit) const {
+    if (!lighter(hit.triangle) || (nearest[i] == hit.triangle && edge[i] < 1.f)) return false;
+    MovingTriangle m = moving(hit.place);
+    m.a1 = m.a0, m.b1 = m.b0, m.c1 = m.c0;
+    return crossing_time(m, to_double(from), to_double(to)) < 0;
+  }
+
   static constexpr double velocity_unit = 1.0 / (1 << 24);  // m/s
 
   DRENCH_HD void add_stop(int vertex, Vec3<float> v) const {
@@ -147,7 +185,7 @@ struct PathTest {
     for (int attempt = 0;; ++attempt) {
       const Hit hit = first_hit(from, to);
       if (hit.triangle < 0) return true;
-      if (!still(hit.triangle) && (lighter(hit.triangle) || attempt >= attempts)) {
+      if (!still(hit.triangle) && (triangle_stops(i, from, to, hit) || attempt >= attempts)) {
         stopped[i] = hit.triangle;
         for (int k = 0; k < 3; ++k) add_stop(polygons.corner[3 * hit.triangle + k], velocity[i]);
         return false;
@@ -185,7 +223,8 @@ struct PathTest {
     float row = 1.f / mass;
     for (int c = 0; c < 3; ++c) {
       wall = wall + cloth_velocity[k[c]] * w[c];
-      row += w[c] * maximum(w[c], vertex_share[k[c]]) * inverse_mass[k[c]];
+      row += w[c] * maximum(w[c], vertex_share[k[c]]) * inverse_mass[k[c]] *
+             ground.gives(k[c], cloth_next[k[c]], direction * -1.f);
     }
     const float approach = dot(direction, velocity[i] - wall);
     if (approach >= 0.f) return;

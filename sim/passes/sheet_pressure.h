@@ -153,15 +153,14 @@ inline void sum_loads(State& state, Base base) {
 }
 
 /// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts.
-inline void add_to_reference(State& state, const VecView& of, float keep) {
-  const BlockInverse block = free_block_inverse(state);
-  const FreeWays free = free_ways(state);
+template <class Matrix>
+void add_to_reference(State& state, const Matrix& matrix, const VecView& of, float keep) {
   ClothControl* control = state.cloth_system.control.data();
   reduce_then(
       "cloth: reference", state.cloth.vertices, 0.,
       DRENCH_LAMBDA(int i) {
-        const Vec3<float> r = free.of(i, of[i]);
-        return dot_double(r, block.times(i, r));
+        const Vec3<float> r = matrix.moving(i, of[i]);
+        return dot_double(r, matrix.scaled(i, r));
       },
       AddDoubles{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
@@ -179,31 +178,92 @@ inline void load_by_pressures(State& state) {
       });
 }
 
-/// Adds to the solve's diagonal the row sums of C A^-1 C^T, which bound every mode: the sheets'
-/// answer to the same pressure all along one side. Their mass alone would bound them too, far
-/// too high where a light sheet is taut.
+/// What bounds A from below: inertia, and tension without its direction; what is left out, the
+/// stiffness along springs, is not negative. Its inverse has no negative entry. Acts on each
+/// component alike.
+struct TensionMatrix {
+  SpringEnds ends;
+  const float *tension, *inertia, *inverse_mass;
+
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> moving(Index i, Vec3<T> v) const {
+    return select(load(inverse_mass, i) > T(0.f), v, Vec3<T>{T(0.f), T(0.f), T(0.f)});
+  }
+  template <class Index>
+  DRENCH_HD auto times(const VecView& view, Index i) const {
+    using T = decltype(load(inertia, i));
+    const Vec3<T> x = view.at(i);
+    Vec3<T> y = x * load(inertia, i);
+    for (int s = 0; s < ends.slots; ++s)
+      y = y + (x - ends.at_end(view, i, s)) * load(tension, i + s * ends.stride);
+    return moving(i, y);
+  }
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> scaled(Index i, Vec3<T> r) const {
+    T sum = load(inertia, i);
+    for (int s = 0; s < ends.slots; ++s) sum = sum + load(tension, i + s * ends.stride);
+    return moving(i, r * (T(1.f) / maximum(sum, T(1e-20f))));
+  }
+};
+
+/// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex on the ways that it may go.
+struct RowSize {
+  SheetRows rows;
+  FreeWays free;
+  DRENCH_HD float at(int row, int k) const {
+    return rows.weight[k][row] * length(free.of(rows.vertex[k][row], rows.gradient[row]));
+  }
+};
+
+/// Sums the sizes of all rows, times a particle's mass, by vertices: kg^2/m^4, into x of `to`.
+inline void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
+  const NearView near = near_list(state);
+  const ContactView c = contact_rows(state);
+  const VecView impulse = state.contact.impulse.view();
+  const int triangles = state.cloth.triangles, *start = near.start, gap = c.soft_begin - c.close;
+  const float mass = state.parameters.particle_mass, *share = state.cloth.share.data();
+  parallel_for(
+      "sheets: sizes by triangle", triangles, DRENCH_LAMBDA(int t) {
+        float sum[3] = {0.f, 0.f, 0.f};
+        for (int soft = 0; soft < 2; ++soft) {
+          const int k = t + soft * triangles;
+          for (int row = start[k] + soft * gap; row < start[k + 1] + soft * gap; ++row)
+            for (int e = 0; e < 3; ++e) sum[e] += mass * size.at(row, e);
+        }
+        for (int e = 0; e < 3; ++e) impulse.set(3 * t + e, {sum[e], 0.f, 0.f});
+      });
+  parallel_for(
+      "sheets: sizes", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+        const Vec3<float> none{0.f, 0.f, 0.f};
+        to.set(v, share[v] > 0.f ? near.sum_on_vertex(impulse, v) : none);
+      });
+}
+
+/// Adds to the solve's diagonal a bound of C A^-1 C^T: with T <= A the matrix of inertia and
+/// tension it is at most C T^-1 C^T, of which no row's magnitudes sum to more than
+///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: the ways that vertex k may go,
+/// since T^-1 has no negative entry. Flat sheets lose nothing by it: springs along a sheet do not
+/// act across it, and this is its answer to the same pressure all along. The answer with its signs,
+/// to the same pressure along one side, is no bound where a sheet is folded: the pushes of two
+/// flanks cancel, and pressures there rose without end (4e11 Pa in the folds over a small ball).
 inline void add_sheets_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const SheetRows c = sheet_rows(state);
-  const int* side = state.fluid.memory_side.data();
-  const float mass = state.parameters.particle_mass;
-  float* inverse = state.pressure.inverse_diagonal.data();
-  parallel_for(
-      "sheets: even pressure", c.rows, DRENCH_LAMBDA(int row) {
-        const int i = c.particle[row];
-        c.load.set(row,
-                   i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : c.gradient[row] * (mass * float(side[i])));
-      });
-  sum_loads(state, Base::none);
+  const RowSize size{c, free_ways(state)};
+  const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
+                             state.cloth.inverse_mass.data()};
   const VecView answer = s.answer.view(), right = s.right.view();
+  sum_row_sizes(state, size, right);
   s.answer.clear();
-  add_to_reference(state, right, 0.f);
-  sweep_cloth(state, answer, right, last_sweeps, 0.03f);
+  add_to_reference(state, matrix, right, 0.f);
+  sweep_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
+  float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || inverse[i] == 0.f) return;
-        const float sum = max0(float(side[i]) * dot(c.gradient[row], c.at_foot(row, answer)));
+        float sum = 0.f;
+        for (int k = 0; k < 3; ++k) sum += size.at(row, k) * max0(answer.x[c.vertex[k][row]]);
         inverse[i] = 1.f / (1.f / inverse[i] + sum + c.compliance[row] * (1.f / squeeze));
       });
 }
@@ -218,10 +278,10 @@ inline void start_sheets(State& state) {
   hold_at_walls(state);
   if (state.parameters.obstacles > 0) hold_at_obstacles(state);
   add_sheets_to_diagonal(state);
-  load_by_pressures(state);
   sum_loads(state, Base::none);
-  add_to_reference(state, s.right.view(), 0.f);
-  add_to_reference(state, s.base.view(), 1.f);
+  const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
+  add_to_reference(state, matrix, s.right.view(), 0.f);
+  add_to_reference(state, matrix, s.base.view(), 1.f);
 }
 
 /// The sheets' answer to the pressures beside the positions.
@@ -242,7 +302,7 @@ inline void settle_sheets(State& state) {
     s.right.clear();
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
-    add_to_reference(state, given, 0.f);
+    add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
     sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
   if (state.parameters.obstacles > 0)
