@@ -211,7 +211,7 @@ const Term terms[] = {
     {"obstacle_under_cloth",
      projected,
      on_sheet,
-     [](Shot& s) { ball(s, V3d(0, -1.035, 0)); },
+     [](Shot& s) { ball(s, V3d(0, -1.03, 0)); },
      [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
      Leaves::the_bits,
      {"predict_around_obstacles", "project_around_obstacles"},
