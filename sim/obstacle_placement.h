@@ -16,6 +16,10 @@ struct ObstaclePlacement {
   float blend[2] = {0, 0};          // 0 the first of its level sets .. 1 the second
   float deform = 0;                 // how far a vertex moves between these
   float low[3] = {}, high[3] = {};  // bounds over the step
+  int of = 0;                       // which obstacle: it may have images (obstacle_images.h)
+  bool around = false;              // images are one body with it: its distance is the least of all
+  int joined[3][2] = {};            // these, first and last by axis
+  float period[3][3] = {};          // to the next of these, in its own frame
 };
 
 }  // namespace drench::sim

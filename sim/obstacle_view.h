@@ -93,8 +93,25 @@ struct ObstacleView : ObstaclePlacement {
     if (shape == ObstacleShape::plane) return own.y;
     if (shape == ObstacleShape::sphere) return length(own) - half[0];
     if (shape == ObstacleShape::box) return BoxDistance(own, half).distance;
+    if (!around) return field_distance(own, mix);
+    float least = 1e30f;
+    for (int i = joined[0][0]; i <= joined[0][1]; ++i) {
+      for (int j = joined[1][0]; j <= joined[1][1]; ++j) {
+        for (int k = joined[2][0]; k <= joined[2][1]; ++k) {
+          const Vec3<float> to_image =
+              period_along(0) * float(i) + period_along(1) * float(j) + period_along(2) * float(k);
+          least = minimum(least, field_distance(own - to_image, mix));
+        }
+      }
+    }
+    return least;
+  }
+  DRENCH_HD float field_distance(Vec3<float> own, float mix) const {
     const float first = field[0](own);
     return deform > 0.f ? first + mix * (field[1](own) - first) : first;
+  }
+  DRENCH_HD Vec3<float> period_along(int k) const {
+    return {period[k][0], period[k][1], period[k][2]};
   }
 
   /// Unit, away from the solid; zero deep inside a level set, where nothing is known.

@@ -246,27 +246,45 @@ void ObstacleSet::place(Solver& solver, double start, double end) {
         solver.load_level_set(role_, int(k), s, entry.bracket->set[entry.deforms ? s : 0]);
       entry.bracket->loaded = true;
     }
-    all.push_back(placement(entry, begin, film_frame(end)));
+    ObstaclePlacement own = placement(entry, begin, film_frame(end));
+    own.of = int(k);
     const double middle = 0.5 * (start + end);
     const bool there = window_.empty() || (middle >= window_[k].start && middle < window_[k].stop);
-    for (int c = 0; c < 3 && !there; ++c) all[k].low[c] = float(far_off), all[k].high[c] = -far_off;
+    for (int c = 0; c < 3 && !there; ++c) own.low[c] = float(far_off), own.high[c] = -far_off;
+    for (const ObstacleImages::Image& image : images_.of(own, extent(entry, own)))
+      all.push_back(image.placement);
   }
   if (!all.empty()) solver.place(role_, all);
 }
 
+V3d ObstacleSet::extent(const Entry& entry, const ObstaclePlacement& placement) const {
+  V3d size(0);
+  for (int k = 0; k < 3; ++k) {
+    for (int own = 0; own < 3; ++own) {
+      size[k] +=
+          std::abs(double(placement.axis[1][3 * own + k])) * (entry.high[own] - entry.low[own]);
+    }
+  }
+  return size;
+}
+
 double ObstacleSet::distance(const V3d& point, double time) {
   const double frame = film_frame(time);
+  const V3d place = images_.wrapped(point - origin_) + origin_;
   double least = far_off;
   for (Entry& entry : obstacle_) {
     if (entry.obstacle.type == ObstacleType::mesh) bracket_at(entry, frame);
-    cpu::ObstacleView view{placement(entry, frame, frame), {}};
-    if (entry.bracket) {
-      view.field[0] = host_view(entry.bracket->set[0]);
-      view.field[1] = host_view(entry.bracket->set[entry.deforms ? 1 : 0]);
+    const ObstaclePlacement given = placement(entry, frame, frame);
+    for (const auto& [placement, shift] : images_.of(given, extent(entry, given))) {
+      cpu::ObstacleView view{placement, {}};
+      if (entry.bracket) {
+        view.field[0] = host_view(entry.bracket->set[0]);
+        view.field[1] = host_view(entry.bracket->set[entry.deforms ? 1 : 0]);
+      }
+      const V3d own = obstacle_pose(entry.obstacle, frame).to_own(place - shift);
+      least = std::min(
+          least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
     }
-    const V3d own = obstacle_pose(entry.obstacle, frame).to_own(point);
-    least = std::min(
-        least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
   }
   return least;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/contract/obstacle.h"
+#include "sim/obstacle_images.h"
 #include "sim/solver.h"
 
 namespace drench::sim {
@@ -28,6 +29,8 @@ class ObstacleSet {
               std::vector<Window> window, const LocalFrame& frame, LevelSetMaker make_level_set);
 
   int count() const { return int(obstacle_.size()); }
+  /// From now on obstacles reach across seams. Sinks do not: they end where they end.
+  void set_images(const ObstacleImages& images) { images_ = images; }
   /// Tells the solver where the obstacles are from `start` to `end`, s since the first frame, and
   /// gives it the level sets that it does not have yet. A step must not cross a stop.
   void place(Solver& solver, double start, double end);
@@ -66,6 +69,7 @@ class ObstacleSet {
   LevelSet level_set(const Entry& entry, const TriangleMesh& mesh) const;
   double travel(Entry& entry, double begin, double end);
   ObstaclePlacement placement(Entry& entry, double begin, double end);
+  V3d extent(const Entry& entry, const ObstaclePlacement& placement) const;
 
   Solids role_ = Solids::obstacles;
   std::vector<Window> window_;  // of sinks
@@ -74,6 +78,7 @@ class ObstacleSet {
   double snap_ = 1;  // m
   LevelSetMaker make_level_set_;
   std::vector<Entry> obstacle_;
+  ObstacleImages images_;
 };
 
 /// The sinks of a shot. @throws Error as ObstacleSet.

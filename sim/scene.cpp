@@ -471,6 +471,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   scene.mesh_emitter = mesh_emitters(shot, make_level_set);
   scene.parameters =
       build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles);
+  scene.obstacles.set_images(ObstacleImages(scene.parameters));
   HostState& start = scene.start;
   for (size_t i = 0; i < fluid.position.size(); ++i) {
     const V3d p = fluid.position[i], u = fluid.velocity[i];

@@ -182,7 +182,7 @@ class BackendSolver : public Solver {
     for (size_t k = 0; k < placement.size(); ++k) {
       ObstacleView view{placement[k], {}};
       for (size_t s = 0; view.shape == ObstacleShape::field && s < 2; ++s) {
-        const ObstacleState::Field& field = o.field.at(2 * k + s);
+        const ObstacleState::Field& field = o.field.at(2 * size_t(view.of) + s);
         view.field[s] = field.shape;
         view.field[s].block = field.block.data(), view.field[s].value = field.value.data();
       }
@@ -190,15 +190,17 @@ class BackendSolver : public Solver {
     }
     o.count = int(views.size());
     from_host(o.view, views);
-    o.stopped.resize(4 * views.size());
+    const Parameters& p = state_.parameters;
+    o.stopped.resize(size_t(4) * (which == Solids::sinks ? p.sinks : p.obstacles));
     o.stopped.clear_bytes(0);
   }
   void blow(const WindNow& wind) override { state_.wind = wind; }
   std::vector<ObstacleImpulse> obstacle_impulses() const override {
     const ObstacleState& o = state_.obstacles;
     const std::vector<long long> stopped = to_host(o.stopped, o.stopped.size());
-    std::vector<ObstacleImpulse> impulses(o.count);
-    for (int k = 0; k < o.count && state_.dt > 0; ++k) {
+    const int count = state_.parameters.obstacles;
+    std::vector<ObstacleImpulse> impulses(count);
+    for (int k = 0; k < count && state_.dt > 0; ++k) {
       Impulse pressure = pressure_impulse(state_, k);
       if (allocated_ & column_tension) pressure = pressure(pressure, tension_impulse(state_, k));
       if (state_.contact.near > 0) {

@@ -244,14 +244,15 @@ struct TensionState {
   Column<Float4> normal;  // unit, outwards; w: 0 inside
 };
 
-/// Obstacles as the step has them (obstacle_placement.h) and the level sets they point to.
+/// Obstacles and their images as the step has them (obstacle_placement.h) and the level sets they
+/// point to.
 struct ObstacleState {
   struct Field {
     Column<int> block;
     Column<float> value;
     FieldView shape{};  // without pointers
   };
-  int count = 0;
+  int count = 0;  // with images
   Column<ObstacleView> view;
   std::vector<Field> field;   // two an obstacle
   Column<long long> stopped;  // 4 an obstacle: see StopSums

@@ -9,6 +9,7 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/probe_check.h"
+#include "pipeline/contract/seam_check.h"
 #include "pipeline/contract/source_check.h"
 
 namespace drench {
@@ -35,6 +36,7 @@ class Checker {
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
     for (size_t i = 0; i < shot_.obstacle.size(); ++i) check_obstacle(i);
+    check_obstacles_at_seams(shot_, sources_);
     check_sources(shot_, sources_);
     check_names();
     check_probes(shot_, sources_);
@@ -150,11 +152,6 @@ class Checker {
   void check_periodic(int axis) const {
     const std::string key = fmt::format("domain.{}", "xyz"[axis]);
     const double length = shot_.domain.max[axis] - shot_.domain.min[axis];
-    if (!shot_.obstacle.empty()) {
-      fail(key, fmt::format("{} is \"periodic\" but the shot has obstacles, which end at the seam. "
-                            "Use \"walls\" or \"open\", or remove the [[obstacle]]",
-                            key));
-    }
     if (!shot_.cloth.empty() && shot_.fluid.present() && !is_incompressible(shot_)) {
       fail(key, fmt::format("{} is \"periodic\" but the shot has cloth in a weakly compressible "
                             "fluid, which does not see it across the seam. Use fluid.solver = "

@@ -28,13 +28,23 @@ struct ClothHold {
   StopSums stopped;
   float room;                      // m, between sheet and surface beyond what particles keep
   float inverse_dt, inverse_mass;  // 1/s, of a particle, 1/kg
+  Vec3<float> low, period;         // m; 0 where an axis is not periodic
 
+  /// What takes a vertex, which nothing wraps, into the domain, where the images of obstacles are.
+  /// Paths take that of their start. m
+  DRENCH_HD Vec3<float> home(Vec3<float> x) const {
+    const auto along = [](float x, float low, float length) {
+      return length > 0.f ? -length * floorf((x - low) / length) : 0.f;
+    };
+    return {along(x.x, low.x, period.x), along(x.y, low.y, period.y), along(x.z, low.z, period.z)};
+  }
   /// m, of a vertex to a surface: as to a wall of the domain, and half the thickness.
   DRENCH_HD float distance_to(const ObstacleView& o, int vertex) const {
     return o.clearance + room + half_thickness[fan_entry[fan_start[vertex]] / 3];
   }
 
-  /// Where the first obstacle stops a vertex that would go from x0 to x1; -1 if none does.
+  /// Where the first obstacle stops a vertex that would go from x0 to x1, both at home; -1 if none
+  /// does.
   /// @param slack  share of the distance that may be missing
   DRENCH_HD int stop(int vertex, Vec3<float> x0, Vec3<float> x1, float slack,
                      Vec3<float>& own) const {
@@ -50,21 +60,23 @@ struct ClothHold {
   DRENCH_HD bool hold(int vertex, Vec3<float> from, Vec3<float> straight, Vec3<float> to,
                       Vec3<float>& w) const {
     Vec3<float> own;
-    const int k = stop(vertex, from, to, 0.f, own);
+    const Vec3<float> in = home(from);
+    const int k = stop(vertex, from + in, to + in, 0.f, own);
     if (k < 0) return false;
     const ObstacleView& o = obstacles.obstacle[k];
     const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), may = along(free[vertex], n);
     const float size2 = length2(may);
     if (size2 < 0.01f) return false;  // a wall holds it that way
     const Vec3<float> way = may * (1.f / sqrtf(size2));
-    w = w + way * (dot(n, o.to_frame(1, own) - straight - w) / dot(n, way));
+    w = w + way * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, way));
     normal.set(vertex, way);
     free_block.put_free(vertex, block, free[vertex], way, inertia[vertex]);
     grip[vertex] = k;
     return true;
   }
 
-  /// The velocity that the surface has there along its normal, and the solid's own across it, m/s.
+  /// The velocity that the surface has along its normal at x, which is at home, and the solid's own
+  /// across it, m/s.
   DRENCH_HD Vec3<float> surface_velocity(const ObstacleView& o, Vec3<float> x,
                                          Vec3<float> n) const {
     const Vec3<float> own = o.to_own(1, x);
@@ -74,19 +86,23 @@ struct ClothHold {
   }
 
   /// @param given  kg m/s, to the vertex
-  DRENCH_HD void react(int k, Vec3<float> given) const { stopped.add(k, given * -inverse_mass); }
+  DRENCH_HD void react(int k, Vec3<float> given) const {
+    stopped.add(obstacles.obstacle[k].of, given * -inverse_mass);
+  }
 
   /// The last guard: where a vertex ends that would go from x0 to x1 with velocity u.
   DRENCH_HD void guard(int vertex, float mass, Vec3<float> x0, Vec3<float>& x1,
                        Vec3<float>& u) const {
+    const Vec3<float> in = home(x0);
     for (int round = 0; round < 4; ++round) {
       Vec3<float> own, unused{0.f, 0.f, 0.f};
-      const int k = stop(vertex, x0, x1, 0.02f, own);
+      const int k = stop(vertex, x0 + in, x1 + in, 0.02f, own);
       if (k < 0) return;
       const ObstacleView& o = obstacles.obstacle[k];
       const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
-      x1 = o.to_frame(1, own);
-      const float inward = dot(u - surface_velocity(o, x1, n), n);
+      const Vec3<float> out = o.to_frame(1, own);
+      x1 = out - in;
+      const float inward = dot(u - surface_velocity(o, out, n), n);
       if (inward < 0.f) {
         react(k, n * (-inward * mass));
         u = u - n * inward;
@@ -100,11 +116,23 @@ inline ClothHold cloth_hold_of(const State& state) {
   const ClothState& c = state.cloth;
   const ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
-  return {state.obstacles.views(), cloth_walls_of(p),    c.half_thickness.data(),
-          c.fan_start.data(),      c.fan_entry.data(),   s.free.view(),
-          s.normal.view(),         block_inverse(state), free_block_inverse(state),
-          s.inertia.data(),        s.grip.data(),        {state.obstacles.stopped.data()},
-          0.15f * p.spacing,       float(1 / state.dt),  1.f / p.particle_mass};
+  return {state.obstacles.views(),
+          cloth_walls_of(p),
+          c.half_thickness.data(),
+          c.fan_start.data(),
+          c.fan_entry.data(),
+          s.free.view(),
+          s.normal.view(),
+          block_inverse(state),
+          free_block_inverse(state),
+          s.inertia.data(),
+          s.grip.data(),
+          {state.obstacles.stopped.data()},
+          0.15f * p.spacing,
+          float(1 / state.dt),
+          1.f / p.particle_mass,
+          {p.low[0], p.low[1], p.low[2]},
+          periods_of(p)};
 }
 
 /// As hold_at_walls, whose axes it takes into account.
@@ -157,7 +185,8 @@ struct HoldRevision {
   /// The obstacle takes the vertex with it.
   DRENCH_HD bool stick(int i, const ObstacleView& o, Vec3<float> n) const {
     const Vec3<float> x = position[i], straight = x + velocity[i] * dt, w = change[i];
-    const Vec3<float> off = along(hold.free[i], o.to_frame(1, o.to_own(0, x)) - straight - w);
+    const Vec3<float> in = hold.home(x), carried = o.to_frame(1, o.to_own(0, x + in)) - in;
+    const Vec3<float> off = along(hold.free[i], carried - straight - w);
     slides[i] = 0.f;
     right.set(i, given[i]);
     change.set(i, w + off - n * dot(n, off));
@@ -179,7 +208,7 @@ struct HoldRevision {
     if (normal < 0.f) return let_go(i);
     if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + velocity[i] * dt;
-    const Vec3<float> solid = hold.surface_velocity(o, straight, n);
+    const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);
     if (round == 0) {  // hold what is slow enough for friction to stop it
       const Vec3<float> slip = across(velocity[i] - solid, n);
       const float size = length(slip);
@@ -261,7 +290,8 @@ inline void finish_at_obstacles(State& state, const VecView& given) {
         if (k >= 0) {
           const Vec3<float> n = hold.normal[i], w = change[i];
           u = v[i] + w * inverse_dt;
-          const Vec3<float> solid = hold.surface_velocity(hold.obstacles.obstacle[k], to, n);
+          const ObstacleView& o = hold.obstacles.obstacle[k];
+          const Vec3<float> solid = hold.surface_velocity(o, to + hold.home(x[i]), n);
           const Vec3<float> kick = n * dot(solid - u, n);
           const Vec3<float> reaction = along(hold.free[i], matrix.whole(change, i) - given[i]);
           hold.react(k, reaction * inverse_dt + kick * mass[i]);

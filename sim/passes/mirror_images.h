@@ -125,7 +125,7 @@ struct MirrorImages {
       const float d = maximum(o.distance(own, o.blend[1]), 0.1f * spacing);
       if (d >= h) continue;
       const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
-      if (length2(n) > 0.5f) mirrors.add({n, dot(n, x) - d, d, 1.f, k});
+      if (length2(n) > 0.5f) mirrors.add({n, dot(n, x) - d, d, 1.f, o.of});
     }
     if (any_sheet) sheets.add(mirrors, i, x, h, 0.1f * spacing);
     mirrors.keep_seen(x, 0.05f * spacing);

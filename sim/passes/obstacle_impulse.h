@@ -13,8 +13,10 @@ struct Impulse {
   }
 };
 
-/// What pressure gave to one obstacle in the step that was made, kg m/s: the reaction to its part
-/// of -D^T q (pressure_rows.h). Of particles that are not in the near list.
+DRENCH_HD Impulse times(Vec3<float> v, double push) { return {push * v.x, push * v.y, push * v.z}; }
+
+/// What pressure gave to one obstacle, all images of it, in the step that was made, kg m/s: the
+/// reaction to its part of -D^T q (pressure_rows.h). Of particles that are not in the near list.
 inline Impulse pressure_impulse(const State& state, int which) {
   const Parameters& p = state.parameters;
   const ObstacleShare law = obstacle_share_of(p);
@@ -29,13 +31,17 @@ inline Impulse pressure_impulse(const State& state, int which) {
         const Float4 at = place[i];
         const Vec3<float> x{at.x, at.y, at.z};
         if (triangle && triangle[i] >= 0) return Impulse{};
-        const WallShare own = law.of(obstacles.obstacle[which], x);
-        if (at.w == 0.f || own.value == 0.f) return Impulse{};
-        WallShare others = walls.share(x);
-        for (int k = 0; k < obstacles.count; ++k)
-          if (k != which) others = law.both(others, law.of(obstacles.obstacle[k], x));
-        const double push = factor * at.w * (1.f - others.value);
-        return Impulse{push * own.gradient.x, push * own.gradient.y, push * own.gradient.z};
+        Impulse sum;
+        for (int image = 0; image < obstacles.count && at.w != 0.f; ++image) {
+          if (obstacles.obstacle[image].of != which) continue;
+          const WallShare own = law.of(obstacles.obstacle[image], x);
+          if (own.value == 0.f) continue;
+          WallShare others = walls.share(x);
+          for (int k = 0; k < obstacles.count; ++k)
+            if (k != image) others = law.both(others, law.of(obstacles.obstacle[k], x));
+          sum = sum(sum, times(own.gradient, factor * at.w * (1.f - others.value)));
+        }
+        return sum;
       },
       Impulse{});
 }
@@ -56,15 +62,20 @@ inline Impulse pressure_impulse_near_sheets(const State& state, int which) {
         const int i = c.particle[row];
         if (i < 0 || place[i].w == 0.f) return Impulse{};
         const Vec3<float> x{place[i].x, place[i].y, place[i].z}, n = normal[i];
-        const WallShare own = law.seen(obstacles.obstacle[which], x, n, c.gap[row], walls);
-        if (own.value == 0.f) return Impulse{};
-        WallShare others = walls.share(x, n, c.gap[row]);
-        for (int k = 0; k < obstacles.count; ++k) {
-          if (k != which)
-            others = law.both(others, law.seen(obstacles.obstacle[k], x, n, c.gap[row], walls));
+        const float gap = c.gap[row];
+        Impulse sum;
+        for (int image = 0; image < obstacles.count; ++image) {
+          if (obstacles.obstacle[image].of != which) continue;
+          const WallShare own = law.seen(obstacles.obstacle[image], x, n, gap, walls);
+          if (own.value == 0.f) continue;
+          WallShare others = walls.share(x, n, gap);
+          for (int k = 0; k < obstacles.count; ++k)
+            if (k != image)
+              others = law.both(others, law.seen(obstacles.obstacle[k], x, n, gap, walls));
+          sum = sum(sum,
+                    times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value)));
         }
-        const double push = factor * place[i].w * c.open[row] * (1.f - others.value);
-        return Impulse{push * own.gradient.x, push * own.gradient.y, push * own.gradient.z};
+        return sum;
       },
       Impulse{});
 }
@@ -82,8 +93,7 @@ inline Impulse tension_impulse(const State& state, int which) {
         const Mirrors mirrors = images.of(i);
         for (int k = 0; k < mirrors.count; ++k) {
           if (mirrors.mirror[k].of != which) continue;
-          const Vec3<float> s = images.sum(i, mirrors, force).by[k];
-          impulse = {factor * s.x, factor * s.y, factor * s.z};
+          impulse = impulse(impulse, times(images.sum(i, mirrors, force).by[k], factor));
         }
         return impulse;
       },

@@ -98,7 +98,7 @@ struct StopSums {
 /// through what is thinner than its path. What it stops takes on the surface's normal velocity.
 struct ObstacleGuard {
   ObstacleViews obstacles;
-  Mover walls;
+  Mover walls, ends;  // paths go on beyond a seam, where images are; `ends` wraps what ends there
   float inverse_dt;
   int start;  // see PathStop
   StopSums stopped;
@@ -116,7 +116,7 @@ struct ObstacleGuard {
   /// As a Mover, within the domain's walls too.
   DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
     const Vec3<float> to = walls(x, v);
-    return (*this)(x, to, v);
+    return ends.wrapped((*this)(x, to, v));
   }
 
   /// Where a particle ends that would go from x0 to x1, and what becomes of its velocity.
@@ -132,8 +132,8 @@ struct ObstacleGuard {
         x1 = o.to_frame(1, own);
         const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
         const float inward = dot(v, n) - (start == 1 ? 0.f : surface_speed(o, own, n, inverse_dt));
-        if (inward < 0.f) stopped.add(k, n * inward);
-        stopped.count(k);
+        if (inward < 0.f) stopped.add(o.of, n * inward);
+        stopped.count(o.of);
         if (inward < 0.f) v = v - n * inward;
         x1 = walls.inside(x1);
       }
@@ -147,8 +147,10 @@ struct ObstacleGuard {
 /// @param start  see PathStop.
 inline ObstacleGuard obstacle_guard_of(const State& state, int start) {
   const float dt = float(state.dt);
+  const bool goes_on = start == 1 && state.cloth.vertices > 0;  // see project_density
   return {state.obstacles.views(),
-          mover_of(state.parameters, dt),
+          path_mover_of(state.parameters, dt),
+          goes_on ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt),
           1.f / dt,
           start,
           {state.obstacles.stopped.data()}};

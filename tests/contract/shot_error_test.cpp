@@ -84,8 +84,15 @@ TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
       {"[domain]\nx = \"periodic\"\n[fluid]\nsolver = \"weakly_compressible\"\n"
        "[[cloth]]\n",
        {"scene.toml:5", "domain.x", "cloth", "seam", "incompressible"}},
-      {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"sphere\"\n",
-       {"scene.toml:5", "domain.x", "obstacle", "seam"}},
+      {"[domain]\nx = \"periodic\"\n[[obstacle]]\ntype = \"plane\"\nnormal = [0.1, 1, 0]\n",
+       {"scene.toml:8", "obstacle[0].normal", "along x by 0.0995", "domain.x", "use a box"}},
+      {"[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.5]\nz = \"periodic\"\n[[obstacle]]\ntype = "
+       "\"box\"\nsize = [0.1, 0.1, 0.6]\nrotation_deg = [0, 1, 0]\n",
+       {"scene.toml:10", "obstacle[0].size", "overlaps its own image", "z axis", "0.5 m on"}},
+      // A stirrer longer than the period is caught in the frame in which it lies along it.
+      {"[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.5]\nz = \"periodic\"\n[[obstacle]]\ntype = "
+       "\"box\"\nsize = [0.1, 0.1, 0.6]\nrotation_deg = [[1001, [0, 90, 0]], [1031, [0, 0, 0]]]\n",
+       {"scene.toml:10", "obstacle[0].size", "overlaps its own image"}},
       {"[fluid]\nsolver = \"weakly_compressible\"\n[[cloth]]\nretardation_time = 0.01\n",
        {"scene.toml", "cloth[0].retardation_time", "Use 0"}},
       {"[fluid]\nsolver = \"weakly_compressible\"\nsurface_tension = 0.072\n",
@@ -109,6 +116,15 @@ TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
   });
   const std::string around = "[domain]\nmin = [0, 0, 0]\nmax = [2, 2, 0.5]\nz = \"periodic\"\n";
   EXPECT_EQ(parse_shot(box + around, folder_ / "scene.toml").domain.axis[2], Axis::periodic);
+  const auto fits = [&](const std::string& obstacle) {
+    const std::string text = box + around + "[[obstacle]]\n" + obstacle;
+    return parse_shot(text, folder_ / "scene.toml").obstacle.size() == 1;
+  };
+  EXPECT_TRUE(fits("type = \"plane\"\nnormal = [1, 1, 0]\n"));
+  EXPECT_TRUE(fits("type = \"box\"\nsize = [0.1, 0.1, 0.5]\nrotation_deg = [0, 0, 30]\n"));
+  EXPECT_TRUE(fits("type = \"box\"\nsize = [0.1, 3, 0.1]\nrotation_deg = [90, 0, 0]\n"));
+  EXPECT_TRUE(fits("type = \"box\"\nsize = [0.1, 0.2, 2]\nrotation_deg = [45, 0, 0]\n"));  // louver
+  EXPECT_TRUE(fits("type = \"sphere\"\nradius = 0.3\n"));
 }
 
 // Letters beyond ASCII belong into strings and comments; toml++ must not see them anywhere else.

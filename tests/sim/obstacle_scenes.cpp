@@ -173,4 +173,28 @@ Lift lift_of(ObstacleType type, double spacings) {
   return {force.y - 1, std::hypot(force.x, force.z)};
 }
 
+BarForce lift_of_bar(Obstacle bar, double section, int across,
+                     const LevelSetMaker& make_level_set) {
+  Shot shot = tank_shot(1);
+  const double a = shot.fluid.spacing = 0.06 / across;
+  const int side = 2 * across, depth = int(std::round(2.25 * across));
+  shot.fluid.box.clear();
+  shot.domain.max = V3d(side * a, 2 * depth * a, 6 * a);
+  shot.domain.axis[2] = Axis::periodic;
+  add_box(shot, V3d(0), {side, depth, 6});
+  bar.position = V3d(side * a / 2, 0.06, 1.7 * a);  // ends within the domain if there are any
+  shot.obstacle.push_back(bar);
+  Stepper run(shot, make_level_set);
+  run.advance(0.8);
+  V3d impulse(0);
+  const double begin = run.time;
+  while (run.time < begin + 0.5) {
+    run.step();
+    const sim::ObstacleImpulse i = run.solver->obstacle_impulses().at(0);
+    impulse += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
+  }
+  const V3d force = impulse / (run.time - begin) / (1000 * g * section * 6 * a);
+  return {force.y - 1, force.x, force.z};
+}
+
 }  // namespace drench::sim_tests

@@ -35,4 +35,15 @@ struct Lift {
 /// A body of this radius or half edge, in spacings, held in the middle of a pool.
 Lift lift_of(ObstacleType type, double spacings);
 
+/// A bar along the periodic z axis, 6 cm across, held in a pool between walls 12 cm apart.
+struct BarForce {
+  double error = 0;     // of the mean vertical force over the displaced weight
+  double sideways = 0;  // of the mean force along x over it
+  double along = 0;     // the same along z
+};
+/// @param bar  its position is set here. @param section  m^2. @param across  spacings in 6 cm; the
+/// period is six spacings.
+BarForce lift_of_bar(Obstacle bar, double section, int across,
+                     const LevelSetMaker& make_level_set = {});
+
 }  // namespace drench::sim_tests
