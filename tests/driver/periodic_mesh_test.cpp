@@ -166,7 +166,7 @@ TEST_P(MeshSeam, SameBitsForAnyNumberOfThreadsAndAfterAResume) {
   const TemporaryFolder folder;
   const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
   const Shot shot = splash(folder.path(), GetParam(), V3d(0.08, 0, 0.06));
-  const SimulatorOptions options{Device::cpu, make_level_set};
+  const SimulatorOptions options{.device = Device::cpu, .level_set = make_level_set};
   std::vector<ParticleFrame> ends;
   for (const int threads : {1, 16}) {
     tbb::task_arena arena(threads);

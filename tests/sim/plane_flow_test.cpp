@@ -9,6 +9,7 @@
 #include "tests/sim/same_state.h"
 #include "tests/sim/support.h"
 #include "tests/validation/plane_flow.h"
+#include "tests/validation/wave_maker.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -137,6 +138,14 @@ TEST(FullDomain, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
   second.solver->load(first.solver->save());
   for (int k = 0; k < 6; ++k) second.step(1e-3);
   expect_same_state(state[0], second.solver->save());
+}
+
+// Measured at 10, 20 and 30 layers: docs/benchmarks.md, wave_maker.
+TEST(PlaneFlow, APistonMakesTheWavesOfLinearTheory) {
+  const validation::WaveMaker wave = validation::wave_maker(10, 1e-3);
+  EXPECT_NEAR(wave.made, 1, 0.16);    // measured 1.13
+  EXPECT_NEAR(wave.length, 1, 0.05);  // measured 1.031
+  EXPECT_GT(wave.carried, 0.7);       // measured 0.745
 }
 
 }  // namespace
