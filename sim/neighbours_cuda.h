@@ -34,27 +34,27 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
   lists.begin.resize(size_t(n) + 1), lists.blocks.resize(n);
   int* blocks = lists.blocks.data();
   parallel_for("neighbours: count", n, [=] __device__(int i) {
-    int count = 0;
-    for_each_within(grid, position, i, h, filter, [&](int, float) { ++count; });
-    blocks[i] = (count + 3) / 4;
+    BlockFiller filler;
+    for_each_within(grid, position, i, h, filter, [&](int j, float) { filler.opens(j); });
+    blocks[i] = filler.blocks;
   });
   exclusive_scan(lists.blocks, n, lists.begin, scratch);
-  const size_t entries = size_t(value_at(lists.begin, n)) * 4;
-  if (lists.index.size() < entries) {
-    lists.index.renew(entries + entries / 8), lists.closeness.renew(entries + entries / 8);
-  }
-  int* index = lists.index.data();
-  float* closeness = lists.closeness.data();
+  const size_t all = value_at(lists.begin, n);
+  if (lists.block.size() < all) lists.block.renew(all + all / 16), lists.base.renew(all + all / 16);
+  NeighbourBlock* block = lists.block.data();
+  int* base = lists.base.data();
   const unsigned* first = lists.begin.data();
   parallel_for("neighbours: fill", n, [=] __device__(int i) {
-    size_t at = size_t(first[i]) * 4;
+    BlockFiller filler;
+    NeighbourBlock* to = block + first[i] - 1;
     float sum = 0.f;
     for_each_within(grid, position, i, h, filter, [&](int j, float r2) {
       const float u = max0(1.f - sqrtf(r2) / h);
       sum += Kernel::value(u);
-      index[at] = j, closeness[at++] = u;
+      if (filler.opens(j)) *++to = {}, base[to - block] = j;
+      to->offset[filler.used - 1] = uint16_t(2 * (j - filler.base));
+      to->closeness[filler.used - 1] = uint16_t(rintf(u * NeighbourBlock::unit));
     });
-    for (; at % 4 != 0; ++at) index[at] = i, closeness[at] = 0.f;
     density(i, sum);
   });
 }
@@ -75,16 +75,22 @@ __global__ void launch_neighbours(NeighbourView list, int n, Physics physics) {
   };
   const P self = load(i);
   S sum{};
-  const int4* index = reinterpret_cast<const int4*>(list.index) + list.begin[i];
-  const float4* closeness = reinterpret_cast<const float4*>(list.closeness) + list.begin[i];
-  const auto pair = [&](int j, float u) {
-    const float w = physics.weight(u);
+  const auto pair = [&](int j, unsigned closeness) {
+    const float w = physics.weight(float(closeness) * (1.f / NeighbourBlock::unit));
     physics.pair(self, load(j), Quad{w, w, w, w}, sum);
   };
+  const auto two = [&](int base, unsigned offset, unsigned closeness) {
+    pair(base + int((offset & 0xffff) >> 1), closeness & 0xffff);
+    pair(base + int(offset >> 17), closeness >> 16);
+  };
+  const uint4* block = reinterpret_cast<const uint4*>(list.block + list.begin[i]);
+  const int* base = list.base + list.begin[i];
   for (int b = 0; b < list.blocks[i]; ++b) {
-    const int4 j = __ldg(index + b);
-    const float4 u = __ldg(closeness + b);
-    pair(j.x, u.x), pair(j.y, u.y), pair(j.z, u.z), pair(j.w, u.w);
+    const uint4 o = __ldg(block + 2 * b), u = __ldg(block + 2 * b + 1);
+    const int from = __ldg(base + b);
+    two(from, o.x, u.x), two(from, o.y, u.y);
+    if ((u.z | u.w) == 0) continue;
+    two(from, o.z, u.z), two(from, o.w, u.w);
   }
   typename Physics::template Sum<Float4> out;
   static_assert(sizeof out == sizeof sum, "a sum has as many members of either type");

@@ -3,7 +3,7 @@
 // do with them. On a CPU core a Quad holds the same four numbers of two neighbours side by side; on
 // the GPU those of one.
 
-#include "sim/backend.h"
+#include "sim/pack.h"
 
 #if !defined(__CUDACC__)
 #include <immintrin.h>
@@ -87,18 +87,15 @@ DRENCH_HD Quad nearest_integer(Quad a) {
   return Quad(Quad::Native(_mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)));
 }
 
-/// Four consecutive floats, twice.
-DRENCH_HD Quad both(const float* a) {
-  return Quad(Quad::Native(_mm256_broadcast_ps(reinterpret_cast<const __m128*>(a))));
+/// Lanes 2 k and 2 k + 1 of eight, each in all places of one half.
+DRENCH_HD Quad spread_two(Pack a, int k) {
+  const __m256i lane =
+      _mm256_add_epi32(_mm256_set1_epi32(2 * k), _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1));
+  return Quad(Quad::Native(_mm256_permutevar8x32_ps(a.v, lane)));
 }
-/// First and second, or third and fourth component, each in all places of one half.
-DRENCH_HD Quad spread_first(Quad a) {
-  return Quad(Quad::Native(_mm256_permutevar_ps(a.v, _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1))));
+DRENCH_HD Quad both(const Float4& a) {
+  return Quad(Quad::Native(_mm256_broadcast_ps(reinterpret_cast<const __m128*>(&a))));
 }
-DRENCH_HD Quad spread_last(Quad a) {
-  return Quad(Quad::Native(_mm256_permutevar_ps(a.v, _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3))));
-}
-DRENCH_HD Quad both(const Float4& a) { return both(&a.x); }
 DRENCH_HD Quad splat(float a) { return Quad(a); }
 DRENCH_HD Quad positive(Quad a) {
   return Quad(Quad::Native(_mm256_max_ps(a.v, _mm256_setzero_ps())));

@@ -151,10 +151,10 @@ struct MirrorImages {
     ImageSums sums;
     if (mirrors.count == 0) return sums;
     const float h = support_radius, own[3] = {place[i].x, place[i].y, place[i].z};
-    const size_t begin = size_t(list.begin[i]) * 4;
-    for (int k = 0; k < 4 * list.blocks[i]; ++k) {
-      if (!(list.closeness[begin + size_t(k)] > 0.f)) continue;
-      const int j = list.index[begin + size_t(k)];
+    const size_t end = list.end(i);
+    for (size_t k = list.first(i); k < end; ++k) {
+      if (!(list.closeness(k) > 0.f)) continue;
+      const int j = list.index(k);
       const float at[3] = {place[j].x, place[j].y, place[j].z};
       float near[3];  // the nearest image across periodic axes
       for (int c = 0; c < 3; ++c)

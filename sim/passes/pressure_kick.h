@@ -66,9 +66,10 @@ struct EarlierAcceleration {
   struct Sum {
     Q push, gradient;
   };
+  /// Below any that counts where no neighbour is.
   template <class T>
   DRENCH_HD T weight(T u) const {
-    return u;
+    return select(u > T(0.f), u, T(-1.f));
   }
   /// Closeness to first order; the way back is less than a quarter of the distance, so that what
   /// meets at high speed is not exchanged.

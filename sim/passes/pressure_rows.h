@@ -29,23 +29,24 @@ struct PressureAcceleration {
   };
   template <class Q>
   struct Sum {
-    Q push;
+    Q diagonal, ahead, back;  // of L_j r w q_j: d r; c times the next of r; c r, one place on
   };
   template <class T>
   DRENCH_HD T weight(T u) const {
     return WendlandC2::slope(u);
   }
-  /// + L_j r w q_j
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
     const Q r = weight * splat_w(j.place) * separation(i.place, j.place);
-    sum.push = multiply_add(j.diagonal, r, multiply_add(j.cross, rotate(r), sum.push)) +
-               rotate_back(j.cross * r);
+    sum.diagonal = multiply_add(j.diagonal, r, sum.diagonal);
+    sum.ahead = multiply_add(j.cross, rotate(r), sum.ahead);
+    sum.back = multiply_add(j.cross, r, sum.back);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const float q = place[i].w;
-    const Float4 own = push[i], p = sum.push;
-    vector[i] = {scale * p.x + q * own.x, scale * p.y + q * own.y, scale * p.z + q * own.z, 0.f};
+    const Float4 own = push[i], d = sum.diagonal, a = sum.ahead, b = sum.back;
+    vector[i] = {scale * (d.x + a.x + b.z) + q * own.x, scale * (d.y + a.y + b.x) + q * own.y,
+                 scale * (d.z + a.z + b.y) + q * own.z, 0.f};
   }
 };
 
@@ -67,7 +68,7 @@ struct DensityRate {
   };
   template <class Q>
   struct Sum {
-    Q diagonal, cross;  // of the products of separation and velocity, made symmetric
+    Q diagonal, cross, back;  // of the products of separation and velocity
   };
   template <class T>
   DRENCH_HD T weight(T u) const {
@@ -77,12 +78,14 @@ struct DensityRate {
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
     const Q r = weight * separation(i.place, j.place), v = i.vector - j.vector;
     sum.diagonal = multiply_add(r, v, sum.diagonal);
-    sum.cross = multiply_add(r, rotate(v), multiply_add(rotate(r), v, sum.cross));
+    sum.cross = multiply_add(r, rotate(v), sum.cross);
+    sum.back = multiply_add(rotate(r), v, sum.back);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 g = wall[i], v = vector[i], d = correction[i], c = correction_cross[i];
-    const Float4 p = sum.diagonal, t = sum.cross;
-    const float product = d.x * p.x + d.y * p.y + d.z * p.z + c.x * t.x + c.y * t.y + c.z * t.z;
+    const Float4 p = sum.diagonal, t = sum.cross, b = sum.back;
+    const float product = d.x * p.x + d.y * p.y + d.z * p.z + c.x * (t.x + b.x) +
+                          c.y * (t.y + b.y) + c.z * (t.z + b.z);
     rate[i] = g.x * v.x + g.y * v.y + g.z * v.z - scale * product;
   }
 };

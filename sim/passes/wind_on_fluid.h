@@ -58,14 +58,13 @@ inline void wind_on_fluid(State& state) {
         if (!(speed > 1e-6f)) return;
         const Vec3<float> way = u * (1.f / speed);
         float shelter = 0.f;
-        const unsigned end = list.begin[i] + unsigned(list.blocks[i]);
-        for (unsigned b = list.begin[i]; b < end && shelter < 1.f; ++b) {
-          for (unsigned k = 4 * b; k < 4 * b + 4; ++k) {
-            if (list.index[k] == i || !(list.closeness[k] > 0.f)) continue;
-            const Vec3<float> d = nearest(x[i] - x[list.index[k]], period);
-            const float size = length(d);
-            if (size > 0.f) shelter = maximum(shelter, dot(way, d) / size);
-          }
+        const size_t end = list.end(i);
+        for (size_t k = list.first(i); k < end && shelter < 1.f; ++k) {
+          const int j = list.index(k);
+          if (j == i || !(list.closeness(k) > 0.f)) continue;
+          const Vec3<float> d = nearest(x[i] - x[j], period);
+          const float size = length(d);
+          if (size > 0.f) shelter = maximum(shelter, dot(way, d) / size);
         }
         const Vec3<float> in{wall[i].x, wall[i].y, wall[i].z};  // towards walls
         const float steep = length(in);

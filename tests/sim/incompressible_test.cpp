@@ -35,11 +35,11 @@ TEST(NeighbourLists, HoldWhatABruteForceSearchFinds) {
     const double h = listed.state.parameters.support_radius;
     for (int i = 0; i < count; ++i) {
       std::vector<int> found, expected;
-      for (int k = 0; k < 4 * list.blocks[i]; ++k) {
-        const size_t at = 4 * size_t(list.begin[i]) + size_t(k);
-        const double u = 1 - (listed.place(i) - listed.place(list.index[at])).length() / h;
-        if (list.closeness[at] > 0) found.push_back(list.index[at]);
-        if (list.closeness[at] > 0) EXPECT_NEAR(list.closeness[at], u, 1e-5);
+      for (size_t k = list.first(i); k < list.end(i); ++k) {
+        if (!(list.closeness(k) > 0)) continue;
+        const double u = 1 - (listed.place(i) - listed.place(list.index(k))).length() / h;
+        found.push_back(list.index(k));
+        EXPECT_NEAR(list.closeness(k), u, 1e-5);
       }
       for (int j = 0; j < count; ++j) {
         if ((listed.place(i) - listed.place(j)).length() < h * (1 - 1e-6)) expected.push_back(j);
@@ -49,6 +49,32 @@ TEST(NeighbourLists, HoldWhatABruteForceSearchFinds) {
       EXPECT_LE(found.size(), expected.size() + 1) << i;  // one on the border may be either
     }
   }
+}
+
+// Indices that jump farther than a block reaches, and back, as across planes of a large scene and
+// seams: what is read is what went in, in as many blocks as the GPU counts.
+TEST(NeighbourLists, HoldIndicesHoweverFarApart) {
+  sim::cpu::Found found;
+  const std::vector<int> index{70000, 70001, 40000, 40001, 40002, 72767, 72768, 5,  6,         7,
+                               8,     9,     10,    11,    12,    13,    14,    15, 2000000000};
+  found.count = int(index.size());
+  found.index = index, found.index.resize(index.size() + 8);
+  found.block.resize(index.size()), found.base.resize(index.size());
+  for (size_t k = 0; k < found.index.size(); ++k)
+    found.distance2.push_back(float(k + 1) / float(index.size()));  // closeness by now
+  found.pack_blocks();
+  sim::cpu::BlockFiller filler;
+  for (const int j : index) filler.opens(j);
+  EXPECT_EQ(found.blocks, filler.blocks);
+  const unsigned begin = 0;
+  const sim::cpu::NeighbourView list{found.block.data(), found.base.data(), &begin, &found.blocks};
+  std::vector<int> read;
+  for (size_t k = list.first(0); k < list.end(0); ++k) {
+    if (!(list.closeness(k) > 0)) continue;
+    EXPECT_NEAR(list.closeness(k), float(read.size() + 1) / float(index.size()), 1e-5);
+    read.push_back(list.index(k));
+  }
+  EXPECT_EQ(read, index);
 }
 
 /// Density at given positions, summed in double over all pairs.

@@ -193,10 +193,8 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   sim::cpu::density_rate(state);
   for (int i = 0; i < n; ++i) {
     std::vector<int> found, expected;
-    for (int k = 0; k < 4 * list.blocks[i]; ++k) {
-      const size_t entry = 4 * size_t(list.begin[i]) + size_t(k);
-      if (list.closeness[entry] > 0) found.push_back(list.index[entry]);
-    }
+    for (size_t k = list.first(i); k < list.end(i); ++k)
+      if (list.closeness(k) > 0) found.push_back(list.index(k));
     double sum = 0, rate = 0;
     const auto vector = [&](int j) {
       const sim::cpu::Float4 v = s.vector.data()[j];
