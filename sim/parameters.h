@@ -24,6 +24,7 @@ struct Parameters {
   float viscous_tolerance = 1e-4f;  // RMS of what the solve leaves over RMS of the velocity
   int most_viscous_iterations = 200;
   bool no_slip = false;               // at the domain's walls
+  bool no_slip_obstacles = false, no_slip_sheets = false;  // at any of them
   float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
   float gravity[3] = {0, 0, 0};       // m/s^2
   float surface_tension = 0;          // N/m
@@ -49,8 +50,9 @@ struct Parameters {
 inline float viscous_strength(const Parameters& p, double dt) {
   return float(dt) * p.dynamic_viscosity / (p.rest_density * p.support_radius * p.support_radius);
 }
+/// Sheets may be far lighter than the fluid that they hold: beside them it always is.
 inline bool viscosity_is_implicit(const Parameters& p, double dt) {
-  return p.incompressible && viscous_strength(p, dt) > 0.01f;
+  return p.incompressible && (viscous_strength(p, dt) > 0.01f || p.no_slip_sheets);
 }
 
 /// Whether sheets make implicit steps (sim/passes/cloth_implicit.h), or explicit substeps: these

@@ -121,12 +121,15 @@ bool walls_hold(const Shot& shot) {
   for (const V3d& v : domain.wall_velocity.all()) {
     if (v.length() > 0) return true;
   }
-  const double layer = std::sqrt(shot.fluid.kinematic_viscosity * 1.0);  // m after 1 s
-  return layer >= shot.fluid.spacing;
+  return holds_fluid(shot, Slip::automatic);
 }
 
 void set_viscosity(const Shot& shot, Parameters& p) {
   p.no_slip = walls_hold(shot);
+  const bool viscous = shot.fluid.kinematic_viscosity > 0;
+  for (const Obstacle& o : shot.obstacle)
+    p.no_slip_obstacles |= viscous && holds_fluid(shot, o.slip);
+  for (const Cloth& c : shot.cloth) p.no_slip_sheets |= viscous && holds_fluid(shot, c.slip);
   const auto velocity = shot.domain.wall_velocity.all();
   for (int k = 0; k < 3; ++k) {
     for (int end = 0; end < 2; ++end) {
@@ -302,7 +305,7 @@ void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) 
 }
 
 void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame,
-                  Scene& scene) {
+                  const Shot& shot, Scene& scene) {
   ClothTopology& t = scene.cloth;
   const int base = t.vertices(), base_triangle = t.triangles();
   append_springs(sheet, cloth, frame, t, base);
@@ -323,6 +326,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     }
     t.sheet.push_back(index);
     t.half_thickness.push_back(float(0.5 * cloth.thickness));
+    t.no_slip.push_back(holds_fluid(shot, cloth.slip) ? 1.f : 0.f);
     t.rest_centroid.push(float(centre.x - frame.origin[0]), float(centre.y - frame.origin[1]),
                          float(centre.z - frame.origin[2]));
   }
@@ -491,7 +495,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
     scene.first_vertex.push_back(scene.cloth.vertices());
     scene.first_triangle.push_back(scene.cloth.triangles());
-    append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, scene);
+    append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, shot, scene);
     dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back(), shot.cloth[s]));
   }
   scene.first_vertex.push_back(scene.cloth.vertices());

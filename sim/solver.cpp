@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "sim/passes/body_drag.h"
 #include "sim/passes/measure_density.h"
 #include "sim/passes/obstacle_impulse.h"
 #include "sim/passes/probe.h"
@@ -203,6 +204,7 @@ class BackendSolver : public Solver {
     for (int k = 0; k < count && state_.dt > 0; ++k) {
       Impulse pressure = pressure_impulse(state_, k);
       if (allocated_ & column_tension) pressure = pressure(pressure, tension_impulse(state_, k));
+      if (allocated_ & column_drag) pressure = pressure(pressure, drag_impulse(state_, k));
       if (state_.contact.near > 0) {
         pressure = pressure(pressure, pressure_impulse_near_sheets(state_, k));
       }
@@ -240,6 +242,10 @@ class BackendSolver : public Solver {
       if (state_.parameters.full) state_.pressure.way.resize(n);
     }
     if (allocated_ & column_tension) state_.tension.normal.resize(n);
+    if (allocated_ & column_drag) {
+      ViscosityState& v = state_.viscosity;
+      for (Column<Float4>* c : {&v.body_rate, &v.body_cross, &v.body_source}) c->resize(n);
+    }
     if (allocated_ & column_sheet) {
       for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,
                                &f.edge, &f.cloth_share}) {
@@ -285,6 +291,7 @@ class BackendSolver : public Solver {
     load_springs(t);
     from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
     from_host(c.half_thickness, t.half_thickness);
+    if (state_.parameters.no_slip_sheets) from_host(c.no_slip, t.no_slip);
     upload(c.rest_centroid, t.rest_centroid);
     from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry),
         from_host(c.rim, t.rim);
@@ -334,6 +341,7 @@ class BackendSolver : public Solver {
                          &s.image, &s.direction, &s.direction_image})
       v->resize(c.padded);
     s.control.resize(1);
+    if (state_.parameters.no_slip_sheets) s.drag_factor.resize(size_t(6) * c.padded);
     if (state_.parameters.obstacles > 0) {
       s.normal.resize(c.padded), s.rub.resize(c.padded);
       s.grip.resize(c.padded), s.slides.resize(c.padded);

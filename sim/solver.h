@@ -43,6 +43,7 @@ struct ClothTopology {
   std::vector<float> rest_length, stiffness, spring_damping;
   std::vector<int> corner, neighbour, sheet;  // 3, 3, 1 a triangle
   std::vector<float> half_thickness;
+  std::vector<float> no_slip;    // of a triangle: 1 where it holds the fluid beside it, else 0
   std::vector<float> air_share;  // of a vertex: area its mass stands for / a third of its triangles
   HostVec rest_centroid;
   std::vector<int> fan_start, fan_entry, rim;
@@ -76,6 +77,7 @@ enum ColumnGroup : unsigned {
   column_cloth_system = 512,  // the implicit step of the sheets
   column_projection = 256,    // neighbour lists and rows of the pressure solve
   column_tension = 1024,      // normals of the surface
+  column_drag = 2048,         // what obstacles and sheets brake the fluid by
 };
 
 struct PassInfo {

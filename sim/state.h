@@ -77,6 +77,7 @@ struct ClothState {
   Column<int> neighbour;             // 3 a triangle: across edges ab, bc, ca; -1 is a free edge
   Column<int> sheet;                 // of a triangle
   Column<float> half_thickness;      // m, of a triangle
+  Column<float> no_slip;             // of a triangle: 1 where it holds fluid; only where any does
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
@@ -133,6 +134,7 @@ struct ClothSystem {
   Column<float> slides;       // 0 where friction holds a vertex, else 1. Only with obstacles
   VecColumn rub;              // kg m, friction of what slides on them. Only with obstacles
   VecColumn residual, scaled, image, direction, direction_image;
+  Column<float> drag_factor;  // as factor, with the fluid's drag; only where sheets hold fluid
   Column<ClothControl> control;
 };
 
@@ -168,6 +170,7 @@ struct ViscousControl {
   float step = 0, turn = 0;  // along the direction, and of the old direction in the next
   double product = 0;        // of the residual with itself preconditioned
   double size = 0;           // what residuals are compared with: a sum of squares, m^2/s^2
+  double sheet_square = 0, sheet_product = 0, sheet_curvature = 0;  // what sheets add to the sums
 };
 
 /// Columns of the implicit viscosity (passes/viscosity_solve.h), allocated by the first step that
@@ -175,6 +178,8 @@ struct ViscousControl {
 struct ViscosityState {
   Column<Float4> solution, residual, direction, product;  // m/s
   Column<Float4> diagonal, cross;  // inverse blocks: xx, yy, zz and xy, yz, zx
+  // What brakes a particle, see WallDrag; only where obstacles or sheets do (passes/body_drag.h).
+  Column<Float4> body_rate, body_cross, body_source;
   Column<ViscousControl> control;
 };
 

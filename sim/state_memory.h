@@ -37,6 +37,8 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
                           p.hierarchy.answer, p.hierarchy.inverse));
   all.push_back(memory_of("implicit viscosity", v.solution, v.residual, v.direction, v.product,
                           v.diagonal, v.cross, v.control));
+  all.push_back(memory_of("drag of obstacles and sheets", v.body_rate, v.body_cross, v.body_source,
+                          state.cloth.no_slip, state.cloth_system.drag_factor));
   all.push_back(memory_of("surface tension", state.tension.normal));
   all.push_back(memory_of("remembered sides", f.memory_triangle, f.memory_side, f.owed));
   all.push_back(memory_of("nearest triangles", f.triangle, f.far_by, f.weight_b, f.weight_c,

@@ -1,5 +1,6 @@
 #include "sim/step_plan.h"
 
+#include "sim/passes/body_drag.h"
 #include "sim/passes/contact_exact.h"
 #include "sim/passes/contact_paper.h"
 #include "sim/passes/density.h"
@@ -136,6 +137,9 @@ bool tense(const Parameters& p, bool cloth) { return projected(p, cloth) && p.su
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
+bool dragged(const Parameters& p, bool cloth) {
+  return viscous(p, cloth) && (p.no_slip_obstacles || p.no_slip_sheets);
+}
 bool windy(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.air_density > 0 && p.fluid_drag > 0;
 }
@@ -183,6 +187,7 @@ const Pass all_passes[] = {
      moving | column_density | column_projection, project_density},
     {"project_around_obstacles", around_obstacles, moving | column_density | column_projection,
      moving | column_density | column_projection, project_around_obstacles},
+    {"find_body_drag", dragged, column_velocity | column_projection, column_drag, find_body_drag},
     {"apply_viscosity", viscous, column_velocity | column_projection,
      column_velocity | column_projection, apply_viscosity},
     {"wind_on_fluid", windy, moving | column_density | column_projection, column_velocity,

@@ -5,6 +5,7 @@
 #include <Imath/ImathVec.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -50,8 +51,9 @@ struct Timeline {
 // through one comes in at the other
 enum class Axis { open, walls, periodic };
 
-/// How fluid meets the domain's walls; automatic: none where a wall's influence spreads by a
-/// spacing within a second, sqrt(nu 1 s) >= spacing, or where a wall moves; free elsewhere.
+/// How fluid meets the domain's walls, an obstacle, a sheet; automatic: none where their influence
+/// spreads by a spacing within a second, sqrt(nu 1 s) >= spacing, or where a wall moves; free
+/// elsewhere.
 enum class Slip { automatic, free, none };
 
 struct WallVelocity {  // m/s, along the wall
@@ -155,6 +157,7 @@ struct Cloth {
   double spring_damping = 0.1;      // fraction of critical, along each spring; momentum is kept
   double retardation_time = 0;      // s, viscosity over stiffness of each spring (Kelvin-Voigt)
   double thickness = 0.001;         // m
+  Slip slip = Slip::automatic;      // of fluid along it
   std::string material = "cotton";
 };
 
@@ -173,6 +176,7 @@ struct Obstacle {
   std::filesystem::path mesh_file;     // mesh: PLY or OBJ, or a sequence: see obstacle.h
   double scale = 1;                    // mesh: of its coordinates, to m
   double friction = 0.3;               // Coulomb's coefficient of cloth on it
+  Slip slip = Slip::automatic;         // of fluid along it
   std::string material = "ground";
   bool visible = true;
 };
@@ -319,6 +323,11 @@ inline bool is_incompressible(const Shot& shot) {
   return shot.fluid.solver == FluidSolver::incompressible ||
          (shot.fluid.solver == FluidSolver::automatic &&
           (shot.cloth.empty() || shot.coupling.scheme == CouplingScheme::exact));
+}
+/// Whether what has this slip holds the fluid beside it.
+inline bool holds_fluid(const Shot& shot, Slip slip) {
+  if (slip != Slip::automatic) return slip == Slip::none;
+  return std::sqrt(shot.fluid.kinematic_viscosity * 1.0) >= shot.fluid.spacing;  // m after 1 s
 }
 inline double support_ratio(const Shot& shot) {
   if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;

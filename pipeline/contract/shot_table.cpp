@@ -191,6 +191,11 @@ std::vector<Parameter> cloth_rows() {
                                     "with this t; cotton about 0.005. Beside incompressible fluid "
                                     "only"),
       row<&Cloth::thickness>("cloth", "thickness", "m", {1e-6, 1}, simulate, "thickness"),
+      row<&Cloth::slip>("cloth", "slip", "", none, simulate,
+                        "how the incompressible solver's fluid meets it: free, or none (it moves "
+                        "with the sheet, which it drags along). automatic is as that of "
+                        "domain.slip")
+          .one_of({"automatic", "free", "none"}),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
@@ -238,7 +243,12 @@ std::vector<Parameter> obstacle_rows() {
                             "metres for a unit of the file")
           .only(mesh_type),
       row<&Obstacle::friction>("obstacle", "friction", "", {0, 100}, simulate,
-                               "Coulomb's coefficient of cloth on it; fluid slips"),
+                               "Coulomb's coefficient of cloth on it"),
+      row<&Obstacle::slip>("obstacle", "slip", "", none, simulate,
+                           "how the incompressible solver's fluid meets it: free, or none (it "
+                           "moves with the surface). automatic is as that of domain.slip, but that "
+                           "motion does not matter")
+          .one_of({"automatic", "free", "none"}),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
   };

@@ -11,6 +11,7 @@
 // A no-slip wall at distance d acts as fluid beyond it whose velocity goes on in the line from the
 // wall's to the particle's (Morris, Fox, Zhu 1997): v_i - v = (v_i - v_wall) z / d. Its integral is
 // a closed form in d, which stands on the diagonal, and times v_wall on the right-hand side.
+// Obstacles and sheets: body_drag.h.
 
 #include "sim/kernels.h"
 #include "sim/periodic.h"
@@ -18,12 +19,19 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// The share of the matrix of what brakes a particle, a symmetric 3 x 3 block.
 struct WallDrag {
-  Vec3<float> rate;    // diagonal of the wall's share of the matrix
-  Vec3<float> source;  // rate times the wall's velocity, m/s
+  Vec3<float> rate, cross;  // xx, yy, zz and xy, yz, zx
+  Vec3<float> source;       // the block times the wall's velocity, m/s
+
+  DRENCH_HD Vec3<float> times(Vec3<float> v) const {
+    return {rate.x * v.x + (cross.x * v.y + cross.z * v.z),
+            rate.y * v.y + (cross.x * v.x + cross.y * v.z),
+            rate.z * v.z + (cross.z * v.x + cross.y * v.y)};
+  }
 };
 
-/// The domain's walls as what brakes the fluid within a step.
+/// The domain's walls as what brakes the fluid within a step, or all that does (body_drag.h).
 struct NoSlipWalls {
   float low[3], high[3];  // m
   bool on[3];
@@ -31,6 +39,7 @@ struct NoSlipWalls {
   float inverse_h;          // 1/m
   float least;              // of a distance, over h: a quarter of a spacing
   float strength;           // dt nu / h^2
+  const Float4 *body_rate, *body_cross, *body_source;  // of all that brakes; null: walls alone
 
   DRENCH_HD void add(float distance, int axis, const float* moving, WallDrag& drag) const {
     const float q = distance * inverse_h;
@@ -42,7 +51,11 @@ struct NoSlipWalls {
     drag.source =
         drag.source + Vec3<float>{rate[0] * moving[0], rate[1] * moving[1], rate[2] * moving[2]};
   }
-  DRENCH_HD WallDrag drag(const Float4& place) const {
+  DRENCH_HD WallDrag drag(int i, const Float4& place) const {
+    if (body_rate) {
+      const Float4 r = body_rate[i], c = body_cross[i], s = body_source[i];
+      return {{r.x, r.y, r.z}, {c.x, c.y, c.z}, {s.x, s.y, s.z}};
+    }
     const float x[3] = {place.x, place.y, place.z};
     WallDrag drag{};
     for (int k = 0; k < 3; ++k) {
@@ -95,8 +108,8 @@ struct ViscousProduct : ViscousPairs<Separation> {
   }
   DRENCH_HD Vec3<float> result(int i, const Sum<Float4>& sum) const {
     const Float4 v = vector[i], p = sum.push;
-    const Vec3<float> rate = walls.drag(place[i]).rate;
-    return {scale * p.x + rate.x * v.x, scale * p.y + rate.y * v.y, scale * p.z + rate.z * v.z};
+    const Vec3<float> drag = walls.drag(i, place[i]).times({v.x, v.y, v.z});
+    return {scale * p.x + drag.x, scale * p.y + drag.y, scale * p.z + drag.z};
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Vec3<float> r = result(i, sum);
@@ -113,7 +126,7 @@ struct ExplicitViscosity : ViscousProduct<Separation> {
 
   DRENCH_HD bool idle() const { return false; }
   DRENCH_HD void finish(int i, const typename Product::template Sum<Float4>& sum) const {
-    velocity.set(i, velocity[i] - this->result(i, sum) + walls.drag(place[i]).source);
+    velocity.set(i, velocity[i] - this->result(i, sum) + walls.drag(i, place[i]).source);
   }
 };
 
@@ -142,11 +155,11 @@ struct ViscousBlocks : ViscousPairs<Separation> {
     sum.cross = multiply_add(weighted, rotate(apart), sum.cross);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
-    const Vec3<float> rate = walls.drag(place[i]).rate;
+    const WallDrag drag = walls.drag(i, place[i]);
     const Float4 s = sum.square, c = sum.cross;
-    const float xx = 1.f + scale * s.x + rate.x, yy = 1.f + scale * s.y + rate.y,
-                zz = 1.f + scale * s.z + rate.z, xy = scale * c.x, yz = scale * c.y,
-                zx = scale * c.z;
+    const float xx = 1.f + scale * s.x + drag.rate.x, yy = 1.f + scale * s.y + drag.rate.y,
+                zz = 1.f + scale * s.z + drag.rate.z, xy = scale * c.x + drag.cross.x,
+                yz = scale * c.y + drag.cross.y, zx = scale * c.z + drag.cross.z;
     const float a = yy * zz - yz * yz, b = zx * yz - xy * zz, d = xy * yz - zx * yy;
     const float inverse = 1.f / (xx * a + xy * b + zx * d);
     diagonal[i] = {inverse * a, inverse * (xx * zz - zx * zx), inverse * (xx * yy - xy * xy), 0.f};
@@ -167,13 +180,24 @@ inline NoSlipWalls no_slip_walls_of(const Parameters& p, float strength) {
   return walls;
 }
 
+/// With obstacles and sheets, where these hold the fluid and body_drag.h has made their columns.
+inline NoSlipWalls no_slip_of(const State& state, float strength) {
+  NoSlipWalls walls = no_slip_walls_of(state.parameters, strength);
+  const ViscosityState& s = state.viscosity;
+  if (s.body_rate.size() > 0) {
+    walls.body_rate = s.body_rate.data(), walls.body_cross = s.body_cross.data();
+    walls.body_source = s.body_source.data();
+  }
+  return walls;
+}
+
 template <class Separation>
 ViscousPairs<Separation> viscous_pairs_of(const State& state, const Separation& separation) {
   const Parameters& p = state.parameters;
   const float h = p.support_radius, strength = viscous_strength(p, state.dt);
   const float volume = p.particle_mass / p.rest_density / (h * h * h);
   return {state.pressure.place.data(), strength * ViscousWeight::factor * volume / (h * h),
-          no_slip_walls_of(p, strength), separation};
+          no_slip_of(state, strength), separation};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -18,6 +18,7 @@
 
 #include "sim/parallel.h"
 #include "sim/passes/viscosity_rows.h"
+#include "sim/passes/viscosity_sheets.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -62,7 +63,7 @@ struct ViscousIteration {
     solution[i] = direction[i] = {u.x, u.y, u.z, 0.f};
   }
   DRENCH_HD ViscousSums start(int i) const {
-    const Vec3<float> b = velocity[i] + coming(i) + walls.drag(place[i]).source;
+    const Vec3<float> b = velocity[i] + coming(i) + walls.drag(i, place[i]).source;
     const Float4 u = solution[i], k = product[i];
     const Float4 r{b.x - u.x - k.x, b.y - u.y - k.y, b.z - u.z - k.z, 0.f};
     const Float4 z = preconditioned(r, i);
@@ -71,16 +72,19 @@ struct ViscousIteration {
   }
   DRENCH_HD void decide_start(const ViscousSums& sums) const {
     ViscousControl& c = *control;
+    const ViscousControl old = c;
     c = {};
+    c.sheet_square = old.sheet_square, c.sheet_product = old.sheet_product;
     c.size = sums.size;
     finish_iteration(sums);
   }
   DRENCH_HD void finish_iteration(const ViscousSums& sums) const {
     ViscousControl& c = *control;
     const double allowed = double(tolerance) * tolerance * c.size;
-    c.residual = c.size > 0 ? float(::sqrt(sums.square / c.size)) : 0.f;
-    c.product = sums.product;
-    c.converged = sums.square <= allowed || sums.square <= least;
+    const double square = sums.square + c.sheet_square;
+    c.residual = c.size > 0 ? float(::sqrt(square / c.size)) : 0.f;
+    c.product = sums.product + c.sheet_product;
+    c.converged = square <= allowed || square <= least;
     c.done = c.converged || c.iterations >= most_iterations || !(c.product > 0);
   }
 
@@ -90,7 +94,8 @@ struct ViscousIteration {
     return inner(p, p) + inner(p, product[i]);
   }
   DRENCH_HD void decide_step(double curvature) const {
-    if (!control->done) control->step = float(control->product / curvature);
+    if (!control->done)
+      control->step = float(control->product / (curvature + control->sheet_curvature));
   }
   DRENCH_HD ViscousSums step(int i) const {
     if (control->done) return {};
@@ -106,7 +111,7 @@ struct ViscousIteration {
     ViscousControl& c = *control;
     if (c.done) return;
     ++c.iterations;
-    c.turn = float(sums.product / c.product);
+    c.turn = float((sums.product + c.sheet_product) / c.product);
     finish_iteration(sums);
   }
   DRENCH_HD void turn(int i) const {
@@ -175,24 +180,30 @@ void solve_viscosity(State& state, const Separation& separation) {
       "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   parallel_for(
       "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
+  const bool sheets = drags_sheets(state);
   for_each_neighbour("viscosity: product", lists, n, product);
+  if (sheets) start_sheet_drag(state);
   reduce_then(
       "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
       ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
   for (int k = 0; k < state.parameters.most_viscous_iterations && !viscous_solve_ended(s, k - 1);
        ++k) {
     for_each_neighbour("viscosity: product", lists, n, product);
+    if (sheets) multiply_sheet_drag(state);
     reduce_then(
         "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
         AddDoubles{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
+    if (sheets) step_sheet_drag(state);
     reduce_then(
         "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
         ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
     parallel_for(
         "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
+    if (sheets) turn_sheet_drag(state);
   }
   parallel_for(
       "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
+  if (sheets) give_back_sheet_drag(state);
 }
 
 template <class Separation>
