@@ -210,18 +210,24 @@ inline void turn_sheet_drag(State& state) {
       "sheet drag: turn", state.cloth.vertices, DRENCH_LAMBDA(int v) { iteration.turn(v); });
 }
 
-/// What the fluid lost to the sheets is a load of their step like those of the pressures.
+/// What the fluid lost to the sheets is a load of their step like those of the pressures. What the
+/// solve leaves of their answer, and no shift closes of sheets that are held, sweeps take up.
 inline void give_back_sheet_drag(State& state) {
   load_by_drag(state);
   const VertexLoads loads = sum_drag_loads(state);
   ClothSystem& s = state.cloth_system;
   const VecView right = s.right.view(), change = s.change.view(), more = s.answer.view();
   const float dt = float(state.dt), mass = state.parameters.particle_mass;
+  const int* grip = state.parameters.obstacles > 0 ? s.grip.data() : nullptr;
+  const VecView rub = s.rub.view();
   parallel_for(
       "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         right.set(v, right[v] + loads.on(v) * (mass * dt));
         change.set(v, change[v] + more[v] * dt);
+        const bool rubs = grip && grip[v] >= 0;  // friction as settle_at_obstacles has found it
+        more.set(v, rubs ? right[v] + rub[v] : right[v]);
       });
+  sweep_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);
   balance_loose_sheets(state, change, right);
 }
 

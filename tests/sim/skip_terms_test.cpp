@@ -69,6 +69,12 @@ void drain(Shot& shot, const V3d& centre) {
   sink.shape.position = centre;
   shot.sink.push_back(sink);
 }
+/// The same beside a ball, along which it slips whatever its viscosity.
+Shot beside_ball(FluidSolver solver) {
+  Shot shot = water(solver);
+  ball(shot, V3d(0.06, -0.98, 0));
+  return shot;
+}
 void inlet(Shot& shot, double start) {
   FluidEmitter emitter;
   emitter.center = V3d(0, -0.5, 0), emitter.radius = 0.03, emitter.speed = 1, emitter.start = start;
@@ -103,6 +109,22 @@ const Term terms[] = {
      Leaves::the_plan,
      {"apply_viscosity"},
      {"implicit viscosity"}},
+    {"no_slip_obstacle",
+     projected,
+     beside_ball,
+     [](Shot& s) { s.obstacle[0].slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.obstacle[0].slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity", "find_body_drag"},
+     {"drag of obstacles and sheets"}},
+    {"no_slip_sheet",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.cloth[0].slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity", "find_body_drag"},
+     {"implicit viscosity", "drag of obstacles and sheets"}},
     {"surface_tension",
      projected,
      water,
