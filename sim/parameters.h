@@ -23,7 +23,7 @@ struct Parameters {
   // viscosity of the incompressible solver
   float viscous_tolerance = 1e-4f;  // RMS of what the solve leaves over RMS of the velocity
   int most_viscous_iterations = 200;
-  bool no_slip = false;               // at the domain's walls
+  bool no_slip = false;                                    // at the domain's walls
   bool no_slip_obstacles = false, no_slip_sheets = false;  // at any of them
   float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
   float gravity[3] = {0, 0, 0};       // m/s^2
@@ -80,7 +80,8 @@ struct Limits {
 /// The largest stable fluid step and the name of the limit that rules it.
 /// Acoustic 0.4 h/(c + v), force 0.25 sqrt(h/a), viscous 0.125 h^2/nu (research figures, Monaghan
 /// 1992). Incompressible: nothing moves farther than 0.4 spacings, gravity displaces by 0.003, and
-/// a step follows the one before: half of it when its solve was cut short; surface tension 0.25
+/// a step follows the one before: half of it when its solve was cut short, 0.43 spacings over
+/// sqrt(p / rho) of the pressure it found; surface tension 0.25
 /// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none. Implicit sheets alone
 /// keep to the two of speed and gravity.
 struct StepLimit {

@@ -7,13 +7,14 @@
 // iterations, and what it leaves is smooth: with 80 layers of water at rest the pressures came out
 // from a tenth of to five times what they should, and threw the water up.
 //
-// For smooth pressures A is -rho_0^2 times Laplace's operator: a node's stiffness is the energy
-// rho_0^2 sum_i |grad phi(x_i)|^2, taken as that of a function whose support particles fill evenly,
-// times sum_i phi(x_i). To it comes what A makes of pressures without any gradient, in packings out
-// of order and at free surfaces, sum_i phi(x_i) |(D^T 1)_i|^2: without it the widest functions are
-// corrected too far and solves diverge. Sums of phi restrict exactly from level to level.
-// Particles on the bound neither give nor take: the metric of a projected step must not couple
-// them with others (Bertsekas 1982).
+// For smooth pressures A is -rho^2 times Laplace's operator: a node's stiffness is the energy
+// sum_i rho_i^2 |grad phi(x_i)|^2, taken as that of a function whose support particles fill evenly,
+// times sum_i rho_i^2 phi(x_i). To it comes what A makes of pressures without any gradient, in
+// packings out of order, at free surfaces and at sheets that give way (a bound:
+// add_sheets_to_diagonal), sum_i phi(x_i) |(D^T 1)_i|^2: without it the widest functions are
+// corrected too far and solves diverge. Sums of phi restrict exactly from level to level. Particles
+// on the bound neither give nor take: the metric of a projected step must not couple them with
+// others (Bertsekas 1982).
 
 #include "sim/passes/pressure_rows.h"
 
@@ -202,22 +203,31 @@ inline void shape_levels(State& state) {
   }
 }
 
-struct CountOne {
-  DRENCH_HD float operator()(int) const { return 1.f; }
+struct SquaredDensity {
+  const float* density;
+  DRENCH_HD float operator()(int i) const { return density[i] * density[i]; }
 };
-struct SquareOf {
-  const Float4* vector;
+struct EvenEnergy {
+  const Float4* push;
+  const float* sheets;  // null where there are none
   DRENCH_HD float operator()(int i) const {
-    const Float4 v = vector[i];
-    return v.x * v.x + v.y * v.y + v.z * v.z;
+    const Float4 p = push[i];
+    return p.x * p.x + p.y * p.y + p.z * p.z + (sheets ? sheets[i] : 0.f);
   }
 };
-/// The gradient of particles that are not on the bound.
+/// The gradient of particles that are off the bound, and that their own step leaves off it.
 struct FreeGradient {
   const Float4* place;
-  const float *product, *source;
+  const float *product, *source, *inverse_diagonal;
+  const SolveControl* control;
+  float least;
+
+  DRENCH_HD bool free(int i, float gradient) const {
+    return place[i].w - control->relaxation * inverse_diagonal[i] * gradient > least;
+  }
   DRENCH_HD float operator()(int i) const {
-    return place[i].w != 0.f ? -product[i] - source[i] : 0.f;
+    const float gradient = -product[i] - source[i];
+    return inverse_diagonal[i] > 0.f && free(i, gradient) ? gradient : 0.f;
   }
 };
 
@@ -233,28 +243,28 @@ inline void push_evenly(State& state) {
       "levels: first guess", state.fluid.count, DRENCH_LAMBDA(int i) { place[i].w = guess[i]; });
 }
 
-/// Shapes and stiffnesses of all levels.
+/// Shapes and stiffnesses of all levels; after add_sheets_to_diagonal where there are sheets.
 inline void prepare_levels(State& state) {
   shape_levels(state);
   push_evenly(state);
   Hierarchy& h = state.pressure.hierarchy;
   float *inverse = h.inverse.data(), *uneven = h.answer.data();
-  restrict_particles(state, inverse, CountOne{});
-  restrict_particles(state, uneven, SquareOf{state.pressure.vector.data()});
+  restrict_particles(state, inverse, SquaredDensity{state.fluid.density.data()});
+  restrict_particles(state, uneven,
+                     EvenEnergy{state.pressure.vector.data(),
+                                state.contact.near > 0 ? state.pressure.product.data() : nullptr});
   for (int l = 1; l < h.levels; ++l) {
     restrict_nodes(state, l, inverse), restrict_nodes(state, l, uneven);
   }
-  const float rest = state.parameters.rest_density;
   for (int l = 0; l < h.levels; ++l) {
     const NodeLevel level = h.level[l];
     // of hats, over the integral of the function: of the slope's square along an axis, and of the
     // function's own square
     const auto bend = [](const NodeAxis& a) { return a.n == 1 ? 0.f : 2.f / (a.edge * a.edge); };
     const auto mean = [](const NodeAxis& a) { return a.n == 1 ? 1.f : 2.f / 3.f; };
-    const float smooth = rest * rest *
-                         (bend(level.x) * mean(level.y) * mean(level.z) +
-                          mean(level.x) * bend(level.y) * mean(level.z) +
-                          mean(level.x) * mean(level.y) * bend(level.z));
+    const float smooth = bend(level.x) * mean(level.y) * mean(level.z) +
+                         mean(level.x) * bend(level.y) * mean(level.z) +
+                         mean(level.x) * mean(level.y) * bend(level.z);
     constexpr float part = 0.3f;  // of a node's own step; 0.15 to 0.5 tried: levels overlap
     parallel_for(
         "levels: stiffness", level.count(), DRENCH_LAMBDA(int n) {
@@ -265,14 +275,12 @@ inline void prepare_levels(State& state) {
   }
 }
 
-/// z on the nodes of the finest level, of the gradient -product - source.
-inline void correct_on_levels(State& state) {
+/// z on the nodes of the finest level.
+inline void correct_on_levels(State& state, const FreeGradient& gradient) {
   Hierarchy& h = state.pressure.hierarchy;
-  const PressureState& s = state.pressure;
   float* answer = h.answer.data();
   const float* inverse = h.inverse.data();
-  restrict_particles(state, answer,
-                     FreeGradient{s.place.data(), s.product.data(), s.source.data()});
+  restrict_particles(state, answer, gradient);
   for (int l = 1; l < h.levels; ++l) restrict_nodes(state, l, answer);
   const int all = h.level[h.levels - 1].first + h.level[h.levels - 1].count();
   parallel_for(

@@ -1,12 +1,12 @@
 #pragma once
 // min 1/2 x^T A x - b^T x over x >= 0 with A = D D^T (pressure_rows.h): pressures that never pull
 // and leave no density above rest. Accelerated projected gradients (Nesterov 1983, restarted as in
-// O'Donoghue and Candes 2015; with contact as in Mazhar et al. 2015), preconditioned by the diagonal
-// and coarse levels (multilevel.h): one application of A an iteration and no line search. On a
-// collapsing column, with the diagonal alone, it needs less than half of the iterations of plain
-// projected Jacobi for the same residual, with the levels half of those, and a tenth of them in
-// deep water. Conjugate gradients with projected steps (MPRGP) were tried and dropped: near a free
-// surface each step meets the bound and starts the conjugation anew, so that they need more
+// O'Donoghue and Candes 2015; with contact as in Mazhar et al. 2015), preconditioned by the
+// diagonal and coarse levels (multilevel.h): one application of A an iteration and no line search.
+// On a collapsing column, with the diagonal alone, it needs less than half of the iterations of
+// plain projected Jacobi for the same residual, with the levels half of those, and a tenth of them
+// in deep water. Conjugate gradients with projected steps (MPRGP) were tried and dropped: near a
+// free surface each step meets the bound and starts the conjugation anew, so that they need more
 // iterations than Jacobi.
 
 #include "sim/parallel.h"
@@ -30,7 +30,7 @@ struct PressureIteration {
   SolveControl* control;
   float tolerance, scale;  // of the residual's mean; 1 / (n rest_density)
   int most_iterations;
-  float least;  // pressures are not below
+  FreeGradient on_levels;
   FinestNodes finest;
   const float* answer;  // z on these nodes
 
@@ -38,18 +38,16 @@ struct PressureIteration {
   /// and underdense: pressure that is too high makes energy.
   DRENCH_HD SolveSums step(int i) const {
     if (control->done) return {};
-    const float y = place[i].w, d = inverse_diagonal[i];
+    const float y = place[i].w, d = inverse_diagonal[i], least = on_levels.least;
+    next[i] = 0.f;
+    if (d == 0.f) return {};
     const float gradient = -product[i] - source[i];
     float z = d * gradient;
-    if (y != 0.f) z += finest.interpolate(place[i], answer);
-    const float free = y - control->relaxation * z;
-    const float x = d == 0.f ? 0.f : maximum(free, least);
-    next[i] = x;
-    const float left = d == 0.f ? 0.f : y > least ? fabsf(gradient) : max0(-gradient);
+    if (on_levels.free(i, gradient)) z += finest.interpolate(place[i], answer);
+    const float to = y - control->relaxation * z, x = next[i] = maximum(to, least);
     const double change = double(x) - before[i];
-    return {double(left), d == 0.f    ? 0.
-                          : x == free ? gradient * change
-                                      : double(y - x) * change / d};
+    return {double(y > least ? fabsf(gradient) : max0(-gradient)),
+            x == to ? gradient * change : double(y - x) * change / d};
   }
 
   /// After the sums of all particles: done, or how far the next extrapolation goes.
@@ -75,7 +73,7 @@ struct PressureIteration {
   DRENCH_HD void extrapolate(int i) const {
     if (control->done) return;
     const float x = next[i];
-    place[i].w = maximum(x + control->extrapolation * (x - before[i]), least);
+    place[i].w = maximum(x + control->extrapolation * (x - before[i]), on_levels.least);
     before[i] = x;
   }
 };
@@ -169,7 +167,13 @@ inline void keep_pressures(State& state) {
 inline void find_pressures(State& state, float least) {
   PressureState& s = state.pressure;
   const int n = state.fluid.count, most_iterations = state.parameters.most_iterations;
+  if (state.parameters.full) remove_mean(state);
+  const bool sheets = state.contact.near > 0;
+  if (sheets) start_sheets(state);
   prepare_levels(state);
+  const FreeGradient gradient{s.place.data(),   s.product.data(),
+                              s.source.data(),  s.inverse_diagonal.data(),
+                              s.control.data(), least};
   const PressureIteration iteration{s.place.data(),
                                     s.before.data(),
                                     s.next.data(),
@@ -180,12 +184,9 @@ inline void find_pressures(State& state, float least) {
                                     state.parameters.tolerance,
                                     1.f / (float(n) * state.parameters.rest_density),
                                     most_iterations,
-                                    least,
+                                    gradient,
                                     {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
                                     s.hierarchy.answer.data()};
-  if (state.parameters.full) remove_mean(state);
-  const bool sheets = state.contact.near > 0;
-  if (sheets) start_sheets(state);
   for (int k = 0; k <= most_iterations && !solve_ended(s, k - 1); ++k) {
     accelerate_by_pressure(state);
     density_rate(state);
@@ -193,7 +194,7 @@ inline void find_pressures(State& state, float least) {
       respond_sheets(state, k == 0 ? first_sweeps : next_sweeps, sheet_tolerance);
       subtract_sheet_rate(state);
     }
-    correct_on_levels(state);
+    correct_on_levels(state, gradient);
     reduce_then(
         "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
         SolveSums{}, DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });

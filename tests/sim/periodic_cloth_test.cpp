@@ -165,7 +165,7 @@ TEST_P(StripPool, HangsAsAPlaneChainOfSpringsDoes) {
   EXPECT_LT(pool.shape, 0.02);
   EXPECT_LT(pool.spread, 0.02 * pool.static_sag);
   EXPECT_GT(pool.lowest, 0);
-  EXPECT_LT(pool.lowest, 0.8 * spacing);
+  EXPECT_LT(pool.lowest, 0.85 * spacing);
 }
 
 // --- Nothing tells where the seam is -------------------------------------------------------------
@@ -191,6 +191,7 @@ enum class Sheets { joined, loose };
 Shot splash(Sheets sheets, const V3d& shift, const V3d& drift = V3d(0)) {
   Shot shot = slab({15, 40, 12});
   shot.domain.axis[1] = Axis::periodic;
+  shot.fluid.tolerance = 1e-6;  // coarse levels stand at other places: solves agree when done
   const V3d corner = V3d(0.03, 0.1, 0.03) + shift;
   Cloth& sheet = sheets == Sheets::joined ? add_grid(shot, V3d(0.005, 0.1, 0.005) + shift, 15, 12)
                                           : add_grid(shot, corner, 8, 8);
@@ -215,7 +216,7 @@ TEST_P(Seam, IsNowhere) {
   double push = 0;  // they did meet
   for (const float v : p.cloth_velocity.y) push = std::max(push, double(std::abs(v)));
   ASSERT_GT(push, 0.3);
-  EXPECT_LT(difference(p, q, shift, period), 2e-6);
+  EXPECT_LT(difference(p, q, shift, period), 4e-6);
 }
 
 // The same as it flies through all seams: sheets keep coordinates of their own, particles do not.

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -427,16 +428,6 @@ TEST(SheetsOnPeriodicObstacles, WeighOnTheBarAcrossTheSeam) {
 
 // --- Determinism and skips ----------------------------------------------------------------------
 
-void expect_same(const sim::HostState& p, const sim::HostState& q) {
-  EXPECT_EQ(p.id, q.id);
-  EXPECT_EQ(p.position.x, q.position.x);
-  EXPECT_EQ(p.position.y, q.position.y);
-  EXPECT_EQ(p.position.z, q.position.z);
-  EXPECT_EQ(p.velocity.x, q.velocity.x);
-  EXPECT_EQ(p.velocity.y, q.velocity.y);
-  EXPECT_EQ(p.velocity.z, q.velocity.z);
-  EXPECT_EQ(p.cloth_position.y, q.cloth_position.y);
-}
 TEST(PeriodicObstacles, HaveTheSameBitsForAnyNumberOfThreadsAndGoOn) {
   const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
   for (const Shot& shot : {stirred(), drape(V3d(0.11, 0, 0.09))}) {
@@ -449,13 +440,13 @@ TEST(PeriodicObstacles, HaveTheSameBitsForAnyNumberOfThreadsAndGoOn) {
         state.push_back(run.solver->save());
       });
     }
-    expect_same(state[0], state[1]);
+    expect_same_state(state[0], state[1]);
     Stepper first(shot), second(shot);
     for (int k = 0; k < 30; ++k) first.step(1e-3);
     second.solver->load(first.solver->save());
     second.time = first.time;
     for (int k = 0; k < 30; ++k) second.step(1e-3);
-    expect_same(state[0], second.solver->save());
+    expect_same_state(state[0], second.solver->save());
   }
 }
 
@@ -489,6 +480,7 @@ TEST(PeriodicObstacles, CostNothingWhereTheyAreNot) {
     Shot shot = empty_shot();
     shot.fluid.solver = FluidSolver::incompressible;
     shot.gravity = V3d(0, -g, 0);
+    shot.fluid.tolerance = 1e-6;  // coarse levels stand at other places: solves agree when done
     shot.domain.axis = {sides, Axis::walls, sides};
     add_sphere(shot, V3d(0, -0.06, 0), 0.05);
     if (far) add_sphere(shot, V3d(0.9, 0, 0.95), 0.2);
@@ -505,7 +497,7 @@ TEST(PeriodicObstacles, CostNothingWhereTheyAreNot) {
   }
   for (int k = 0; k < 60; ++k) open.step(1e-3), periodic.step(1e-3), with.step(1e-3);
   EXPECT_LT(difference(open.solver->save(), periodic.solver->save(), V3d(0), V3d(2, 0, 2)), 2e-5);
-  expect_same(periodic.solver->save(), with.solver->save());
+  expect_same_state(periodic.solver->save(), with.solver->save());
 }
 
 }  // namespace
