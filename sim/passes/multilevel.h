@@ -117,7 +117,7 @@ DRENCH_HD void for_each_child(const NodeAxis& coarse, const NodeAxis& fine, int 
                               const Visit& visit) {
   if (!coarse.halved) return visit(k, 1.f);
   const int middle = 2 * k;
-  visit(middle, 1.f);
+  if (middle < fine.n) visit(middle, 1.f);
   if (coarse.n == 1 && !fine.wraps) return visit(1, 1.f);
   const int before = middle > 0 ? middle - 1 : fine.wraps ? fine.n - 1 : 0;
   if (before & 1) visit(before, 0.5f);
