@@ -10,6 +10,7 @@ enum class ProbeKind {
   inner_pressure,  // Pa
   wall_force,      // N, x y z
   cloth_force,     // N, x y z
+  obstacle_force,  // N, x y z
   vertex,          // m local, x y z
   energy,          // J: kinetic, potential, of the springs
   volume,          // particles; m local, their mean place x y z; mean of max(rho / rho_0 - 1, 0)
@@ -22,7 +23,7 @@ struct ProbeQuery {
   float radius = 0, rim = 0;    // m: of the disc, and half the width over which its weight falls
   float extent = 1;             // m^2 on a wall, m^3 inside: the weights' integral over the domain
   int axis = 0, side = 0;       // of the wall; 0 the low one, 1 the high one
-  int begin = 0, end = 0;       // vertices
+  int begin = 0, end = 0;       // vertices; begin: the obstacle
 };
 
 }  // namespace drench::sim

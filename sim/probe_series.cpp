@@ -46,7 +46,9 @@ ProbeKind kind_of(const Probe& probe, const Shot& shot) {
     case ProbeType::pressure:
       return wall_under(probe, shot) ? ProbeKind::wall_pressure : ProbeKind::inner_pressure;
     case ProbeType::force:
-      return wall_named(probe.target) ? ProbeKind::wall_force : ProbeKind::cloth_force;
+      if (wall_named(probe.target)) return ProbeKind::wall_force;
+      return obstacle_named(shot, probe.target) ? ProbeKind::obstacle_force
+                                                : ProbeKind::cloth_force;
     case ProbeType::tip:
       return ProbeKind::vertex;
     case ProbeType::energy:
@@ -158,6 +160,7 @@ void ProbeSeries::aim(Series& series, const Shot& shot, const Scene& scene) cons
     const size_t s = sheet_named(scene, probe.target);
     q.begin = scene.first_vertex[s], q.end = scene.first_vertex[s + 1];
   }
+  if (q.kind == ProbeKind::obstacle_force) q.begin = *obstacle_named(shot, probe.target);
   if (q.kind == ProbeKind::vertex) {
     const size_t s = sheet_named(scene, probe.cloth);
     const Sheet& sheet = scene.sheet[s];
@@ -276,6 +279,8 @@ std::string ProbeSeries::definition(const Series& series) const {
       return fmt::format("force of the fluid on the domain wall {}{}", p.target, window());
     case ProbeKind::cloth_force:
       return fmt::format("force of the fluid on the sheet \"{}\"{}", p.target, window());
+    case ProbeKind::obstacle_force:
+      return fmt::format("force of fluid and sheets on the obstacle \"{}\"{}", p.target, window());
     case ProbeKind::vertex:
       return fmt::format("displacement of a vertex of \"{}\" from its rest place {} m", p.cloth,
                          vector(V3d(frame_.to_world(0, float(series.rest.x)),

@@ -165,7 +165,18 @@ class BackendSolver : public Solver {
 
   Limits measure() override { return measure_limits(state_); }
   std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) override {
-    return probe_states(state_, queries);
+    const auto on_obstacle = [](const ProbeQuery& q) {
+      return q.kind == ProbeKind::obstacle_force;
+    };
+    std::vector<ObstacleImpulse> received;  // before the volume probe measures density anew
+    if (std::any_of(queries.begin(), queries.end(), on_obstacle)) received = obstacle_impulses();
+    std::vector<std::vector<double>> answers = probe_states(state_, queries);
+    for (size_t k = 0; k < queries.size(); ++k) {
+      if (!on_obstacle(queries[k])) continue;
+      for (const double push : received[size_t(queries[k].begin)].impulse)
+        answers[k].push_back(push / state_.dt);
+    }
+    return answers;
   }
 
   void load_level_set(Solids of, int index, int which, const LevelSet& set) override {

@@ -77,8 +77,17 @@ class ProbeChecker {
                                  "wall. Use \"walls\", or another target",
                                  path_, probe_.target, "xyz"[wall->axis]));
     }
+    if (const auto obstacle = obstacle_named(shot_, probe_.target)) {
+      for (const Cloth& cloth : shot_.cloth) {
+        if (cloth.name != probe_.target) continue;
+        fail("target", fmt::format("{}.target is \"{}\", which is the name of obstacle {} and of a "
+                                   "sheet; rename one of them",
+                                   path_, probe_.target, *obstacle + 1));
+      }
+      return;
+    }
     check_sheet("target", probe_.target,
-                "a wall (x_low, x_high, y_low, y_high, z_low, z_high) or a sheet");
+                "a wall (x_low, x_high, y_low, y_high, z_low, z_high), an obstacle or a sheet");
   }
 
   void check_tip() const {
@@ -116,6 +125,12 @@ std::optional<DomainWall> wall_named(std::string_view name) {
     if (name.substr(1) == "_low") return DomainWall{axis, Side::low};
     if (name.substr(1) == "_high") return DomainWall{axis, Side::high};
   }
+  return {};
+}
+
+std::optional<int> obstacle_named(const Shot& shot, std::string_view name) {
+  for (size_t k = 0; k < shot.obstacle.size(); ++k)
+    if (shot.obstacle[k].name == name) return int(k);
   return {};
 }
 

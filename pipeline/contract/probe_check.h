@@ -20,6 +20,9 @@ struct DomainWall {
 /// "x_low" to "z_high"; nothing for any other name.
 std::optional<DomainWall> wall_named(std::string_view name);
 
+/// Index of the first obstacle of that name.
+std::optional<int> obstacle_named(const Shot& shot, std::string_view name);
+
 /// The wall that a pressure probe lies on: parallel to it and within half a spacing.
 std::optional<DomainWall> wall_under(const Probe& probe, const Shot& shot);
 

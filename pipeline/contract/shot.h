@@ -219,7 +219,7 @@ struct Probe {
   V3d normal{0, 1, 0};           // pressure: of the disc
   double radius = 0.01;          // pressure: of the disc, m
   double window = 1e-3;          // pressure, force: the mean columns are over this time, s
-  std::string target = "y_low";  // force: a wall, x_low to z_high, or the name of a sheet
+  std::string target = "y_low";  // force: a wall, x_low to z_high, an obstacle or a sheet
   std::string cloth = "cloth";   // tip: name of the sheet
   int vertex = -1;               // tip: of the sheet; -1: the one nearest to position at rest
 };

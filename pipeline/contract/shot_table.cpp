@@ -279,7 +279,8 @@ std::vector<Parameter> probe_rows() {
                           "the mean columns are means over so much time before each row")
           .only(pressure | force),
       row<&Probe::target>("probe", "target", "", none, simulate,
-                          "what the fluid pushes: a domain wall, x_low to z_high, or a sheet")
+                          "what the fluid pushes: a domain wall, x_low to z_high, an obstacle or "
+                          "a sheet, by name")
           .only(force),
       row<&Probe::cloth>("probe", "cloth", "", none, simulate, "name of the sheet").only(tip),
       row<&Probe::vertex>("probe", "vertex", "", {-1, 2e9}, simulate,

@@ -226,7 +226,7 @@ struct DraggedVelocity {
   }
 };
 
-/// What viscosity gave to one obstacle in the step that was made, kg m/s.
+/// What viscosity gave to one obstacle, all images of it, in the step that was made, kg m/s.
 inline Impulse drag_impulse(const State& state, int which) {
   const BodyDrag law = body_drag_of(state);
   const bool solved = viscosity_is_implicit(state.parameters, state.dt);
@@ -242,8 +242,10 @@ inline Impulse drag_impulse(const State& state, int which) {
       DRENCH_LAMBDA(int i) {
         if (triangle && triangle[i] >= 0) return Impulse{};
         WallDrag drag{};
-        law.add_obstacle(obstacles.obstacle[which], {place[i].x, place[i].y, place[i].z},
-                         BesideSheet{}, drag);
+        const Vec3<float> x{place[i].x, place[i].y, place[i].z};
+        for (int k = 0; k < obstacles.count; ++k)
+          if (obstacles.obstacle[k].of == which)
+            law.add_obstacle(obstacles.obstacle[k], x, BesideSheet{}, drag);
         return velocity.on(drag, i, mass);
       },
       Impulse{});
@@ -256,7 +258,9 @@ inline Impulse drag_impulse(const State& state, int which) {
         if (i < 0) return Impulse{};
         const Vec3<float> x{place[i].x, place[i].y, place[i].z};
         WallDrag drag{};
-        law.add_obstacle(obstacles.obstacle[which], x, gaps.of(row, x), drag);
+        for (int k = 0; k < obstacles.count; ++k)
+          if (obstacles.obstacle[k].of == which)
+            law.add_obstacle(obstacles.obstacle[k], x, gaps.of(row, x), drag);
         return velocity.on(drag, i, mass);
       },
       Impulse{});

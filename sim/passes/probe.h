@@ -154,6 +154,8 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
       return wall_force(state, query);
     case ProbeKind::cloth_force:
       return cloth_force(state, query);
+    case ProbeKind::obstacle_force:
+      return {};  // the solver adds what its obstacles received
     case ProbeKind::vertex:
       return vertex(state, query.begin);
     case ProbeKind::energy:

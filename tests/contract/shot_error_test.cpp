@@ -259,6 +259,9 @@ TEST_F(ShotError, NamesBadProbes) {
       {"[[probe]]\ntype = \"pressure\"\nwindow = -1\n", {"scene.toml:6", "window", "0 and 1"}},
       {"[[probe]]\ntype = \"force\"\ntarget = \"left\"\n",
        {"scene.toml:6", "\"left\"", "x_low", "sheets of this shot: none"}},
+      {"[[obstacle]]\ntype = \"sphere\"\nname = \"a\"\n[[cloth]]\nname = \"a\"\n[[probe]]\n"
+       "type = \"force\"\ntarget = \"a\"\n",
+       {"\"a\"", "obstacle 1 and of a sheet", "rename"}},
       {"[domain]\ny = \"open\"\n[[probe]]\ntype = \"force\"\n",
        {"scene.toml:6", "\"y_low\"", "domain.y is \"open\""}},
       {"[[cloth]]\nname = \"flag\"\n[[probe]]\ntype = \"tip\"\n",

@@ -200,10 +200,13 @@ TEST(Obstacles, MomentumOfFluidAndObstaclesIsKept) {
   const V3d start = total_momentum(run.scene, run.solver->save());
   V3d given(0);
   double size = 0;
+  std::vector<sim::ProbeQuery> on_each(2);
+  for (int k = 0; k < 2; ++k)
+    on_each[size_t(k)].kind = sim::ProbeKind::obstacle_force, on_each[size_t(k)].begin = k;
   for (int k = 0; k < 120; ++k) {
     run.step(1e-3);
-    for (const sim::ObstacleImpulse& i : run.solver->obstacle_impulses()) {
-      const V3d impulse(i.impulse[0], i.impulse[1], i.impulse[2]);
+    for (const std::vector<double>& force : run.solver->probe(on_each)) {
+      const V3d impulse = V3d(force.at(0), force.at(1), force.at(2)) * 1e-3;
       given += impulse, size += impulse.length();
     }
   }

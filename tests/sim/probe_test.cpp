@@ -167,6 +167,36 @@ INSTANTIATE_TEST_SUITE_P(Solvers, WallForces,
                                                                          : "WeaklyCompressible";
                          });
 
+// A ball held in a pool at rest: what its probe reads is the weight that it displaces.
+TEST(ObstacleForce, OfASubmergedBallIsTheWeightItDisplaces) {
+  Probed run(R"(
+[shot]
+frames = [1, 25]
+fps = 50
+[domain]
+min = [0, 0, 0]
+max = [0.2, 0.4, 0.2]
+[fluid]
+spacing = 0.01
+[[fluid.box]]
+min = [0, 0, 0]
+max = [0.2, 0.24, 0.2]
+[[obstacle]]
+type = "sphere"
+name = "ball"
+position = [0.1, 0.11, 0.1]
+radius = 0.05
+[[probe]]
+type = "force"
+name = "lift"
+target = "ball"
+)");
+  run.run_to(25);
+  const double weight = 1000 * g * 4 / 3 * M_PI * 0.05 * 0.05 * 0.05;
+  EXPECT_NEAR(run.mean("lift", "force y [N]", 0.25) / weight, 1, 0.08);
+  EXPECT_NEAR(run.mean("lift", "force x [N]", 0.25) / weight, 0, 0.08);
+}
+
 // Without gravity and walls the only force on a block is the sheet's, but for what vertices that
 // had to be stopped (path_test.h) give to the particles themselves.
 TEST(ClothForce, IsWhatTheMomentumOfTheFluidLacks) {

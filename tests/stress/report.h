@@ -1,5 +1,5 @@
 #pragma once
-// The table of docs/benchmarks.md, section Stress: a line for every row of a test, printed as it
+// The table of docs/stress.md: a line for every row of a test, printed as it
 // is measured, and the gates of the research notes.
 
 #include <string>
