@@ -30,7 +30,8 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
       // The solve takes the places of neighbours as they are; moved by what pressures push, they
       // answer like springs of frequency sqrt(p / rho) / a and more, which long steps excite: 40
       // layers at rest boiled at 0.51, 30 did not at 0.44.
-      if (limits.pressure > 0) consider(0.43 * a / std::sqrt(limits.pressure), "pressure");
+      if (limits.pressure > 0)
+        consider(std::max(0.43 * a / std::sqrt(limits.pressure), 0.1 * ruling.dt), "pressure");
     }
   } else if (p.fluid) {
     // One speed of sound a step, and nothing moves farther than 0.4 supports: cloth speed counts.

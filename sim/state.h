@@ -160,6 +160,7 @@ struct SolveControl {
   float momentum = 1.f, extrapolation = 0.f;
   float mean = 0.f;  // kg/m^3, of the source; only where the fluid is full
   int spent = 0;     // iterations of a solve before in the same step
+  int levels = 1;    // 1 while coarse levels take part
   float peak = 0.f;  // p / rho_0, m^2/s^2: the greatest of a column at rest with the same moments
 };
 

@@ -10,11 +10,10 @@
 // For smooth pressures A is -rho^2 times Laplace's operator: a node's stiffness is the energy
 // sum_i rho_i^2 |grad phi(x_i)|^2, taken as that of a function whose support particles fill evenly,
 // times sum_i rho_i^2 phi(x_i). To it comes what A makes of pressures without any gradient, in
-// packings out of order, at free surfaces and at sheets that give way (a bound:
-// add_sheets_to_diagonal), sum_i phi(x_i) |(D^T 1)_i|^2: without it the widest functions are
-// corrected too far and solves diverge. Sums of phi restrict exactly from level to level. Particles
-// on the bound neither give nor take: the metric of a projected step must not couple them with
-// others (Bertsekas 1982).
+// packings out of order and at free surfaces, sum_i phi(x_i) |(D^T 1)_i|^2: without it the widest
+// functions are corrected too far and solves diverge. Sums of phi restrict exactly from level to
+// level. Particles on the bound neither give nor take: the metric of a projected step must not
+// couple them with others (Bertsekas 1982).
 
 #include "sim/passes/pressure_rows.h"
 
@@ -68,10 +67,10 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
   float* partial = h.partial.data();
   const int blocks = h.blocks.x * h.blocks.y * h.blocks.z;
   const Vec3<int> nb = h.blocks;
-  const int* done = &state.pressure.control.data()->done;
+  const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
       "levels: blocks", blocks, DRENCH_LAMBDA(int b) {
-        if (*done) return;
+        if (!*awake) return;
         const GridShape& g = finest.grid;
         const Vec3<int> size{1 << finest.shift.x, 1 << finest.shift.y, 1 << finest.shift.z};
         const int x = b % nb.x * size.x, y = b / nb.x % nb.y * size.y,
@@ -96,7 +95,7 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
   const NodeLevel level = h.level[0];
   parallel_for(
       "levels: nodes", level.count(), DRENCH_LAMBDA(int n) {
-        if (*done) return;
+        if (!*awake) return;
         const Vec3<int> at = level.place(n);
         float sum = 0.f;
         for (int k = 0; k < 8; ++k) {
@@ -128,10 +127,10 @@ DRENCH_HD void for_each_child(const NodeAxis& coarse, const NodeAxis& fine, int 
 inline void restrict_nodes(State& state, int l, float* nodes) {
   const Hierarchy& h = state.pressure.hierarchy;
   const NodeLevel fine = h.level[l - 1], coarse = h.level[l];
-  const int* done = &state.pressure.control.data()->done;
+  const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
       "levels: down", coarse.count(), DRENCH_LAMBDA(int n) {
-        if (*done) return;
+        if (!*awake) return;
         const Vec3<int> at = coarse.place(n);
         float sum = 0.f;
         for_each_child(coarse.z, fine.z, at.z, [&](int z, float wz) {
@@ -149,10 +148,10 @@ inline void restrict_nodes(State& state, int l, float* nodes) {
 inline void prolong_nodes(State& state, int l, float* nodes) {
   const Hierarchy& h = state.pressure.hierarchy;
   const NodeLevel fine = h.level[l - 1], coarse = h.level[l];
-  const int* done = &state.pressure.control.data()->done;
+  const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
       "levels: up", fine.count(), DRENCH_LAMBDA(int n) {
-        if (*done) return;
+        if (!*awake) return;
         const Vec3<int> at = fine.place(n);
         const NodeAxis::Parents x = coarse.x.parents(at.x), y = coarse.y.parents(at.y),
                                 z = coarse.z.parents(at.z);
@@ -209,10 +208,9 @@ struct SquaredDensity {
 };
 struct EvenEnergy {
   const Float4* push;
-  const float* sheets;  // null where there are none
   DRENCH_HD float operator()(int i) const {
     const Float4 p = push[i];
-    return p.x * p.x + p.y * p.y + p.z * p.z + (sheets ? sheets[i] : 0.f);
+    return p.x * p.x + p.y * p.y + p.z * p.z;
   }
 };
 /// The gradient of particles that are off the bound, and that their own step leaves off it.
@@ -223,7 +221,8 @@ struct FreeGradient {
   float least;
 
   DRENCH_HD bool free(int i, float gradient) const {
-    return place[i].w - control->relaxation * inverse_diagonal[i] * gradient > least;
+    return control->levels &&
+           place[i].w - control->relaxation * inverse_diagonal[i] * gradient > least;
   }
   DRENCH_HD float operator()(int i) const {
     const float gradient = -product[i] - source[i];
@@ -243,16 +242,32 @@ inline void push_evenly(State& state) {
       "levels: first guess", state.fluid.count, DRENCH_LAMBDA(int i) { place[i].w = guess[i]; });
 }
 
-/// Shapes and stiffnesses of all levels; after add_sheets_to_diagonal where there are sheets.
+/// Levels are for errors that are small and smooth. In fluid that an impact has crushed they are
+/// neither, and what is free of the bound changes with every iteration: by levels particles were
+/// thrown there at 53 km/s. Nor do they know sheets: with the bound of add_sheets_to_diagonal in
+/// their stiffness pools on sheets are solved as well as without levels, but a sheet that folds
+/// around water ended in pressures without end.
+inline void choose_levels(State& state) {
+  constexpr float small = 0.02f;  // of the rest density, in the mean
+  SolveControl* control = state.pressure.control.data();
+  const float* source = state.pressure.source.data();
+  const bool sheets = state.contact.near > 0;
+  const double most = double(small) * state.parameters.rest_density * state.fluid.count;
+  reduce_then(
+      "levels: error", state.fluid.count, 0.0,
+      DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, AddDoubles{},
+      DRENCH_LAMBDA(double sum) { control->levels = !sheets && sum <= most; });
+}
+
+/// Shapes and stiffnesses of all levels.
 inline void prepare_levels(State& state) {
   shape_levels(state);
+  choose_levels(state);
   push_evenly(state);
   Hierarchy& h = state.pressure.hierarchy;
   float *inverse = h.inverse.data(), *uneven = h.answer.data();
   restrict_particles(state, inverse, SquaredDensity{state.fluid.density.data()});
-  restrict_particles(state, uneven,
-                     EvenEnergy{state.pressure.vector.data(),
-                                state.contact.near > 0 ? state.pressure.product.data() : nullptr});
+  restrict_particles(state, uneven, EvenEnergy{state.pressure.vector.data()});
   for (int l = 1; l < h.levels; ++l) {
     restrict_nodes(state, l, inverse), restrict_nodes(state, l, uneven);
   }

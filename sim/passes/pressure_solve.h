@@ -56,10 +56,14 @@ struct PressureIteration {
     if (c.done) return;
     c.residual = float(sums.residual * scale);
     c.done = c.residual <= tolerance || c.iterations >= most_iterations;
-    if (c.done) return;
+    if (c.done) {
+      c.levels = 0;
+      return;
+    }
     ++c.iterations;
     if (!(c.residual <= 2.f * c.least_residual)) {  // steps too long for the largest eigenvalue
       c.relaxation *= 0.7f;
+      c.levels = 0;
       c.least_residual = c.residual;
       c.momentum = 1.f;
     }

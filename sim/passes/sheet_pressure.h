@@ -246,7 +246,6 @@ inline void sum_row_sizes(State& state, const RowSize& size, const VecView& to) 
 /// act across it, and this is its answer to the same pressure all along. The answer with its signs,
 /// to the same pressure along one side, is no bound where a sheet is folded: the pushes of two
 /// flanks cancel, and pressures there rose without end (4e11 Pa in the folds over a small ball).
-/// Leaves what it adds in PressureState::product.
 inline void add_sheets_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const SheetRows c = sheet_rows(state);
@@ -258,17 +257,14 @@ inline void add_sheets_to_diagonal(State& state) {
   s.answer.clear();
   add_to_reference(state, matrix, right, 0.f);
   sweep_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
-  float *inverse = state.pressure.inverse_diagonal.data(), *added = state.pressure.product.data();
-  parallel_for(
-      "sheets: none", state.fluid.count, DRENCH_LAMBDA(int i) { added[i] = 0.f; });
+  float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || inverse[i] == 0.f) return;
         float sum = 0.f;
         for (int k = 0; k < 3; ++k) sum += size.at(row, k) * max0(answer.x[c.vertex[k][row]]);
-        added[i] = sum + c.compliance[row] * (1.f / squeeze);
-        inverse[i] = 1.f / (1.f / inverse[i] + added[i]);
+        inverse[i] = 1.f / (1.f / inverse[i] + sum + c.compliance[row] * (1.f / squeeze));
       });
 }
 
