@@ -48,7 +48,7 @@ TEST_P(Resting, ColumnHasTheLinearPressureAndKeepsItsVolume) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Layers, Resting,
-                         testing::Values(RestGate{10, 0.03, 12e-3}, RestGate{15, 0.025, 8e-3},
+                         testing::Values(RestGate{10, 0.03, 9e-3}, RestGate{15, 0.025, 8e-3},
                                          RestGate{20, 0.02, 5e-3}),
                          [](const auto& gate) { return std::to_string(gate.param.layers); });
 
