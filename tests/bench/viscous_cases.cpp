@@ -8,6 +8,7 @@
 
 #include "tests/bench/bench.h"
 #include "tests/sim/support.h"
+#include "tests/validation/body_drag.h"
 #include "tests/validation/viscous.h"
 
 namespace drench::bench {
@@ -52,6 +53,39 @@ void spreading(const Emit& emit) {
     emit(line);
   }
 }
+
+void body_drag(const Emit& emit) {
+  for (const int across : {6, 12, 24}) {
+    validation::Dragged trough;
+    Line line;
+    line.cost = measure([&] { trough = validation::lid_driven(across); });
+    line.method = "trough under a sliding plane", line.threads = hardware_threads();
+    line.resolution = std::to_string(across) + " across, " + std::to_string(trough.particles);
+    line.error = trough.error, line.gate = 0.07;
+    line.error_of = "L2 of u over U";
+    line.more["return_flow"] = trough.scale;
+    emit(line);
+  }
+  constexpr const char* name[] = {"plane", "box", "sheet"};
+  for (const auto floor :
+       {validation::Floor::plane, validation::Floor::box, validation::Floor::sheet}) {
+    for (const int layers : {6, 12, 24}) {
+      validation::Dragged film;
+      Line line;
+      line.cost = measure([&] { film = validation::film(floor, layers); });
+      line.method = std::string("film on a ") + name[int(floor)];
+      line.threads = hardware_threads();
+      line.resolution = std::to_string(layers) + " layers, " + std::to_string(film.particles);
+      line.error = std::abs(film.scale - 1), line.gate = 0.03;
+      line.error_of = "mean speed over Nusselt's, less 1";
+      line.more["l2"] = film.error;
+      line.more["force"] = film.force;
+      emit(line);
+    }
+  }
+}
+const Registration drag{"fluid_body_drag", "fluid that does not slip along obstacles and sheets",
+                        body_drag};
 
 /// A block of 24 x 24 x 24 slumps on a no-slip floor for 40 steps of 2 ms.
 void cost(const Emit& emit) {

@@ -13,6 +13,7 @@
 #include "pipeline/contract/mesh_file.h"
 #include "sim/scene.h"
 #include "sim/simulator.h"
+#include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/same_bits.h"
 #include "tests/temporary_folder.h"
@@ -27,19 +28,8 @@ constexpr double a = 0.02;  // m
 class MeshEmitter : public testing::Test {
  protected:
   void SetUp() override {
-    write_box("box.obj", V3f(0.2f));
+    test::write_box(folder_ / "box.obj", V3f(0.2f));
     write_mesh(folder_ / "ball.ply", test::unit_sphere(24, 48));
-  }
-  /// From the origin to `size`, m.
-  void write_box(const std::string& file, const V3f& size) const {
-    std::string text;
-    for (int k = 0; k < 8; ++k) {
-      const V3f p(k & 1 ? size.x : 0, k & 2 ? size.y : 0, k & 4 ? size.z : 0);
-      text +=
-          "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
-    }
-    text += "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
-    write_file_whole(folder_ / file, text);
   }
   FluidEmitter emitter_of(const std::string& file, const V3d& center) const {
     FluidEmitter emitter;
@@ -281,7 +271,7 @@ TEST_F(MeshEmitter, ThatCannotBeFilledIsRefused) {
   EXPECT_NE(refused("nan.obj").find("nan.obj"), std::string::npos);
   EXPECT_NE(refused("none.obj").find("none.obj"), std::string::npos);
   EXPECT_NE(refused("box.obj", V3d(0.45, 0, 0)).find("never holds"), std::string::npos);
-  write_box("small.obj", V3f(0.2f, 0.2f, 0.6f * float(a)));
+  test::write_box(folder_ / "small.obj", V3f(0.2f, 0.2f, 0.6f * float(a)));
   EXPECT_NE(refused("small.obj").find("never holds"), std::string::npos);
   FluidEmitter huge = emitter_of("box.obj", V3d(0));
   huge.scale = 1e5;

@@ -11,6 +11,7 @@
 #include "pipeline/contract/obstacle.h"
 #include "sim/obstacle_view.h"
 #include "sim/simulator.h"
+#include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/temporary_folder.h"
 
@@ -57,23 +58,6 @@ TEST(LevelSetBlocks, HaveTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(made[0].value, made[1].value);
 }
 
-/// A box as 12 triangles.
-TriangleMesh box_mesh(const V3f& size) {
-  TriangleMesh mesh;
-  for (int k = 0; k < 8; ++k) {
-    mesh.position.emplace_back(k & 1 ? size.x / 2 : -size.x / 2, k & 2 ? size.y / 2 : -size.y / 2,
-                               k & 4 ? size.z / 2 : -size.z / 2);
-  }
-  const uint32_t quad[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                               {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  for (const auto& q : quad) {
-    mesh.triangle.emplace_back(q[0], q[1], q[2]);
-    mesh.triangle.emplace_back(q[0], q[2], q[3]);
-  }
-  mesh.velocity.resize(8, V3f(0));
-  return mesh;
-}
-
 /// Water that falls on an obstacle made of a file, 2,000 particles.
 Shot falling_on(const Obstacle& obstacle) {
   Shot shot;
@@ -93,7 +77,7 @@ TEST(MeshObstacle, OfABoxLetsNoParticleIn) {
   block.type = ObstacleType::mesh, block.mesh_file = folder / "block.ply";
   block.position = V3d(0.01, 0.12, 0), block.rotation_deg = V3d(45, 30, 20);
   const V3f size(0.12f, 0.06f, 0.2f);
-  write_mesh(block.mesh_file, box_mesh(size));
+  write_mesh(block.mesh_file, test::box_mesh(-size / 2, size / 2));
   Simulator simulator(falling_on(block), {.device = Device::cpu, .level_set = make_level_set});
   const Pose pose = obstacle_pose(block, 1001);
   size_t hits = 0;
@@ -110,10 +94,9 @@ TEST(MeshObstacle, OfABoxLetsNoParticleIn) {
   EXPECT_GT(hits, 100u);  // it was met
 }
 
-// A ball of a sequence that swells from 4 to 9 cm in half a second, in water: none in it.
-TEST(MeshObstacle, OfASequenceLetsNoParticleInWhereItSwells) {
-  const TemporaryFolder folder;
-  const auto radius = [](double frame) { return 0.04 + 0.05 * (frame - 1001) / 12; };
+/// A ball about (0, 0.1, 0) as a sequence of 13 frames. @param radius  m, of the frame.
+template <class Radius>
+Obstacle swelling_ball(const TemporaryFolder& folder, const Radius& radius) {
   for (int frame = 1001; frame <= 1013; ++frame) {
     TriangleMesh ball = test::unit_sphere(24, 48);
     for (V3f& p : ball.position) p *= float(radius(frame));
@@ -122,6 +105,14 @@ TEST(MeshObstacle, OfASequenceLetsNoParticleInWhereItSwells) {
   Obstacle ball;
   ball.type = ObstacleType::mesh, ball.mesh_file = folder / "ball.%d.ply";
   ball.position = V3d(0, 0.1, 0);
+  return ball;
+}
+
+// A ball of a sequence that swells from 4 to 9 cm in half a second, in water: none in it.
+TEST(MeshObstacle, OfASequenceLetsNoParticleInWhereItSwells) {
+  const TemporaryFolder folder;
+  const auto radius = [](double frame) { return 0.04 + 0.05 * (frame - 1001) / 12; };
+  const Obstacle ball = swelling_ball(folder, radius);
   Shot shot = falling_on(ball);
   shot.fluid.box[0].min = V3d(-0.2, 0, -0.2), shot.fluid.box[0].max = V3d(0.2);
   Simulator simulator(shot, {.device = Device::cpu, .level_set = make_level_set});
@@ -145,14 +136,7 @@ TEST(MeshObstacle, OfASequenceLetsNoParticleInWhereItSwells) {
 TEST(MeshObstacle, OfASequenceLiftsTheSheetAboveIt) {
   const TemporaryFolder folder;
   const auto radius = [](double frame) { return 0.06 + 0.05 * (frame - 1001) / 12; };
-  for (int frame = 1001; frame <= 1013; ++frame) {
-    TriangleMesh ball = test::unit_sphere(24, 48);
-    for (V3f& p : ball.position) p *= float(radius(frame));
-    write_mesh(folder / ("ball." + std::to_string(frame) + ".ply"), ball);
-  }
-  Obstacle ball;
-  ball.type = ObstacleType::mesh, ball.mesh_file = folder / "ball.%d.ply";
-  ball.position = V3d(0, 0.1, 0);
+  const Obstacle ball = swelling_ball(folder, radius);
   Shot shot = falling_on(ball);
   Cloth sheet;
   sheet.corner = V3d(-0.19, 0.18, -0.19), sheet.u = V3d(0.38, 0, 0), sheet.v = V3d(0, 0, 0.38);

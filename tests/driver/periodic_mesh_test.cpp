@@ -12,11 +12,13 @@
 #include "sim/simulator.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/periodic_scenes.h"
 #include "tests/temporary_folder.h"
 
 namespace drench {
 namespace {
 
+using sim_tests::slab;
 using sim_tests::Stepper;
 using test::TemporaryFolder;
 
@@ -50,15 +52,6 @@ Obstacle mesh_obstacle(const std::filesystem::path& file, const TriangleMesh& me
   Obstacle o;
   o.type = ObstacleType::mesh, o.mesh_file = file;
   return o;
-}
-
-/// Periodic along x and z.
-Shot slab(std::array<int, 3> cells) {
-  Shot shot = sim_tests::empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = a;
-  shot.domain.min = V3d(0), shot.domain.max = V3d(cells[0], cells[1], cells[2]) * a;
-  shot.domain.axis = {Axis::periodic, Axis::open, Axis::periodic};
-  return shot;
 }
 
 // The distance to a bar that goes around is that to an endless one, at its ends too.

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/contract/error.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/level_set.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/obstacle.h"
 #include "sim/scene.h"
 #include "sim/simulator.h"
+#include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/temporary_folder.h"
 
@@ -32,33 +32,18 @@ class Volume : public testing::Test {
     shot.fluid.volume.push_back(volume);
     return shot;
   }
-  void write_box(const std::string& file, const V3f& size) const {
-    std::string text;
-    for (int k = 0; k < 8; ++k) {
-      const V3f p(k & 1 ? size.x : 0, k & 2 ? size.y : 0, k & 4 ? size.z : 0);
-      text +=
-          "v " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) + "\n";
-    }
-    text += "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
-    write_file_whole(folder_ / file, text);
-  }
   static sim::InitialFluid fill(const Shot& shot) {
     return sim::initial_fluid(shot, make_level_set);
   }
   static std::string refusal(const Shot& shot) {
-    try {
-      fill(shot);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "nothing was refused";
+    return test::error_of([&] { fill(shot); });
   }
   TemporaryFolder folder_;
 };
 
 // A box of whole cells on the lattice holds every one of them.
 TEST_F(Volume, OfABoxOnTheLatticeIsTheBox) {
-  write_box("box.obj", V3f(0.5f, 0.3f, 0.2f));
+  test::write_box(folder_ / "box.obj", V3f(0.5f, 0.3f, 0.2f));
   Shot shot = shot_of("box.obj", 0.02), boxes = shot;
   shot.fluid.volume[0].position = V3d(-0.1, 0.1, -0.3);
   const sim::InitialFluid fluid = fill(shot);
@@ -76,7 +61,7 @@ TEST_F(Volume, OfABoxOnTheLatticeIsTheBox) {
 // Turned and scaled: every particle at least half a spacing inside the true planes, and every
 // lattice place that deep is filled, but for the edges that the level set rounds off.
 TEST_F(Volume, HoldsTheLatticePlacesHalfASpacingInside) {
-  write_box("box.obj", V3f(0.5f, 0.3f, 0.2f));
+  test::write_box(folder_ / "box.obj", V3f(0.5f, 0.3f, 0.2f));
   Shot shot = shot_of("box.obj", 0.02);
   FluidVolume& volume = shot.fluid.volume[0];
   volume.scale = 2, volume.position = V3d(0.05, 0.02, 0.01), volume.rotation_deg = V3d(30, 40, 50);
@@ -150,7 +135,7 @@ TEST_F(Volume, ThatCannotBeFilledIsRefused) {
   EXPECT_NE(refusal(shot_of("none.obj", 0.05)).find("none.obj"), std::string::npos);
   write_file_whole(folder_ / "nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 0 1\nv 0 1 0\nf 1 2 3\n");
   EXPECT_NE(refusal(shot_of("nan.obj", 0.05)).find("nan.obj"), std::string::npos);
-  write_box("box.obj", V3f(0.5f, 0.3f, 0.01f));
+  test::write_box(folder_ / "box.obj", V3f(0.5f, 0.3f, 0.01f));
   EXPECT_NE(refusal(shot_of("box.obj", 0.05)).find("holds no particle"), std::string::npos);
   Shot far_off = shot_of("box.obj", 0.005);
   far_off.fluid.volume[0].position = V3d(1.2, 0, 0);

@@ -1,8 +1,6 @@
 // Same bits for any number of threads, after a resume, and wherever the scene stands.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <unistd.h>
 
@@ -28,14 +26,7 @@ Shot splash(double shift = 0) {
   return shot;
 }
 
-sim::HostState after_steps(const Shot& shot, int steps) {
-  Stepper run(shot);
-  for (int k = 0; k < steps; ++k) run.step();
-  return run.solver->save();
-}
-
 TEST(Determinism, AnyNumberOfThreadsGivesTheSameBits) {
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
   for (int k = 0; k < 3; ++k) {
     Shot shot = splash();
     const CouplingScheme scheme = k == 1 ? CouplingScheme::paper : CouplingScheme::exact;
@@ -43,13 +34,7 @@ TEST(Determinism, AnyNumberOfThreadsGivesTheSameBits) {
     if (k == 2) shot.fluid.solver = FluidSolver::incompressible;
     if (scheme == CouplingScheme::paper)
       shot.cloth[0].areal_density = 5;  // it diverges on light cloth
-    std::vector<sim::HostState> state;
-    for (int threads : {1, 2, 16}) {
-      tbb::task_arena arena(threads);
-      arena.execute([&] { state.push_back(after_steps(shot, 60)); });
-    }
-    expect_same_state(state[0], state[1]);
-    expect_same_state(state[0], state[2]);
+    expect_same_bits_on_threads(shot, 60);
   }
 }
 
@@ -58,7 +43,7 @@ TEST(Determinism, ALatticeShiftOfTenKilometresGivesTheSameBits) {
   for (FluidSolver solver : {FluidSolver::weakly_compressible, FluidSolver::incompressible}) {
     Shot here = splash(), there = splash(1e4);
     here.fluid.solver = there.fluid.solver = solver;
-    expect_same_state(after_steps(here, 60), after_steps(there, 60));
+    expect_same_state(after(here, 60), after(there, 60));
   }
 }
 

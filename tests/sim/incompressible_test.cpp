@@ -1,8 +1,6 @@
 // The incompressible solver: lists, rows, walls and whole steps, each against an oracle of its own.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -372,38 +370,19 @@ TEST(ImageWalls, BothWallsOfAThinDomainCount) {
   for (const float density : run.solver->density()) EXPECT_NEAR(density, 1000, 15);
 }
 
-sim::HostState after(const Shot& shot, int steps, bool refreshed = false) {
-  Stepper run(shot);
-  for (int k = 0; k < steps; ++k) {
-    run.step(2e-3);
-    if (refreshed) run.solver->refresh();
-  }
-  return run.solver->save();
-}
-
 TEST(Incompressible, AnyNumberOfThreadsGivesTheSameBits) {
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
-  std::vector<sim::HostState> state;
-  for (const int threads : {1, 2, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] { state.push_back(after(column(90, 1e-4), 30)); });
-  }
-  expect_same_state(state[0], state[1]);
-  expect_same_state(state[0], state[2]);
+  expect_same_bits_on_threads(column(90, 1e-4), 30, 2e-3);
 }
 
 TEST(Incompressible, LookingBetweenStepsChangesNoBit) {
-  expect_same_state(after(column(12, 1e-4), 40), after(column(12, 1e-4), 40, true));
+  const Shot shot = column(12, 1e-4);
+  Stepper run(shot);
+  for (int k = 0; k < 40; ++k) run.step(2e-3), run.solver->refresh();
+  expect_same_state(after(shot, 40, 2e-3), run.solver->save());
 }
 
 TEST(Incompressible, ASavedStateGoesOnWithTheSameBits) {
-  const Shot shot = column(12, 1e-4);
-  Stepper whole(shot), first(shot);
-  for (int k = 0; k < 20; ++k) whole.step(2e-3), first.step(2e-3);
-  Stepper second(shot);
-  second.solver->load(first.solver->save());
-  for (int k = 0; k < 20; ++k) whole.step(2e-3), second.step(2e-3);
-  expect_same_state(whole.solver->save(), second.solver->save());
+  expect_same_bits_when_resumed(column(12, 1e-4), 40, 2e-3);
 }
 
 TEST(Incompressible, WithoutXsphNothingIsSmoothed) {

@@ -62,7 +62,9 @@ TEST_P(Momentum, OfFluidAndClothIsKeptInASplash) {
 TEST_P(Momentum, IsKeptWhereThePathTestActs) {
   const Drift drift = drift_of(V3d(0, -10, 0), 20, GetParam());
   EXPECT_LT(drift.worst, 1e-5);
-  if (GetParam() == FluidSolver::weakly_compressible) EXPECT_GT(drift.guard_hits, 0u);
+  if (GetParam() == FluidSolver::weakly_compressible) {
+    EXPECT_GT(drift.guard_hits, 0u);
+  }
 }
 
 // Sheets six times as heavy as the water between them close on it until the path test stops them,

@@ -1,8 +1,6 @@
 // Obstacles in violent and moving flows: nothing leaks, room is made, bits stay.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -163,23 +161,8 @@ Shot stirred() {
 }
 
 TEST(ObstacleMotion, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
-  const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
-  std::vector<sim::HostState> state;
-  for (const int threads : {1, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] {
-      Stepper run(stirred());
-      for (int k = 0; k < 60; ++k) run.step(2e-3);
-      state.push_back(run.solver->save());
-    });
-  }
-  expect_same_state(state[0], state[1]);
-  Stepper first(stirred()), second(stirred());
-  for (int k = 0; k < 30; ++k) first.step(2e-3);
-  second.solver->load(first.solver->save());
-  second.time = first.time;
-  for (int k = 0; k < 30; ++k) second.step(2e-3);
-  expect_same_state(state[0], second.solver->save());
+  expect_same_bits_on_threads(stirred(), 60, 2e-3);
+  expect_same_bits_when_resumed(stirred(), 60, 2e-3);
 }
 
 TEST(ObstacleMotion, FarAwayChangesNoBit) {

@@ -147,6 +147,19 @@ Settled settle_in_tilted_tank(double degrees, double seconds) {
   return result;
 }
 
+/// On the first obstacle, N, over half a second once the fluid is at rest.
+static V3d mean_force(Stepper& run) {
+  run.advance(0.8);
+  V3d impulse(0);
+  const double begin = run.time;
+  while (run.time < begin + 0.5) {
+    run.step();
+    const sim::ObstacleImpulse i = run.solver->obstacle_impulses().at(0);
+    impulse += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
+  }
+  return impulse / (run.time - begin);
+}
+
 Lift lift_of(ObstacleType type, double spacings) {
   Shot shot = tank_shot(1);
   const double a = shot.fluid.spacing = 0.06 / spacings;  // the body has one size
@@ -161,15 +174,7 @@ Lift lift_of(ObstacleType type, double spacings) {
       type == ObstacleType::sphere ? 4 * M_PI / 3 * half * half * half : 8 * half * half * half;
   if (type == ObstacleType::box) body.rotation_deg = V3d(0, 20, 10);
   Stepper run(shot);
-  run.advance(0.8);
-  V3d impulse(0);
-  const double begin = run.time;
-  while (run.time < begin + 0.5) {
-    run.step();
-    const sim::ObstacleImpulse i = run.solver->obstacle_impulses().at(0);
-    impulse += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
-  }
-  const V3d force = impulse / (run.time - begin) / (1000 * g * volume);
+  const V3d force = mean_force(run) / (1000 * g * volume);
   return {force.y - 1, std::hypot(force.x, force.z)};
 }
 
@@ -185,15 +190,7 @@ BarForce lift_of_bar(Obstacle bar, double section, int across,
   bar.position = V3d(side * a / 2, 0.06, 1.7 * a);  // ends within the domain if there are any
   shot.obstacle.push_back(bar);
   Stepper run(shot, make_level_set);
-  run.advance(0.8);
-  V3d impulse(0);
-  const double begin = run.time;
-  while (run.time < begin + 0.5) {
-    run.step();
-    const sim::ObstacleImpulse i = run.solver->obstacle_impulses().at(0);
-    impulse += V3d(i.impulse[0], i.impulse[1], i.impulse[2]);
-  }
-  const V3d force = impulse / (run.time - begin) / (1000 * g * section * 6 * a);
+  const V3d force = mean_force(run) / (1000 * g * section * 6 * a);
   return {force.y - 1, force.x, force.z};
 }
 

@@ -2,7 +2,6 @@
 // nothing tells where the seam is.
 
 #include <gtest/gtest.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,8 @@
 #include "sim/probe_series.h"
 #include "sim/simulator.h"
 #include "tests/sim/crossings.h"
+#include "tests/sim/periodic_scenes.h"
+#include "tests/sim/same_state.h"
 #include "tests/temporary_folder.h"
 #include "tests/validation/strip_pool.h"
 
@@ -20,34 +21,12 @@ namespace {
 
 constexpr double a = 0.01;  // m, spacing
 
-/// A box of `cells` spacings, periodic along x and z, open along y; no gravity.
-Shot slab(std::array<int, 3> cells) {
-  Shot shot = empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = a;
-  shot.domain.min = V3d(0), shot.domain.max = V3d(cells[0], cells[1], cells[2]) * a;
-  shot.domain.axis = {Axis::periodic, Axis::open, Axis::periodic};
-  return shot;
-}
-V3d period_of(const Shot& shot) {
-  V3d period(0);
-  for (int k = 0; k < 3; ++k) {
-    if (shot.domain.axis[size_t(k)] == Axis::periodic)
-      period[k] = shot.domain.max[k] - shot.domain.min[k];
-  }
-  return period;
-}
 /// A horizontal sheet with its corner at `corner` of cells of a spacing.
 Cloth& add_grid(Shot& shot, V3d corner, int nx, int nz) {
   Cloth& sheet = shot.cloth.emplace_back();
   sheet.corner = corner, sheet.u = V3d(nx * a, 0, 0), sheet.v = V3d(0, 0, nz * a);
   sheet.cells = V2i(nx, nz), sheet.damping = 0;
   return sheet;
-}
-
-V3d nearest_image(V3d d, const V3d& period) {
-  for (int k = 0; k < 3; ++k)
-    if (period[k] > 0) d[k] -= period[k] * std::round(d[k] / period[k]);
-  return d;
 }
 
 // --- Topology -----------------------------------------------------------------------------------
@@ -169,21 +148,6 @@ TEST_P(StripPool, HangsAsAPlaneChainOfSpringsDoes) {
 }
 
 // --- Nothing tells where the seam is -------------------------------------------------------------
-
-double difference(const sim::HostState& p, const sim::HostState& q, const V3d& shift,
-                  const V3d& period) {
-  const std::vector<int> of_p = place_of_id(p), of_q = place_of_id(q);
-  double worst = 0;
-  for (size_t i = 0; i < of_p.size(); ++i) {
-    const V3d d = at(q.position, size_t(of_q[i])) - at(p.position, size_t(of_p[i])) - shift;
-    worst = std::max(worst, nearest_image(d, period).length());
-  }
-  for (size_t v = 0; v < p.cloth_position.size(); ++v) {
-    const V3d d = at(q.cloth_position, v) - at(p.cloth_position, v) - shift;
-    worst = std::max(worst, nearest_image(d, period).length());
-  }
-  return worst;
-}
 
 enum class Sheets { joined, loose };
 
@@ -323,7 +287,9 @@ TEST(JoinedSheet, NothingCrossesAtTheSeam) {
     for (const float v : run.solver->save().cloth_velocity.y)
       push = std::max(push, double(std::abs(v)));
     EXPECT_GT(push, 0.05);
-    if (steps == 100) EXPECT_GT(run.solver->save().guard_hits, 100u);
+    if (steps == 100) {
+      EXPECT_GT(run.solver->save().guard_hits, 100u);
+    }
   }
 }
 
@@ -335,22 +301,7 @@ TEST_P(Seam, IsCrossedBySheetsAndByNoPathThroughThem) {
 // --- Determinism and files ----------------------------------------------------------------------
 
 TEST_P(Seam, SameBitsForAnyNumberOfThreads) {
-  std::vector<sim::HostState> states;
-  for (const int threads : {1, 2, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] {
-      Stepper run(splash(GetParam(), V3d(0.05, 0.285, 0.04)));
-      for (int k = 0; k < 60; ++k) run.step(2e-4);
-      states.push_back(run.solver->save());
-    });
-  }
-  for (const int other : {1, 2}) {
-    EXPECT_EQ(states[0].id, states[size_t(other)].id);
-    EXPECT_EQ(states[0].position.x, states[size_t(other)].position.x);
-    EXPECT_EQ(states[0].velocity.y, states[size_t(other)].velocity.y);
-    EXPECT_EQ(states[0].cloth_position.y, states[size_t(other)].cloth_position.y);
-    EXPECT_EQ(states[0].cloth_velocity.z, states[size_t(other)].cloth_velocity.z);
-  }
+  expect_same_bits_on_threads(splash(GetParam(), V3d(0.05, 0.285, 0.04)), 60, 2e-4);
 }
 
 // Both edges at the seam are drawn, a period apart and moving as one.
@@ -358,8 +309,8 @@ TEST_P(Seam, ResumesWithTheSameBitsAndDrawsNoHole) {
   const test::TemporaryFolder folder;
   Shot shot = splash(GetParam(), V3d(0.05, 0.285, 0.04));
   shot.timeline = {1, 10, 120};
-  Simulator whole(shot, {Device::cpu, {}}), first(shot, {Device::cpu, {}}),
-      second(shot, {Device::cpu, {}});
+  Simulator whole(shot, {.device = Device::cpu}), first(shot, {.device = Device::cpu}),
+      second(shot, {.device = Device::cpu});
   whole.advance_frame(), first.advance_frame();
   first.write_checkpoint(folder / "state");
   second.read_checkpoint(folder / "state");

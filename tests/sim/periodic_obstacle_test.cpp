@@ -3,55 +3,18 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/periodic_scenes.h"
 #include "tests/sim/same_state.h"
 
 namespace drench::sim_tests {
 namespace {
 
 constexpr double a = 0.01, g = 9.81;  // m, m/s^2
-
-/// A box of `cells` spacings, periodic along x and z, open along y; no gravity.
-Shot slab(std::array<int, 3> cells) {
-  Shot shot = empty_shot();
-  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = a;
-  shot.domain.min = V3d(0), shot.domain.max = V3d(cells[0], cells[1], cells[2]) * a;
-  shot.domain.axis = {Axis::periodic, Axis::open, Axis::periodic};
-  return shot;
-}
-V3d period_of(const Shot& shot) {
-  V3d period(0);
-  for (int k = 0; k < 3; ++k) {
-    if (shot.domain.axis[size_t(k)] == Axis::periodic)
-      period[k] = shot.domain.max[k] - shot.domain.min[k];
-  }
-  return period;
-}
-V3d nearest_image(V3d d, const V3d& period) {
-  for (int k = 0; k < 3; ++k)
-    if (period[k] > 0) d[k] -= period[k] * std::round(d[k] / period[k]);
-  return d;
-}
-double difference(const sim::HostState& p, const sim::HostState& q, const V3d& shift,
-                  const V3d& period) {
-  const std::vector<int> of_p = place_of_id(p), of_q = place_of_id(q);
-  double worst = 0;
-  for (size_t i = 0; i < of_p.size(); ++i) {
-    const V3d d = at(q.position, size_t(of_q[i])) - at(p.position, size_t(of_p[i])) - shift;
-    worst = std::max(worst, nearest_image(d, period).length());
-  }
-  for (size_t v = 0; v < p.cloth_position.size(); ++v) {
-    const V3d d = at(q.cloth_position, v) - at(p.cloth_position, v) - shift;
-    worst = std::max(worst, nearest_image(d, period).length());
-  }
-  return worst;
-}
 
 V3d impulse_of(const Stepper& run, size_t obstacle) {
   const sim::ObstacleImpulse i = run.solver->obstacle_impulses().at(obstacle);
@@ -105,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(Body, SeamOfObstacles,
 // Moved so that both seams run through the body, and once more by a period and more.
 TEST_P(SeamOfObstacles, IsNowhere) {
   const V3d period = period_of(slab({15, 40, 12}));
-  for (const V3d shift : {V3d(0.08, 0, 0.06), V3d(-0.22, 0, 0.18)}) {
+  for (const V3d& shift : {V3d(0.08, 0, 0.06), V3d(-0.22, 0, 0.18)}) {
     Stepper here(splash(GetParam(), V3d(0))), there(splash(GetParam(), shift));
     V3d given(0), other(0);
     for (int k = 0; k < 60; ++k) {
@@ -431,24 +394,9 @@ TEST(SheetsOnPeriodicObstacles, WeighOnTheBarAcrossTheSeam) {
 // --- Determinism and skips ----------------------------------------------------------------------
 
 TEST(PeriodicObstacles, HaveTheSameBitsForAnyNumberOfThreadsAndGoOn) {
-  const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
   for (const Shot& shot : {stirred(), drape(V3d(0.11, 0, 0.09))}) {
-    std::vector<sim::HostState> state;
-    for (const int threads : {1, 16}) {
-      tbb::task_arena arena(threads);
-      arena.execute([&] {
-        Stepper run(shot);
-        for (int k = 0; k < 60; ++k) run.step(1e-3);
-        state.push_back(run.solver->save());
-      });
-    }
-    expect_same_state(state[0], state[1]);
-    Stepper first(shot), second(shot);
-    for (int k = 0; k < 30; ++k) first.step(1e-3);
-    second.solver->load(first.solver->save());
-    second.time = first.time;
-    for (int k = 0; k < 30; ++k) second.step(1e-3);
-    expect_same_state(state[0], second.solver->save());
+    expect_same_bits_on_threads(shot, 60, 1e-3);
+    expect_same_bits_when_resumed(shot, 60, 1e-3);
   }
 }
 

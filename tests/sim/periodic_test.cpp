@@ -11,6 +11,7 @@
 #include "sim/passes/measure_density.h"
 #include "sim/simulator.h"
 #include "tests/sim/listed.h"
+#include "tests/sim/periodic_scenes.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::sim_tests {
@@ -26,13 +27,6 @@ Shot periodic_box(FluidSolver solver, std::array<int, 3> cells) {
   shot.domain.max = V3d(cells[0], cells[1], cells[2]) * shot.fluid.spacing;
   shot.domain.axis = all_periodic;
   return shot;
-}
-
-V3d period_of(const Shot& shot) { return shot.domain.max - shot.domain.min; }
-
-V3d nearest_image(V3d d, const V3d& period) {
-  for (int k = 0; k < 3; ++k) d[k] -= period[k] * std::round(d[k] / period[k]);
-  return d;
 }
 
 class Periodic : public testing::TestWithParam<FluidSolver> {};
@@ -126,8 +120,8 @@ Shot collision(FluidSolver solver, const V3d& shift, const V3d& drift) {
 }
 
 /// RMS distance of each particle of one state from that of the other, moved by `shift`, m.
-double difference(const sim::HostState& a, const sim::HostState& b, const V3d& shift,
-                  const V3d& period) {
+double rms_difference(const sim::HostState& a, const sim::HostState& b, const V3d& shift,
+                      const V3d& period) {
   const std::vector<int> of_a = place_of_id(a), of_b = place_of_id(b);
   double sum = 0;
   for (size_t i = 0; i < of_a.size(); ++i) {
@@ -151,8 +145,8 @@ TEST_P(Periodic, NothingTellsWhereTheSeamIs) {
   for (const float v : state.velocity.y) spread = std::max(spread, double(std::abs(v)));
   ASSERT_GT(spread, 0.1);
   const V3d period = period_of(collision(GetParam(), V3d(0), V3d(0)));
-  EXPECT_LT(difference(state, moved.solver->save(), far, period), 2e-5);
-  EXPECT_LT(difference(state, flying.solver->save(), drift * 0.035, period), 2e-5);
+  EXPECT_LT(rms_difference(state, moved.solver->save(), far, period), 2e-5);
+  EXPECT_LT(rms_difference(state, flying.solver->save(), drift * 0.035, period), 2e-5);
 }
 
 TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
@@ -264,8 +258,8 @@ TEST(PeriodicResume, HasTheSameBitsAndLosesNothing) {
   jet.center = V3d(0.155, 0.08, 0.159), jet.direction = V3d(1, 0, 0);
   jet.radius = 0.02, jet.speed = 1.5, jet.stop = 0.1;
   shot.fluid.emitter.push_back(jet);
-  Simulator whole(shot, {Device::cpu, {}}), first(shot, {Device::cpu, {}}),
-      second(shot, {Device::cpu, {}});
+  Simulator whole(shot, {.device = Device::cpu}), first(shot, {.device = Device::cpu}),
+      second(shot, {.device = Device::cpu});
   for (int frame = 0; frame < 3; ++frame) whole.advance_frame(), first.advance_frame();
   first.write_checkpoint(folder / "state");
   second.read_checkpoint(folder / "state");
@@ -307,7 +301,7 @@ sim::HostState splash(Axis sides) {
 
 TEST(PeriodicSkip, SidesOutOfReachChangeNothingButRounding) {
   const sim::HostState open = splash(Axis::open), periodic = splash(Axis::periodic);
-  EXPECT_LT(difference(open, periodic, V3d(0), V3d(2)), 2e-5);
+  EXPECT_LT(rms_difference(open, periodic, V3d(0), V3d(2)), 2e-5);
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
 // Plane flows with a closed form, coarse: the bench has the curves.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 
@@ -122,22 +120,9 @@ TEST(FullDomain, MomentumIsKept) {
 }
 
 TEST(FullDomain, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
-  const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, 16);
-  std::vector<sim::HostState> state;
-  for (const int threads : {1, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] {
-      Stepper run(stirred(24));  // more than one chunk of the reductions
-      for (int k = 0; k < 12; ++k) run.step(1e-3);
-      state.push_back(run.solver->save());
-    });
-  }
-  expect_same_state(state[0], state[1]);
-  Stepper first(stirred(24)), second(stirred(24));
-  for (int k = 0; k < 6; ++k) first.step(1e-3);
-  second.solver->load(first.solver->save());
-  for (int k = 0; k < 6; ++k) second.step(1e-3);
-  expect_same_state(state[0], second.solver->save());
+  const sim::Scene scene = stirred(24);  // more than one chunk of the reductions
+  expect_same_bits_on_threads(scene, 12, 1e-3);
+  expect_same_bits_when_resumed(scene, 12, 1e-3);
 }
 
 // Measured at 10, 20 and 30 layers: docs/benchmarks.md, wave_maker.

@@ -44,8 +44,7 @@ struct Probed {
   Simulator simulator;
 
   explicit Probed(const std::string& text)
-      : shot(parse_shot(text, "probed.toml")),
-        simulator(shot, {.device = Device::cpu, .checkpoint_dir = {}}) {}
+      : shot(parse_shot(text, "probed.toml")), simulator(shot, {.device = Device::cpu}) {}
   Probed& run_to(int frame) {
     while (simulator.frame() < frame) simulator.advance_frame();
     return *this;

@@ -1,9 +1,13 @@
 #pragma once
-// Whole states compared, every column and count.
+// Whole states compared, every column and count; runs on any number of threads and taken up again.
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
-#include "sim/solver.h"
+#include <vector>
+
+#include "tests/sim/support.h"
 
 namespace drench::sim_tests {
 
@@ -26,6 +30,37 @@ inline void expect_same_state(const sim::HostState& a, const sim::HostState& b) 
   expect_same_vectors(a.owed, b.owed);
   expect_same_vectors(a.cloth_position, b.cloth_position);
   expect_same_vectors(a.cloth_velocity, b.cloth_velocity);
+}
+
+/// After so many steps of dt s; of the largest stable size if it is 0. @param start  Shot or Scene.
+template <class Start>
+sim::HostState after(const Start& start, int steps, double dt = 0) {
+  Stepper run(start);
+  for (int k = 0; k < steps; ++k) dt > 0 ? run.step(dt) : run.step();
+  return run.solver->save();
+}
+
+template <class Start>
+void expect_same_bits_on_threads(const Start& start, int steps, double dt = 0) {
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
+  std::vector<sim::HostState> state;
+  for (const int threads : {1, 2, 16}) {
+    tbb::task_arena arena(threads);
+    arena.execute([&] { state.push_back(after(start, steps, dt)); });
+  }
+  expect_same_state(state[0], state[1]);
+  expect_same_state(state[0], state[2]);
+}
+
+/// A run that is taken up where half of the steps are done.
+template <class Start>
+void expect_same_bits_when_resumed(const Start& start, int steps, double dt) {
+  Stepper first(start), second(start);
+  for (int k = 0; k < steps / 2; ++k) first.step(dt);
+  second.solver->load(first.solver->save());
+  second.time = first.time;
+  for (int k = steps / 2; k < steps; ++k) second.step(dt);
+  expect_same_state(after(start, steps, dt), second.solver->save());
 }
 
 }  // namespace drench::sim_tests

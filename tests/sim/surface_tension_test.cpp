@@ -2,8 +2,6 @@
 // fluid_drop.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -202,26 +200,11 @@ Shot block_in_a_corner() {
 }
 
 TEST(SurfaceTension, AnyNumberOfThreadsGivesTheSameBits) {
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
-  std::vector<sim::HostState> state;
-  for (const int threads : {1, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] {
-      Stepper run(block_in_a_corner());
-      for (int k = 0; k < 30; ++k) run.step();
-      state.push_back(run.solver->save());
-    });
-  }
-  expect_same_state(state[0], state[1]);
+  expect_same_bits_on_threads(block_in_a_corner(), 30);
 }
 
 TEST(SurfaceTension, ASavedStateGoesOnWithTheSameBits) {
-  const Shot shot = block_in_a_corner();
-  Stepper whole(shot), first(shot), second(shot);
-  for (int k = 0; k < 20; ++k) whole.step(3e-4), first.step(3e-4);
-  second.solver->load(first.solver->save());
-  for (int k = 0; k < 20; ++k) whole.step(3e-4), second.step(3e-4);
-  expect_same_state(whole.solver->save(), second.solver->save());
+  expect_same_bits_when_resumed(block_in_a_corner(), 40, 3e-4);
 }
 
 TEST(SurfaceTension, LimitsTheStep) {

@@ -1,8 +1,6 @@
 // Viscosity of the incompressible solver: its rows, its solve, walls, and what it must conserve.
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -263,35 +261,18 @@ TEST(Viscosity, SetsNoLimitToTheStep) {
   EXPECT_EQ(Stepper(thin).stable_dt(), Stepper(thick).stable_dt());
 }
 
-sim::HostState after(const Shot& shot, int steps) {
-  Stepper run(shot);
-  for (int k = 0; k < steps; ++k) run.step(2e-3);
-  return run.solver->save();
-}
 TEST(Viscosity, AnyNumberOfThreadsGivesTheSameBits) {
   Shot shot = glass(2e-2);
   shot.domain.max = V3d(0.4, 0.4, 0.2);
   shot.fluid.box.clear();
   add_box(shot, V3d(0), {14, 30, 14});  // more than one chunk of the reductions
-  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, 16);
-  std::vector<sim::HostState> state;
-  for (const int threads : {1, 2, 16}) {
-    tbb::task_arena arena(threads);
-    arena.execute([&] { state.push_back(after(shot, 15)); });
-  }
-  expect_same_state(state[0], state[1]);
-  expect_same_state(state[0], state[2]);
+  expect_same_bits_on_threads(shot, 15, 2e-3);
 }
 
 TEST(Viscosity, ASavedStateGoesOnWithTheSameBits) {
   Shot shot = glass(1e-2);
   shot.domain.max.x = 0.3;
-  Stepper whole(shot), first(shot);
-  for (int k = 0; k < 20; ++k) whole.step(2e-3), first.step(2e-3);
-  Stepper second(shot);
-  second.solver->load(first.solver->save());
-  for (int k = 0; k < 20; ++k) whole.step(2e-3), second.step(2e-3);
-  expect_same_state(whole.solver->save(), second.solver->save());
+  expect_same_bits_when_resumed(shot, 40, 2e-3);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/validation/viscous.h"
 
 namespace drench::validation {
 
@@ -36,20 +37,6 @@ void slide(Obstacle& obstacle, double speed) {
   obstacle.position.keys = {{1001, start}, {2001, start + V3d(speed * seconds, 0, 0)}};
 }
 
-/// A lattice is the densest packing at rest: another has 1 % of room along x.
-sim::Scene shaken(const Shot& shot) {
-  sim::Scene scene = sim::build_scene(shot);
-  constexpr float room = 1.01f;
-  sim_tests::Random random(13);
-  sim::HostVec& x = scene.start.position;
-  scene.parameters.high[0] *= room;
-  for (float& value : x.x) value *= room;
-  for (std::vector<float>* c : {&x.x, &x.y, &x.z}) {
-    for (float& value : *c) value += float(0.5 * shot.fluid.spacing * (random() - 0.5));
-  }
-  return scene;
-}
-
 V3d world(const Stepper& run, const sim::HostState& state, size_t i) {
   V3d x;
   for (int k = 0; k < 3; ++k) x[k] = run.scene.frame.to_world(k, at(state.position, i)[k]);
@@ -69,7 +56,7 @@ Dragged lid_driven(int across) {
   sim_tests::add_plane(shot, V3d(0), V3d(0, 1, 0));
   sim_tests::add_plane(shot, V3d(0, width, 0), V3d(0, -1, 0));
   slide(shot.obstacle[1], U);
-  Stepper run(shaken(shot));
+  Stepper run(shaken(shot, 0.25));
   const double unit = width * width / viscosity;
   advance(run, 0.4 * unit, unit / (20 * across));
   Dragged result;

@@ -23,7 +23,7 @@ double l2_error(Flow flow, double time, double width, double largest, const sim:
   return std::sqrt(sum / double(state.id.size()));
 }
 
-sim::Scene channel(Flow flow, int across, double shaken) {
+sim::Scene channel(Flow flow, int across, double by) {
   constexpr double width = 0.1, viscosity = 1e-3, largest = viscosity / width;  // Re = 1
   constexpr int period = 6;  // particles along the walls: nearly three supports
   const double a = width / across;
@@ -41,20 +41,23 @@ sim::Scene channel(Flow flow, int across, double shaken) {
   else
     shot.gravity = V3d(8 * viscosity * largest / (width * width), 0, 0);
   sim_tests::add_box(shot, V3d(0), {period, across, period});
+  return shaken(shot, by);
+}
+
+}  // namespace
+
+sim::Scene shaken(const Shot& shot, double by) {
   sim::Scene scene = sim::build_scene(shot);
-  // A lattice is the densest packing that is at rest: another needs room, or its pressures jam it.
   constexpr float room = 1.01f;
   sim_tests::Random random(13);
   sim::HostVec& x = scene.start.position;
   scene.parameters.high[0] *= room;
   for (float& value : x.x) value *= room;
   for (std::vector<float>* c : {&x.x, &x.y, &x.z}) {
-    for (float& value : *c) value += float(2 * shaken * a * (random() - 0.5));
+    for (float& value : *c) value += float(2 * by * shot.fluid.spacing * (random() - 0.5));
   }
   return scene;
 }
-
-}  // namespace
 
 double start_up_velocity(Flow flow, double time, double y) {
   double u = flow == Flow::couette ? y : 4 * y * (1 - y);

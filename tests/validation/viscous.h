@@ -1,7 +1,13 @@
 #pragma once
 // Viscous flows with a known answer, run with the incompressible solver: see fluid.h.
 
+#include "sim/scene.h"
+
 namespace drench::validation {
+
+/// A shot's scene, its particles up to `by` spacings off their places. A lattice is the densest
+/// packing that is at rest: another needs room, or its pressures jam it. It has 1 % more along x.
+sim::Scene shaken(const Shot& shot, double by);
 
 enum class Flow { couette, poiseuille };  // the upper wall moves; gravity along the walls
 
