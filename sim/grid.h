@@ -35,6 +35,8 @@ struct GridAxis {
   double count;
 };
 inline GridAxis make_grid_axis(float low, float high, double edge) {
+  // Points that are not finite end the run once the step is done: until then one cell holds all.
+  if (!std::isfinite(high - low) || !std::isfinite(edge)) return {0.f, 0.f, 1};
   const double first = std::floor(low / edge);
   return {float(first * edge), 1.f / float(edge), std::floor(high / edge) - first + 1};
 }
