@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "tests/sim/same_state.h"
 #include "tests/stress/report.h"
 #include "tests/stress/scenes.h"
 
@@ -21,12 +22,6 @@ Shot splash(V3d shift) {
   shot.fluid.box[0].velocity = V3d(1, -10, 0.5);
   shot.cloth[0].corner += shift;
   return shot;
-}
-
-sim::HostState after_steps(const Shot& shot, int steps) {
-  Stepper run(shot);
-  for (int k = 0; k < steps; ++k) run.step();
-  return run.solver->save();
 }
 
 /// Numbers that differ, of all columns that the next step reads.
@@ -49,9 +44,9 @@ size_t differences(const sim::HostState& a, const sim::HostState& b) {
 
 TEST(Bits, AreTheSameFarFromTheOrigin) {
   const int steps = long_form() ? 1000 : 80;
-  const sim::HostState here = after_steps(splash(V3d(0)), steps);
+  const sim::HostState here = after(splash(V3d(0)), steps);
   for (const V3d& shift : {V3d(1e4, 0, 0), V3d(-1e4, 1e4, 1e4), V3d(9e4, -9e4, 9e4)}) {
-    const size_t off = differences(here, after_steps(splash(shift), steps));
+    const size_t off = differences(here, after(splash(shift), steps));
     report("far from origin", fmt::format("({:g}, {:g}, {:g}) m", shift.x, shift.y, shift.z),
            off == 0, fmt::format("{} numbers differ after {} steps", off, steps));
   }
@@ -63,7 +58,7 @@ TEST(Bits, AreTheSameForAnyNumberOfThreads) {
   std::vector<sim::HostState> state;
   for (const int threads : {1, 2, 16}) {
     tbb::task_arena arena(threads);
-    arena.execute([&] { state.push_back(after_steps(splash(V3d(0)), steps)); });
+    arena.execute([&] { state.push_back(after(splash(V3d(0)), steps)); });
   }
   const size_t off = differences(state[0], state[1]) + differences(state[0], state[2]);
   report("determinism", "1, 2, 16 threads", off == 0,

@@ -122,6 +122,24 @@ void report_pouch(const std::string& setting, const Shot& shot, double seconds,
                      1e3 * before, 1e3 * bag.volume));
 }
 
+// Water at 1 m/s in a bag that is free, without gravity: all that one loses the other gets.
+TEST(Momentum, OfWaterAndItsBagIsKept) {
+  const test::TemporaryFolder folder;
+  Shot shot = pouch(folder, V3d(0));
+  shot.gravity = V3d(0), shot.domain.axis[1] = Axis::open;
+  shot.domain.min = V3d(-100), shot.domain.max = V3d(100);
+  shot.cloth[0].damping = 0, shot.fluid.sphere[0].velocity = V3d(1, 0.5, -0.3);
+  Watch watch(shot);
+  Gates gates;
+  gates.speed = 1.25;  // without a fall the bound is the fastest at the start
+  for (const int steps : long_form() ? std::vector{1000, 3000, 10000} : std::vector{1000}) {
+    watch.steps(steps - watch.figures().steps);
+    gates.drift = 1e-5 * steps / 1000;
+    report("momentum", fmt::format("water at 1.2 m/s in a free bag, {} steps", steps), watch,
+           gates);
+  }
+}
+
 TEST(Pouch, HungHoldsItsWater) {
   const test::TemporaryFolder folder;
   Shot shot = pouch(folder, V3d(0));

@@ -185,7 +185,10 @@ void Watch::start() {
   last_ = run.solver->save();
   figures_.particles = int(last_.id.size());
   closed_ = p.gravity[0] == 0 && p.gravity[1] == 0 && p.gravity[2] == 0;
-  for (int k = 0; k < 3; ++k) closed_ = closed_ && !p.wall[k];
+  for (int k = 0; k < 3; ++k) {
+    closed_ = closed_ && !p.wall[k];
+    if (p.periodic[k]) period_[k] = double(p.high[k]) - double(p.low[k]);
+  }
   for (const float m : run.scene.cloth.inverse_mass) closed_ = closed_ && m > 0;
   momentum_ = total_momentum(run.scene, last_);
   fastest_ = std::max(fastest(last_.velocity), fastest(last_.cloth_velocity));
@@ -213,7 +216,8 @@ double Watch::energy(const sim::HostState& state) {
     sum += c.mass[v] *
            (0.5 * at(state.cloth_velocity, v).length2() - g.dot(at(state.cloth_position, v)));
     for (int k = c.spring_start[v]; k < c.spring_start[v + 1]; ++k) {  // each stands in two rows
-      const V3d d = at(state.cloth_position, c.spring_end[k]) - at(state.cloth_position, v);
+      V3d d = at(state.cloth_position, c.spring_end[k]) - at(state.cloth_position, v);
+      if (c.spring_shift.size() > 0) d += at(c.spring_shift, size_t(k));
       const double stretch = d.length() - c.rest_length[k];
       sum += 0.25 * c.stiffness[k] * stretch * stretch;
     }
@@ -225,7 +229,7 @@ void Watch::observe(const sim::HostState& state) {
   const double before = cpu_seconds();
   if (is_finite(state.position) && is_finite(state.cloth_position) &&
       same_ids(state, last_.id.size()))
-    figures_.crossings += count_crossings(run.scene.cloth, last_, state);
+    figures_.crossings += count_crossings(run.scene.cloth, last_, state, period_);
   last_ = state;
   observing_ += cpu_seconds() - before;
 }

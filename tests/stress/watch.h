@@ -65,7 +65,7 @@ class Watch {
   bool closed_ = false;
   Figures figures_;
   sim::HostState last_;
-  V3d momentum_{0};
+  V3d momentum_{0}, period_{0};
   double energy_ = 0, gained_ = 0;                // J
   double height_ = 0, highest_ = 0, lowest_ = 0;  // m; of the mean mass at the start, and of all
   double mass_ = 0, kinetic_ = 0, fastest_ = 0, last_speed_ = 0;
