@@ -245,7 +245,7 @@ int infected(const sim::HostState& state, int particle, int vertex) {
 // bad, or nothing else is infected after 100.
 TEST(Fuzz, OneNumberOfAStateDoesNotSpread) {
   int named = 0, late = 0, silent = 0;
-  const Seeds seeds(60, 3000);
+  const Seeds seeds(40, 3000);
   Stepper run(fall_on_sheet(100, 8));
   for (int k = 0; k < 60; ++k) run.step();  // it has met the sheet
   const sim::HostState clean = run.solver->save();
