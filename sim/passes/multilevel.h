@@ -31,23 +31,26 @@ struct FinestNodes {
             share((p.y - grid.origin.y) * grid.inverse_edge.y, shift.y, y),
             share((p.z - grid.origin.z) * grid.inverse_edge.z, shift.z, z)};
   }
-  DRENCH_HD static void weights(Vec3<float> f, float w[8]) {
-    const float x0 = 1.f - f.x, y0 = 1.f - f.y, z0 = 1.f - f.z;
-    const float a = y0 * z0, b = f.y * z0, c = y0 * f.z, d = f.y * f.z;
-    w[0] = x0 * a, w[1] = f.x * a, w[2] = x0 * b, w[3] = f.x * b;
-    w[4] = x0 * c, w[5] = f.x * c, w[6] = x0 * d, w[7] = f.x * d;
-  }
   /// Of what stands on the nodes.
   DRENCH_HD float interpolate(Float4 p, const float* nodes) const {
     const int x = grid.cell_x(p.x) >> shift.x, y = grid.cell_y(p.y) >> shift.y,
               z = grid.cell_z(p.z) >> shift.z;
-    float w[8], sum = 0.f;
-    weights(within(p, x, y, z), w);
-    const int i[2] = {x, beyond(x, level.x)}, j[2] = {y, beyond(y, level.y)},
-              k[2] = {z, beyond(z, level.z)};
-    for (int n = 0; n < 8; ++n)
-      sum += w[n] * nodes[level.index(i[n & 1], j[n >> 1 & 1], k[n >> 2])];
-    return sum;
+    const Vec3<float> f = within(p, x, y, z);
+    const int x1 = beyond(x, level.x), y1 = beyond(y, level.y), z1 = beyond(z, level.z);
+    const auto row = [&](int j, int k) {
+      const float* v = nodes + level.index(0, j, k);
+      return v[x] + f.x * (v[x1] - v[x]);
+    };
+    const float near = row(y, z), near_up = row(y1, z), far = row(y, z1), far_up = row(y1, z1);
+    const float a = near + f.y * (near_up - near), b = far + f.y * (far_up - far);
+    return a + f.z * (b - a);
+  }
+  /// What the nodes of a block get of its particles, from the sums of value times 1, x, y, xy, z,
+  /// xz, yz and xyz: along each axis what is away from a node is not at the one before it.
+  DRENCH_HD static void to_nodes(float sum[8]) {
+    for (int axis = 1; axis < 8; axis *= 2)
+      for (int n = 0; n < 8; ++n)
+        if (!(n & axis)) sum[n] -= sum[n + axis];
   }
 
  private:
@@ -73,8 +76,8 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
         if (!*awake) return;
         const GridShape& g = finest.grid;
         const Vec3<int> size{1 << finest.shift.x, 1 << finest.shift.y, 1 << finest.shift.z};
-        const int x = b % nb.x * size.x, y = b / nb.x % nb.y * size.y,
-                  z = b / (nb.x * nb.y) * size.z;
+        const Vec3<int> at{b % nb.x, b / nb.x % nb.y, b / (nb.x * nb.y)};
+        const int x = at.x * size.x, y = at.y * size.y, z = at.z * size.z;
         const int end_x = x + size.x < g.nx ? x + size.x : g.nx;
         float sum[8] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
         for (int cz = z; cz < z + size.z && cz < g.nz; ++cz)
@@ -83,13 +86,13 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
             for (int i = row[x]; i < row[end_x]; ++i) {
               const float v = value(i);
               if (v == 0.f) continue;
-              const Float4 p = place[i];
-              float w[8];
-              FinestNodes::weights(finest.within(p, b % nb.x, b / nb.x % nb.y, b / (nb.x * nb.y)),
-                                   w);
-              for (int k = 0; k < 8; ++k) sum[k] += w[k] * v;
+              const Vec3<float> f = finest.within(place[i], at.x, at.y, at.z);
+              const float vx = v * f.x, vy = v * f.y, vz = v * f.z, vxy = vx * f.y;
+              sum[0] += v, sum[1] += vx, sum[2] += vy, sum[3] += vxy;
+              sum[4] += vz, sum[5] += vx * f.z, sum[6] += vy * f.z, sum[7] += vxy * f.z;
             }
           }
+        FinestNodes::to_nodes(sum);
         for (int k = 0; k < 8; ++k) partial[8 * b + k] = sum[k];
       });
   const NodeLevel level = h.level[0];
@@ -259,10 +262,20 @@ inline void choose_levels(State& state) {
       DRENCH_LAMBDA(double sum) { control->levels = !sheets && sum <= most; });
 }
 
+/// Is there nothing to do on the levels? The GPU's host does not ask: launches do nothing there.
+inline bool no_levels(const State& state) {
+#if defined(__CUDACC__)
+  return state.contact.near > 0;
+#else
+  return !state.pressure.control.data()->levels;
+#endif
+}
+
 /// Shapes and stiffnesses of all levels.
 inline void prepare_levels(State& state) {
   shape_levels(state);
   choose_levels(state);
+  if (no_levels(state)) return;
   push_evenly(state);
   Hierarchy& h = state.pressure.hierarchy;
   float *inverse = h.inverse.data(), *uneven = h.answer.data();
@@ -292,6 +305,7 @@ inline void prepare_levels(State& state) {
 
 /// z on the nodes of the finest level.
 inline void correct_on_levels(State& state, const FreeGradient& gradient) {
+  if (no_levels(state)) return;
   Hierarchy& h = state.pressure.hierarchy;
   float* answer = h.answer.data();
   const float* inverse = h.inverse.data();
