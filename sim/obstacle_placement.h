@@ -11,6 +11,7 @@ struct ObstaclePlacement {
   float half[3] = {0, 0, 0};        // box: half its edges; sphere: its radius
   float clearance = 0;              // no particle ends a step nearer
   float friction = 0;               // Coulomb's coefficient of sheets on it
+  float wetting = 0;                // cosine of its contact angle
   float no_slip = 0;                // 1: it holds the fluid beside it; 0: fluid slips along it
   float centre[2][3] = {};          // where its own origin stands
   float axis[2][9] = {};            // its own axes, one after the other

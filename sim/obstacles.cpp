@@ -206,6 +206,7 @@ ObstaclePlacement ObstacleSet::placement(Entry& entry, double begin, double end)
   const bool field = p.shape == ObstacleShape::field;
   p.clearance = float((field ? 0.5 * voxel : 0.1) * shot_.fluid.spacing);
   p.friction = float(o.friction);
+  p.wetting = float(wetting_of(o.contact_angle_deg));
   p.no_slip = holds_fluid(shot_, o.slip) ? 1.f : 0.f;
   if (entry.deforms) {
     const Bracket& bracket = *entry.bracket;

@@ -28,6 +28,8 @@ struct Parameters {
   float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
   float gravity[3] = {0, 0, 0};       // m/s^2
   float surface_tension = 0;          // N/m
+  float wetting = 0;                  // cosine of the contact angle at the domain's walls
+  bool wets = false;                  // at anything at another angle than a right one
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local

@@ -139,6 +139,14 @@ void set_viscosity(const Shot& shot, Parameters& p) {
   }
 }
 
+void set_wetting(const Shot& shot, Parameters& p) {
+  if (!p.incompressible || shot.fluid.surface_tension == 0) return;
+  p.wetting = float(wetting_of(shot.domain.contact_angle_deg));
+  for (const Axis axis : shot.domain.axis) p.wets |= axis == Axis::walls && p.wetting != 0;
+  for (const Obstacle& o : shot.obstacle) p.wets |= wetting_of(o.contact_angle_deg) != 0;
+  for (const Cloth& c : shot.cloth) p.wets |= wetting_of(c.contact_angle_deg) != 0;
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
                             const std::vector<MeshEmitter>& emitters,
                             const ObstacleSet& obstacles) {
@@ -181,6 +189,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.fluid_drag = float(shot.wind.fluid_drag);
   }
   p.surface_tension = float(shot.fluid.surface_tension);
+  set_wetting(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
   p.fixed_dt = shot.time_step;
   return p;
@@ -327,6 +336,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     t.sheet.push_back(index);
     t.half_thickness.push_back(float(0.5 * cloth.thickness));
     t.no_slip.push_back(holds_fluid(shot, cloth.slip) ? 1.f : 0.f);
+    t.wetting.push_back(float(wetting_of(cloth.contact_angle_deg)));
     t.rest_centroid.push(float(centre.x - frame.origin[0]), float(centre.y - frame.origin[1]),
                          float(centre.z - frame.origin[2]));
   }

@@ -253,6 +253,7 @@ class BackendSolver : public Solver {
       if (state_.parameters.full) state_.pressure.way.resize(n);
     }
     if (allocated_ & column_tension) state_.tension.normal.resize(n);
+    if (state_.parameters.wets) state_.tension.wetting.resize(n);
     if (allocated_ & column_drag) {
       ViscosityState& v = state_.viscosity;
       for (Column<Float4>* c : {&v.body_rate, &v.body_cross, &v.body_source}) c->resize(n);
@@ -303,6 +304,7 @@ class BackendSolver : public Solver {
     from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
     from_host(c.half_thickness, t.half_thickness);
     if (state_.parameters.no_slip_sheets) from_host(c.no_slip, t.no_slip);
+    if (state_.parameters.wets) from_host(c.wetting, t.wetting);
     upload(c.rest_centroid, t.rest_centroid);
     from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry),
         from_host(c.rim, t.rim);

@@ -44,6 +44,7 @@ struct ClothTopology {
   std::vector<int> corner, neighbour, sheet;  // 3, 3, 1 a triangle
   std::vector<float> half_thickness;
   std::vector<float> no_slip;    // of a triangle: 1 where it holds the fluid beside it, else 0
+  std::vector<float> wetting;    // of a triangle: cosine of its contact angle
   std::vector<float> air_share;  // of a vertex: area its mass stands for / a third of its triangles
   HostVec rest_centroid;
   std::vector<int> fan_start, fan_entry, rim;

@@ -77,6 +77,7 @@ struct ClothState {
   Column<int> neighbour;             // 3 a triangle: across edges ab, bc, ca; -1 is a free edge
   Column<int> sheet;                 // of a triangle
   Column<float> half_thickness;      // m, of a triangle
+  Column<float> wetting;             // of a triangle: cosine of its contact angle; or empty
   Column<float> no_slip;             // of a triangle: 1 where it holds fluid; only where any does
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
@@ -247,7 +248,8 @@ struct PressureState {
 
 /// Columns of surface tension (passes/surface_tension.h), rebuilt every step.
 struct TensionState {
-  Column<Float4> normal;  // unit, outwards; w: 0 inside
+  Column<Float4> normal;   // unit, outwards; w: 0 inside
+  Column<Float4> wetting;  // unit normal of a wall; w: its surface (passes/wetting.h). Or empty
 };
 
 /// Obstacles and their images as the step has them (obstacle_placement.h) and the level sets they

@@ -40,6 +40,7 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("drag of obstacles and sheets", v.body_rate, v.body_cross, v.body_source,
                           state.cloth.no_slip, state.cloth_system.drag_factor));
   all.push_back(memory_of("surface tension", state.tension.normal));
+  all.push_back(memory_of("contact angles", state.tension.wetting, state.cloth.wetting));
   all.push_back(memory_of("remembered sides", f.memory_triangle, f.memory_side, f.owed));
   all.push_back(memory_of("nearest triangles", f.triangle, f.far_by, f.weight_b, f.weight_c,
                           f.normal, f.sheet_distance, f.plane, f.edge, f.shaded, f.cloth_share));

@@ -14,6 +14,7 @@
 #include "sim/passes/sort_particles.h"
 #include "sim/passes/surface_tension.h"
 #include "sim/passes/viscosity_solve.h"
+#include "sim/passes/wetting.h"
 #include "sim/passes/wind_on_cloth.h"
 #include "sim/passes/wind_on_fluid.h"
 
@@ -134,6 +135,7 @@ bool around_obstacles(const Parameters& p, bool cloth) {
 }
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
 bool tense(const Parameters& p, bool cloth) { return projected(p, cloth) && p.surface_tension > 0; }
+bool wetting(const Parameters& p, bool cloth) { return tense(p, cloth) && p.wets; }
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
@@ -179,6 +181,8 @@ const Pass all_passes[] = {
      find_neighbours},
     {"apply_surface_tension", tense, column_velocity | column_projection,
      column_velocity | column_projection | column_tension, apply_surface_tension},
+    {"apply_contact_angles", wetting, column_velocity | column_projection | column_tension,
+     column_velocity | column_projection | column_tension, apply_contact_angles},
     {"smooth_velocities", smoothed, column_velocity | column_projection,
      column_velocity | column_projection, smooth_velocities},
     {"project_full_box", without_surface, moving | column_density | column_projection,

@@ -67,6 +67,7 @@ struct Domain {
   std::array<Axis, 3> axis{Axis::walls, Axis::walls, Axis::walls};
   Slip slip = Slip::automatic;
   WallVelocity wall_velocity;
+  double contact_angle_deg = 90;  // of the fluid's surface at the walls, within the fluid
 };
 
 struct FluidBox {  // a lattice of round((max-min)/spacing) particles a side
@@ -158,6 +159,7 @@ struct Cloth {
   double retardation_time = 0;      // s, viscosity over stiffness of each spring (Kelvin-Voigt)
   double thickness = 0.001;         // m
   Slip slip = Slip::automatic;      // of fluid along it
+  double contact_angle_deg = 90;    // of the fluid's surface at it, within the fluid
   std::string material = "cotton";
 };
 
@@ -177,6 +179,7 @@ struct Obstacle {
   double scale = 1;                    // mesh: of its coordinates, to m
   double friction = 0.3;               // Coulomb's coefficient of cloth on it
   Slip slip = Slip::automatic;         // of fluid along it
+  double contact_angle_deg = 90;       // of the fluid's surface at it, within the fluid
   std::string material = "ground";
   bool visible = true;
 };
@@ -328,6 +331,10 @@ inline bool is_incompressible(const Shot& shot) {
 inline bool holds_fluid(const Shot& shot, Slip slip) {
   if (slip != Slip::automatic) return slip == Slip::none;
   return std::sqrt(shot.fluid.kinematic_viscosity * 1.0) >= shot.fluid.spacing;  // m after 1 s
+}
+/// Cosine of a contact angle, 0 of a right one.
+inline double wetting_of(double contact_angle_deg) {
+  return contact_angle_deg == 90 ? 0 : std::cos(contact_angle_deg * 3.14159265358979323846 / 180);
 }
 inline double support_ratio(const Shot& shot) {
   if (shot.fluid.support_ratio > 0) return shot.fluid.support_ratio;

@@ -82,6 +82,11 @@ std::vector<Parameter> shot_rows() {
                          "spacing, or if a wall moves; thinner layers cannot be resolved: free")
           .one_of({"automatic", "free", "none"}),
 
+      row<&Domain::contact_angle_deg>(
+          "domain", "contact_angle_deg", "deg", {30, 150}, simulate,
+          "at which the fluid's surface meets these walls, measured within the fluid, where there "
+          "is fluid.surface_tension: below 90 it wets, above it beads"),
+
       row<&WallVelocity::x_low>("domain.wall_velocity", "x_low", "m/s", speed, simulate,
                                 "of the wall at min x; its own x must be 0"),
       row<&WallVelocity::x_high>("domain.wall_velocity", "x_high", "m/s", speed, simulate,
@@ -121,7 +126,7 @@ std::vector<Parameter> fluid_rows() {
       row<&Fluid::surface_tension>(
           "fluid", "surface_tension", "N/m", {0, 100}, simulate,
           "of the incompressible solver: surface tension against air; water has 0.072. Surfaces "
-          "meet walls, obstacles and sheets at a right angle"),
+          "meet walls, obstacles and sheets at their contact_angle_deg"),
       row<&Fluid::artificial_viscosity>(
           "fluid", "artificial_viscosity", "", {0, 10}, simulate,
           "of the weakly compressible solver: alpha of Monaghan 1992; 0 is none"),
@@ -196,6 +201,10 @@ std::vector<Parameter> cloth_rows() {
                         "with the sheet, which it drags along). automatic is as that of "
                         "domain.slip")
           .one_of({"automatic", "free", "none"}),
+      row<&Cloth::contact_angle_deg>(
+          "cloth", "contact_angle_deg", "deg", {30, 150}, simulate,
+          "at which the fluid's surface meets it, measured within the fluid, where there "
+          "is fluid.surface_tension: below 90 it wets, above it beads"),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
@@ -249,6 +258,10 @@ std::vector<Parameter> obstacle_rows() {
                            "moves with the surface). automatic is as that of domain.slip, but that "
                            "motion does not matter")
           .one_of({"automatic", "free", "none"}),
+      row<&Obstacle::contact_angle_deg>(
+          "obstacle", "contact_angle_deg", "deg", {30, 150}, simulate,
+          "at which the fluid's surface meets it, measured within the fluid, where there "
+          "is fluid.surface_tension: below 90 it wets, above it beads"),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
   };

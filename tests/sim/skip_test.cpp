@@ -135,5 +135,32 @@ TEST(Skip, RefreshChangesNoBit) {
   EXPECT_EQ(a.cloth_position.y, b.cloth_position.y);
 }
 
+/// Half a ball on a plane.
+Shot sessile(double angle_deg, double tension) {
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible;
+  shot.fluid.spacing = 0.001, shot.fluid.surface_tension = tension;
+  shot.fluid.sphere.push_back({V3d(0), 0.005});
+  Obstacle& plane = shot.obstacle.emplace_back();
+  plane.type = ObstacleType::plane, plane.contact_angle_deg = angle_deg;
+  return shot;
+}
+
+bool has_contact_angles(const Shot& shot) {
+  const Stepper run(shot);
+  bool any = false;
+  for (const sim::PassInfo& pass : run.solver->plan()) any |= pass.name == "apply_contact_angles";
+  return any;
+}
+
+TEST(Skip, OnlyOtherAnglesThanRightOnesOfATenseFluidHaveAPass) {
+  EXPECT_TRUE(has_contact_angles(sessile(60, 0.072)));
+  EXPECT_FALSE(has_contact_angles(sessile(90, 0.072)));
+  EXPECT_FALSE(has_contact_angles(sessile(60, 0)));
+  Shot far = sessile(90, 0.072);  // walls that there are none of
+  far.domain.axis = {Axis::open, Axis::open, Axis::open}, far.domain.contact_angle_deg = 60;
+  EXPECT_FALSE(has_contact_angles(far));
+}
+
 }  // namespace
 }  // namespace drench::sim_tests

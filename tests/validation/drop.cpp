@@ -288,4 +288,95 @@ Rounding cube_to_sphere(int side) {
   return result;
 }
 
+namespace {
+
+/// deg, of a cap of this volume: h from V = pi h^2 (3 R - h) / 3, cos = 1 - h / R.
+double angle_by_height(double volume, double height) {
+  const double radius = (3 * volume / (pi * height * height) + height) / 3;
+  return std::acos(std::clamp(1 - height / radius, -1., 1.)) * 180 / pi;
+}
+/// The same from how high its centre of mass stands, 3 (2 R - h)^2 / (4 (3 R - h)) above the
+/// sphere's centre, by halving.
+double angle_by_centre(double volume, double centre) {
+  double low = 1, high = 179;
+  for (int k = 0; k < 60; ++k) {
+    const double angle = 0.5 * (low + high), c = std::cos(angle * pi / 180);
+    const double r = std::cbrt(3 * volume / (pi * (2 + c) * (1 - c) * (1 - c))), h = r * (1 - c);
+    const double off = 3 * std::pow(2 * r - h, 2) / (4 * (3 * r - h));  // from the sphere's centre
+    (off - (r - h) < centre ? low : high) = angle;
+  }
+  return low;
+}
+
+/// On y = 0; on a wall of the domain a block of that volume.
+Shot half_a_ball(double size, double spacing, double angle_deg, Ground ground) {
+  Shot shot = weightless(spacing);
+  shot.fluid.kinematic_viscosity = 3e-4;
+  if (ground == Ground::wall) {
+    shot.domain.axis[1] = Axis::walls, shot.domain.min.y = 0;
+    shot.domain.slip = Slip::free, shot.domain.contact_angle_deg = angle_deg;
+    const int wide = int(std::round(1.6 * size / spacing));
+    sim_tests::add_box(shot, V3d(-0.5 * wide * spacing, 0, -0.5 * wide * spacing),
+                       {wide, (wide + 1) / 2, wide});
+    return shot;
+  }
+  shot.fluid.sphere.push_back({V3d(0), size});
+  if (ground == Ground::plane) {
+    Obstacle& plane = shot.obstacle.emplace_back();
+    plane.type = ObstacleType::plane, plane.slip = Slip::free, plane.contact_angle_deg = angle_deg;
+    return shot;
+  }
+  shot.fluid.sphere.clear();
+  const int wide = int(std::round(1.6 * size / spacing));
+  sim_tests::add_box(shot, V3d(-0.5 * wide, 0.1, -0.5 * wide) * spacing,
+                     {wide, (wide + 1) / 2, wide});
+  Cloth& sheet = sim_tests::add_sheet(shot, 6 * size, -0.05 * spacing, 12);
+  sheet.thickness = 0.1 * spacing, sheet.slip = Slip::free, sheet.contact_angle_deg = angle_deg;
+  ClothPin all;
+  for (uint32_t v = 0; v < 13 * 13; ++v) all.vertices.push_back(v);
+  sheet.pin.push_back(all);
+  return shot;
+}
+
+}  // namespace
+
+Sessile sessile_drop(double radius, double angle_deg, Ground ground) {
+  const double size = 0.005, a = size / radius, unit = 2 * pi / rayleigh(size);
+  const Shot shot = half_a_ball(size, a, angle_deg, ground);
+  Stepper run(shot);
+  Sessile result;
+  V3d given(0);
+  const double volume = double(run.solver->particles()) * a * a * a;
+  double mean_centre = 0, mean_height = 0, time = 0, square = 0;
+  while (run.time < 6 * unit) {
+    run.step();
+    for (const sim::ObstacleImpulse& to : run.solver->obstacle_impulses())
+      given += V3d(to.impulse[0], to.impulse[1], to.impulse[2]);
+    if (run.time < 5 * unit) continue;
+    const sim::HostState state = run.solver->save();
+    double centre = 0, top = -1, n = double(state.id.size());
+    const double dt = run.limits.step;
+    for (size_t i = 0; i < state.id.size(); ++i) {
+      const double y = run.scene.frame.to_world(1, state.position.y[i]);
+      centre += y / n, top = std::max(top, y);
+      square += sim_tests::at(state.velocity, i).length2() / n * dt;
+    }
+    mean_centre += centre * dt, mean_height += (top + a / 2) * dt, time += dt;
+  }
+  result.by_centre = angle_by_centre(volume, mean_centre / time);
+  result.by_height = angle_by_height(volume, mean_height / time);
+  const double speed = size * rayleigh(size);
+  result.speed = std::sqrt(square / time) / speed;
+  const sim::HostState state = run.solver->save();
+  const double mass = run.scene.parameters.particle_mass * double(state.id.size());
+  result.lost = (sim_tests::total_momentum(run.scene, state) + given).length() / (mass * speed);
+  result.particles = run.solver->particles();
+  for (size_t i = 0; i < state.id.size(); ++i)
+    result.away += V3d(run.scene.frame.to_world(0, state.position.x[i]),
+                       run.scene.frame.to_world(1, state.position.y[i]),
+                       run.scene.frame.to_world(2, state.position.z[i]))
+                       .length() > 3 * size;
+  return result;
+}
+
 }  // namespace drench::validation
