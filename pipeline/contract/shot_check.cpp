@@ -236,7 +236,10 @@ class Checker {
            "explicit pressures alone. Use coupling.scheme = \"exact\" or fluid.solver = "
            "\"weakly_compressible\"");
     }
-    if (fluid.surface_tension > 0) check_surface_tension();
+    if (fluid.surface_tension > 0)
+      check_surface_tension();
+    else
+      check_right_angles();
     if (fluid.support_ratio > 0 && fluid.support_ratio < 1.2) {
       fail("fluid.support_ratio",
            fmt::format("support radius is {} m (support_ratio {}) but fluid.spacing is {} m; "
@@ -271,6 +274,23 @@ class Checker {
                          shot_.fluid.support_ratio),
              "Leave fluid.support_ratio at 0");
     }
+  }
+
+  /// What pulls fluid to another angle is a share of the surface's tension.
+  void check_right_angles() const {
+    const auto check = [&](const std::string& path, double degrees) {
+      if (wetting_of(degrees) == 0) return;
+      fail(path + ".contact_angle_deg",
+           fmt::format("{}.contact_angle_deg is {} but fluid.surface_tension is 0, so that nothing "
+                       "pulls the fluid there. Set fluid.surface_tension (0.072 for water), or "
+                       "remove the angle",
+                       path, degrees));
+    };
+    check("domain", shot_.domain.contact_angle_deg);
+    for (size_t i = 0; i < shot_.obstacle.size(); ++i)
+      check(fmt::format("obstacle[{}]", i), shot_.obstacle[i].contact_angle_deg);
+    for (size_t i = 0; i < shot_.cloth.size(); ++i)
+      check(fmt::format("cloth[{}]", i), shot_.cloth[i].contact_angle_deg);
   }
 
   void check_box(size_t i) const {

@@ -99,6 +99,10 @@ TEST_F(ShotError, NamesPeriodicAxesThatDoNotFit) {
        {"scene.toml", "fluid.surface_tension", "weakly compressible", "incompressible"}},
       {"[fluid]\nsurface_tension = 0.072\nsupport_ratio = 3\n",
        {"scene.toml:5", "fluid.surface_tension", "support_ratio is 3", "Leave"}},
+      {"[domain]\ncontact_angle_deg = 60\n",
+       {"scene.toml:5", "domain.contact_angle_deg is 60", "fluid.surface_tension is 0", "0.072"}},
+      {"[[obstacle]]\ntype = \"plane\"\ncontact_angle_deg = 120\n",
+       {"scene.toml:6", "obstacle[0].contact_angle_deg is 120", "Set fluid.surface_tension"}},
       {"[fluid]\nsolver = \"incompressible\"\n[coupling]\nscheme = \"paper\"\n[[cloth]]\n",
        {"scene.toml:5", "fluid.solver", "paper", "weakly_compressible"}},
       // 0.08 m are less than two supports of 2.15 spacings.
