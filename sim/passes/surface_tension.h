@@ -11,7 +11,7 @@
 // these stand: without it a drop at rest stirs twice as much.
 //
 // sigma is N/m by one constant k, measured: a drop's period and its inner pressure meet Rayleigh
-// and Laplace with the same one, at three resolutions (docs/benchmarks.md, fluid_drop).
+// and Laplace with the same one, at three resolutions (docs/surface_tension.md).
 // Walls, obstacles and sheets are mirrors: surfaces meet them at a right angle.
 
 #include "sim/passes/mirror_images.h"
