@@ -38,6 +38,9 @@ Row grid_pins_row() {
 }
 
 constexpr Limits share{0, 1};
+constexpr const char* contact_angle =
+    "at which the fluid's surface meets it, measured within the fluid, where there is "
+    "fluid.surface_tension: below 90 it wets, above it beads";
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
 constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;         // bits of ProbeType
 constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
@@ -82,10 +85,8 @@ std::vector<Parameter> shot_rows() {
                          "spacing, or if a wall moves; thinner layers cannot be resolved: free")
           .one_of({"automatic", "free", "none"}),
 
-      row<&Domain::contact_angle_deg>(
-          "domain", "contact_angle_deg", "deg", {30, 150}, simulate,
-          "at which the fluid's surface meets these walls, measured within the fluid, where there "
-          "is fluid.surface_tension: below 90 it wets, above it beads"),
+      row<&Domain::contact_angle_deg>("domain", "contact_angle_deg", "deg", {30, 150}, simulate,
+                                      contact_angle),
 
       row<&WallVelocity::x_low>("domain.wall_velocity", "x_low", "m/s", speed, simulate,
                                 "of the wall at min x; its own x must be 0"),
@@ -201,10 +202,8 @@ std::vector<Parameter> cloth_rows() {
                         "with the sheet, which it drags along). automatic is as that of "
                         "domain.slip")
           .one_of({"automatic", "free", "none"}),
-      row<&Cloth::contact_angle_deg>(
-          "cloth", "contact_angle_deg", "deg", {30, 150}, simulate,
-          "at which the fluid's surface meets it, measured within the fluid, where there "
-          "is fluid.surface_tension: below 90 it wets, above it beads"),
+      row<&Cloth::contact_angle_deg>("cloth", "contact_angle_deg", "deg", {30, 150}, simulate,
+                                     contact_angle),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
@@ -258,10 +257,8 @@ std::vector<Parameter> obstacle_rows() {
                            "moves with the surface). automatic is as that of domain.slip, but that "
                            "motion does not matter")
           .one_of({"automatic", "free", "none"}),
-      row<&Obstacle::contact_angle_deg>(
-          "obstacle", "contact_angle_deg", "deg", {30, 150}, simulate,
-          "at which the fluid's surface meets it, measured within the fluid, where there "
-          "is fluid.surface_tension: below 90 it wets, above it beads"),
+      row<&Obstacle::contact_angle_deg>("obstacle", "contact_angle_deg", "deg", {30, 150}, simulate,
+                                        contact_angle),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
   };
