@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "tests/sim/same_state.h"
 #include "tests/sim/support.h"
@@ -126,13 +127,21 @@ TEST(FullDomain, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
 }
 
 // Measured at 10, 20 and 30 layers: docs/benchmarks.md, wave_maker.
+// Ten layers boil, so that one run says little: these six made 0.955 to 1.200 of the theory's
+// waves, 0.997 to 1.058 times as long, and carried 0.693 to 0.733. Their means are 1.061, 1.024 and
+// 0.711.
 TEST(PlaneFlow, APistonMakesTheWavesOfLinearTheory) {
-  const validation::WaveMaker wave = validation::wave_maker(10, 1e-3);
-  // ten layers boil: six tolerances within 15 % of each other gave 0.955 to 1.200, 0.997 to 1.058
-  // and 0.693 to 0.733
-  EXPECT_NEAR(wave.made, 1, 0.3);
-  EXPECT_NEAR(wave.length, 1, 0.08);
-  EXPECT_GT(wave.carried, 0.65);
+  const std::vector<double> tolerances = {8.5e-4, 9.2e-4, 1e-3, 1.04e-3, 1.08e-3, 1.15e-3};
+  validation::WaveMaker mean{};
+  for (const double tolerance : tolerances) {
+    const validation::WaveMaker wave = validation::wave_maker(10, tolerance);
+    mean.made += wave.made / double(tolerances.size());
+    mean.length += wave.length / double(tolerances.size());
+    mean.carried += wave.carried / double(tolerances.size());
+  }
+  EXPECT_NEAR(mean.made, 1, 0.16);
+  EXPECT_NEAR(mean.length, 1, 0.05);
+  EXPECT_GT(mean.carried, 0.7);
 }
 
 }  // namespace
