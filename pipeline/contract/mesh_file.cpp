@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 
 #include "pipeline/contract/error.h"
@@ -46,11 +47,21 @@ void check_columns(const TriangleMesh& mesh) {
   const auto fits = [&](const auto& column) { return column.empty() || column.size() == n; };
   if (mesh.velocity.size() != n || !fits(mesh.normal) || !fits(mesh.uv) ||
       !fits(mesh.rest_position)) {
-    throw std::logic_error("write_mesh: vertex columns differ in length");
+    throw std::logic_error("mesh file: vertex columns differ in length");
   }
   for (const auto& t : mesh.triangle) {
-    if (std::max({t.x, t.y, t.z}) >= n) throw std::logic_error("write_mesh: index out of range");
+    if (std::max({t.x, t.y, t.z}) >= n) throw std::logic_error("mesh file: index out of range");
   }
+}
+
+void check_finite(const fs::path& path, const char* name, size_t vertex, const float* row,
+                  size_t width) {
+  if (std::all_of(row, row + width, [](float value) { return std::isfinite(value); })) return;
+  throw Error(
+      fmt::format("{}: {} of vertex {} is not finite; the file was not written. If `drench verify` "
+                  "finds the particles sound, this is a fault of the mesher: change surface.voxel "
+                  "a little and report the shot",
+                  path.string(), name, vertex));
 }
 
 std::string header_of(const TriangleMesh& mesh, const std::vector<VertexColumns>& columns) {
@@ -67,6 +78,54 @@ std::string header_of(const TriangleMesh& mesh, const std::vector<VertexColumns>
                      mesh.triangle.size());
 }
 
+/// Text of an OBJ, in one buffer that is never too small.
+class ObjText {
+ public:
+  explicit ObjText(const TriangleMesh& mesh)
+      : normals_(!mesh.normal.empty()),
+        digits_(std::to_string(mesh.position.size()).size()),
+        text_(comment.size() + (mesh.position.size() + mesh.normal.size()) * vertex_line +
+                  mesh.triangle.size() * (12 + 6 * digits_),
+              '\0'),
+        end_(text_.data()) {
+    put(comment);
+  }
+
+  void add_vertex(std::string_view keyword, const Imath::V3f& value) {
+    put(keyword);
+    for (const float number : {value.x, value.y, value.z}) {
+      put(" ");
+      end_ = std::to_chars(end_, end_ + longest_float, number).ptr;
+    }
+    put("\n");
+  }
+  void add_triangle(const Imath::Vec3<uint32_t>& t) {
+    put("f");
+    for (const uint32_t index : {t.x, t.y, t.z}) {
+      put(" ");
+      const char* const number = end_;
+      end_ = std::to_chars(end_, end_ + digits_, index + 1).ptr;
+      if (!normals_) continue;
+      const std::string_view again(number, size_t(end_ - number));
+      put("//");
+      put(again);
+    }
+    put("\n");
+  }
+  std::string_view text() const { return {text_.data(), size_t(end_ - text_.data())}; }
+
+ private:
+  void put(std::string_view part) { end_ = std::copy(part.begin(), part.end(), end_); }
+
+  static constexpr std::string_view comment = "# Drench: metres\n";
+  static constexpr size_t longest_float = 15;                             // -1.17549435e-38
+  static constexpr size_t vertex_line = 2 + 3 * (1 + longest_float) + 1;  // "vn", numbers, end
+  bool normals_;
+  size_t digits_;  // of the largest index
+  std::string text_;
+  char* end_;
+};
+
 }  // namespace
 
 WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
@@ -78,13 +137,7 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
     for (const VertexColumns& column : columns) {
       const size_t width = column.names.size();
       const float* const row = column.data + i * width;
-      if (!std::all_of(row, row + width, [](float value) { return std::isfinite(value); })) {
-        throw Error(
-            fmt::format("{}: {} of vertex {} is not finite; the file was not written. If "
-                        "`drench verify` finds the particles sound, this is a fault of the mesher: "
-                        "change surface.voxel a little and report the shot",
-                        path.string(), column.names[0], i));
-      }
+      check_finite(path, column.names[0], i, row, width);
       append(bytes, row, width * sizeof(float));
     }
   }
@@ -93,6 +146,21 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
     append(bytes, &t.x, 3 * sizeof(uint32_t));
   }
   return write_file_whole(path, bytes);
+}
+
+WrittenFile write_obj(const fs::path& path, const TriangleMesh& mesh) {
+  check_columns(mesh);
+  ObjText text(mesh);
+  for (size_t i = 0; i < mesh.position.size(); ++i) {
+    check_finite(path, "x", i, &mesh.position[i].x, 3);
+    text.add_vertex("v", mesh.position[i]);
+  }
+  for (size_t i = 0; i < mesh.normal.size(); ++i) {
+    check_finite(path, "nx", i, &mesh.normal[i].x, 3);
+    text.add_vertex("vn", mesh.normal[i]);
+  }
+  for (const auto& t : mesh.triangle) text.add_triangle(t);
+  return write_file_whole(path, text.text());
 }
 
 TriangleMesh read_mesh(const fs::path& path) {

@@ -85,12 +85,19 @@ class ObjReader {
   float next_float(std::string_view& line) const {
     std::string_view word = take_word(line);
     if (word.starts_with('+')) word.remove_prefix(1);
-    double value = 0;
+    // Rounded once, so that what write_obj wrote comes back equal; by way of double what float
+    // calls out of range because it is next to nothing.
+    float value = 0;
+    if (parsed(word, value) && std::isfinite(value)) return value;
+    double wide = 0;
+    if (parsed(word, wide) && std::isfinite(float(wide))) return float(wide);
+    fail(fmt::format("holds '{}' where a finite number is expected", word.substr(0, 40)));
+  }
+
+  template <class T>
+  static bool parsed(std::string_view word, T& value) {
     const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (code != std::errc() || end != word.data() + word.size() || !std::isfinite(float(value))) {
-      fail(fmt::format("holds '{}' where a finite number is expected", word.substr(0, 40)));
-    }
-    return float(value);
+    return code == std::errc() && end == word.data() + word.size();
   }
 
   /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far.

@@ -183,7 +183,7 @@ ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
 WrittenFile write_particles(const fs::path& path, const ParticleFrame& frame) {
   check_frame(path, frame);
   initialize_vdb();
-  return write_file_whole(path, vdb_bytes(grid_of(frame)));
+  return write_file_whole(path, vdb_bytes({grid_of(frame)}));
 }
 
 ParticleFrame read_particles(const fs::path& path) {

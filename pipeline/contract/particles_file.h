@@ -16,7 +16,10 @@ WrittenFile write_particles(const std::filesystem::path& path, const ParticleFra
 /// Particles sorted by id when the file has ids. @throws Error if damaged or not such a file.
 ParticleFrame read_particles(const std::filesystem::path& path);
 
-/// Narrow-band level set of a closed mesh, band of 3 voxels a side.
+/// Grid `surface`: narrow-band level set of a closed mesh, m, band of 3 voxels a side. Grid `v`:
+/// on the band's voxels the mesh's velocity at the closest point (beyond a voxel from the mesh one
+/// up to a voxel farther), m/s, half floats. Equal meshes give equal bytes, for any thread count.
+/// @throws Error naming the vertex if the file cannot hold where it is or how it moves.
 WrittenFile write_level_set(const std::filesystem::path& path, const TriangleMesh& mesh,
                             double voxel);
 

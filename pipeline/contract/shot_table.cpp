@@ -299,22 +299,8 @@ std::vector<Parameter> probe_rows() {
   };
 }
 
-std::vector<Parameter> surface_and_camera_rows() {
+std::vector<Parameter> camera_rows() {
   return {
-      row<&SurfaceSettings::voxel>("surface", "voxel", "", {0.05, 4}, mesh,
-                                   "edge of a grid cell / spacing"),
-      row<&SurfaceSettings::support>("surface", "support", "", {1, 8}, mesh,
-                                     "support radius of the kernel / spacing"),
-      row<&SurfaceSettings::iso_value>("surface", "iso_value", "", {0.01, 0.99}, mesh,
-                                       "of the colour field on the surface"),
-      row<&SurfaceSettings::smoothing>("surface", "smoothing", "", {0, 1000}, mesh,
-                                       "passes over the mesh; they keep its volume"),
-      row<&SurfaceSettings::level_set>("surface", "level_set", "", none, mesh,
-                                       "also write the surface as an OpenVDB level set"),
-      row<&SurfaceSettings::memory_gib>(
-          "surface", "memory_gib", "GiB", {0.01, 4096}, no_stage,
-          "a grid that would need more is refused; no part of the result"),
-
       row<&Camera::position>("camera", "position", "m", place, render, "may be animated"),
       row<&Camera::target>("camera", "target", "m", place, render, "looked at; may be animated"),
       row<&Camera::fov_deg>("camera", "fov_deg", "deg", {0.1, 170}, render,
@@ -542,7 +528,7 @@ const std::vector<Parameter>& parameters() {
     std::vector<Parameter> all;
     for (const auto& part :
          {shot_rows(), fluid_rows(), source_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
-          surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
+          surface_rows(), camera_rows(), light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

@@ -32,8 +32,8 @@ std::string content_uuid(std::string_view bytes) {
 /// With grid offsets, as a file has them: readers can then load one grid without the others.
 class SeekableArchive : public openvdb::io::Archive {
  public:
-  void write_to(std::ostream& stream, const openvdb::GridBase::Ptr& grid) const {
-    write(stream, openvdb::GridCPtrVec{grid}, /*seekable=*/true, openvdb::MetaMap());
+  void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const {
+    write(stream, grids, /*seekable=*/true, openvdb::MetaMap());
   }
 };
 
@@ -47,12 +47,12 @@ void initialize_vdb() {
   (void)done;
 }
 
-std::string vdb_bytes(const openvdb::GridBase::Ptr& grid) {
+std::string vdb_bytes(const openvdb::GridCPtrVec& grids) {
   initialize_vdb();
   SeekableArchive archive;
   archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
   std::ostringstream stream(std::ios::binary);
-  archive.write_to(stream, grid);
+  archive.write_to(stream, grids);
   if (!stream) throw std::bad_alloc();  // memory is all that an in-memory stream can lack
   std::string bytes = std::move(stream).str();
   if (bytes.size() < uuid_offset + uuid_size) throw std::logic_error("vdb_bytes: no header");
@@ -74,8 +74,7 @@ openvdb::GridBase::Ptr vdb_grid(std::string_view bytes) {
   std::istringstream stream{std::string(bytes), std::ios::binary};
   openvdb::io::Stream archive(stream, /*delayLoad=*/false);
   const openvdb::GridPtrVecPtr grids = archive.getGrids();
-  if (!stream || !grids || grids->size() != 1)
-    throw std::runtime_error("it does not hold one grid");
+  if (!stream || !grids || grids->empty()) throw std::runtime_error("it holds no grid");
   return grids->front();
 }
 

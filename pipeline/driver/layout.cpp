@@ -11,6 +11,7 @@ std::string cloth(const std::string& name, int frame) {
 std::string probe(const std::string& name) { return fmt::format("sim/probe.{}.csv", name); }
 std::string checkpoint(int frame) { return fmt::format("sim/checkpoint/frame.{:04d}.ckpt", frame); }
 std::string fluid_mesh(int frame) { return fmt::format("mesh/fluid.{:04d}.ply", frame); }
+std::string fluid_obj(int frame) { return fmt::format("mesh/fluid.{:04d}.obj", frame); }
 std::string level_set(int frame) { return fmt::format("mesh/fluid.{:04d}.vdb", frame); }
 std::string image(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.exr", shot, frame);

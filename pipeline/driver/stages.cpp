@@ -121,6 +121,9 @@ class ShotStages final : public Stages {
     const TriangleMesh surface = surface_frame(particles, shot_.surface);
     StageReport report;
     report.files.push_back(write_mesh(folder / layout::fluid_mesh(frame), surface));
+    if (shot_.surface.obj) {
+      report.files.push_back(write_obj(folder / layout::fluid_obj(frame), surface));
+    }
     if (shot_.surface.level_set) {
       report.files.push_back(write_level_set(folder / layout::level_set(frame), surface,
                                              shot_.surface.voxel * particles.spacing));

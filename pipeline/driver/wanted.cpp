@@ -150,6 +150,7 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.frames = std::move(frames);
   wanted.steps = std::move(steps);
   wanted.fluid = shot.fluid.present();
+  wanted.obj = wanted.fluid && shot.surface.obj;
   wanted.level_set = wanted.fluid && shot.surface.level_set;
   for (const Cloth& cloth : shot.cloth) wanted.cloth.push_back(cloth.name);
   wanted.sequence = sequence_digests(shot);
@@ -181,6 +182,7 @@ std::vector<std::string> probe_files(const Wanted& wanted) {
 std::vector<std::string> mesh_files(const Wanted& wanted, int frame) {
   std::vector<std::string> files;
   if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
+  if (wanted.obj) files.push_back(layout::fluid_obj(frame));
   if (wanted.level_set) files.push_back(layout::level_set(frame));
   return files;
 }

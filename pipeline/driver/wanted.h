@@ -31,6 +31,7 @@ struct Wanted {
   std::vector<int> frames;         // to deliver, sorted, at least one
   std::vector<Step> steps;         // steps that may run; a later one alone takes what lies there
   bool fluid = false;              // false: nothing to mesh
+  bool obj = false;                // mesh also writes an OBJ
   bool level_set = false;          // mesh also writes a VDB
   std::vector<std::string> cloth;  // names of the sheets
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <bit>
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include "pipeline/contract/ply_file.h"
 #include "tests/same_bits.h"
@@ -73,7 +76,68 @@ TEST(MeshFile, IsNotWrittenWithAValueThatIsNotFinite) {
   mesh.velocity[7].y = std::numeric_limits<float>::quiet_NaN();
   const std::string text = error_of([&] { write_mesh(folder / "sheet.ply", mesh); });
   EXPECT_NE(text.find("vertex 7"), std::string::npos) << text;
+  mesh.position[5].z = std::numeric_limits<float>::infinity();
+  const std::string obj = error_of([&] { write_obj(folder / "sheet.obj", mesh); });
+  EXPECT_NE(obj.find("vertex 5"), std::string::npos) << obj;
   EXPECT_TRUE(folder.names().empty());
+}
+
+/// Finite floats of any sign and exponent: bits drawn evenly.
+Imath::V3f any_floats(std::mt19937& random) {
+  Imath::V3f value;
+  for (int k = 0; k < 3; ++k) {
+    do value[k] = std::bit_cast<float>(uint32_t(random()));
+    while (!std::isfinite(value[k]));
+  }
+  return value;
+}
+
+TEST(ObjFile, ReturnsPositionsAndTrianglesBitForBit) {
+  const TemporaryFolder folder;
+  std::mt19937 random(1);
+  for (const uint32_t n :
+       {3u, 9u, 10u, 99u, 100000u}) {  // indices of as many digits as there is room
+    TriangleMesh mesh;
+    for (uint32_t i = 0; i < n; ++i) {
+      mesh.position.push_back(any_floats(random));
+      mesh.triangle.emplace_back(i, n - 1 - i, n - 1);
+    }
+    mesh.position[1] = {-0.f, -1.17549435e-38f, -1.40129846e-45f};
+    mesh.velocity.resize(n, Imath::V3f(0));
+    write_obj(folder / "mesh.obj", mesh);
+    expect_same_bits(read_mesh(folder / "mesh.obj"), mesh);
+  }
+}
+
+// Normals are not read by read_mesh: as text, the index of a vertex is that of its normal.
+TEST(ObjFile, HoldsANormalForEveryVertex) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh = full_sheet();
+  mesh.position.resize(3);
+  mesh.velocity.resize(3);
+  mesh.uv.clear();
+  mesh.rest_position.clear();
+  mesh.normal = {{0, 0.6f, 0.8f}, {1, 0, 0}, {0, -1, 1e-9f}};
+  mesh.triangle = {{0, 1, 2}, {2, 1, 0}};
+  write_obj(folder / "mesh.obj", mesh);
+  EXPECT_EQ(read_text(folder / "mesh.obj"),
+            "# Drench: metres\nv 0.1 0.01 1e-20\nv 1.1 0.01 1e-20\nv 2.1 0.01 1e-20\n"
+            "vn 0 0.6 0.8\nvn 1 0 0\nvn 0 -1 1e-09\nf 1//1 2//2 3//3\nf 3//3 2//2 1//1\n");
+  EXPECT_EQ(read_mesh(folder / "mesh.obj").triangle, mesh.triangle);
+}
+
+TEST(ObjFile, IsACommentWithoutAMesh) {
+  const TemporaryFolder folder;
+  write_obj(folder / "empty.obj", {});
+  EXPECT_EQ(read_text(folder / "empty.obj"), "# Drench: metres\n");
+}
+
+TEST(ObjFile, SaysThatItsFolderCannotBeWritten) {
+  const TemporaryFolder folder;
+  test::write_quickly(folder / "taken", "a file");
+  const std::string text = error_of([&] { write_obj(folder / "taken/mesh.obj", full_sheet()); });
+  EXPECT_NE(text.find("taken"), std::string::npos) << text;
+  EXPECT_NE(text.find("a file stands where a folder is needed"), std::string::npos) << text;
 }
 
 constexpr const char* ascii_quad =

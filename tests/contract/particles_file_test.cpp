@@ -151,7 +151,7 @@ TEST(ParticlesFile, RefusesAFileThatHoldsNoParticles) {
   const TemporaryFolder folder;
   TriangleMesh tetrahedron;
   tetrahedron.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  tetrahedron.velocity.resize(4);
+  tetrahedron.velocity.resize(4, Imath::V3f(0));
   tetrahedron.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   write_level_set(folder / "surface.vdb", tetrahedron, 0.05);
   const std::string text = error_of([&] { read_particles(folder / "surface.vdb"); });
@@ -160,7 +160,8 @@ TEST(ParticlesFile, RefusesAFileThatHoldsNoParticles) {
 
 TEST(LevelSetFile, GivesEqualBytesForAnyNumberOfThreads) {
   const TemporaryFolder folder;
-  const TriangleMesh sphere = test::unit_sphere(64, 128);
+  TriangleMesh sphere = test::unit_sphere(64, 128);
+  sphere.velocity = sphere.position;
   std::vector<Digest> digests;
   for (const size_t threads : {1, 2, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

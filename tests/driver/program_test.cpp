@@ -8,10 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "pipeline/contract/mesh_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/output_folder.h"
 #include "tests/driver/child.h"
 #include "tests/driver/tiny_shot.h"
+#include "tests/same_bits.h"
 
 namespace drench {
 namespace {
@@ -111,6 +113,32 @@ TEST(Program, MakesEveryFileTheDesignNames) {
   const Ended verified =
       run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder());
   EXPECT_EQ(verified.code, done) << verified.out;
+}
+
+// PLY is what rendering reads: OBJ and VDB asked for later are made without it.
+TEST(Program, WritesObjAndLevelSetOnRequestOnly) {
+  const TinyShot shot(3);
+  ASSERT_EQ(shot.run("run").code, done);
+  EXPECT_FALSE(fs::exists(shot.out() / layout::fluid_obj(1001)));
+  EXPECT_FALSE(fs::exists(shot.out() / layout::level_set(1001)));
+  std::vector<std::string> asked{"--set", "surface.obj=true", "--set", "surface.level_set=true"};
+  EXPECT_EQ(steps_run_by(shot, asked), (std::map<std::string, int>{{"mesh", 3}}));
+  EXPECT_EQ(steps_run_by(shot, asked), (std::map<std::string, int>{}));
+  const TriangleMesh ply = read_mesh(shot.out() / layout::fluid_mesh(1003));
+  const TriangleMesh obj = read_mesh(shot.out() / layout::fluid_obj(1003));
+  EXPECT_TRUE(same_bits(ply.position, obj.position) && same_bits(ply.triangle, obj.triangle));
+  const auto digests = shot.digests();
+  for (const std::string& file : {layout::fluid_obj(1002), layout::level_set(1002)}) {
+    flip_bit_quietly(shot.out() / file);
+    EXPECT_EQ(run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder()).code,
+              user_error);
+    EXPECT_EQ(steps_run_by(shot, asked), (std::map<std::string, int>{{"mesh", 1}})) << file;
+  }
+  EXPECT_EQ(shot.digests(), digests);
+  fs::remove_all(shot.out());
+  asked.insert(asked.end(), {"--threads", "1"});
+  ASSERT_EQ(shot.run("run", asked).code, done);
+  EXPECT_EQ(shot.digests(), digests);
 }
 
 TEST(Program, SaysThatASecondRunHasNothingToDo) {

@@ -17,7 +17,7 @@ Ended bash(const std::string& text) {
 }
 
 TEST(Scripts, AreValidBashAndExecutable) {
-  for (const char* name : {"run", "test", "bench", ".ci/run"}) {
+  for (const char* name : {"run", "test", "bench", ".ci/run", "tests/blender/run"}) {
     EXPECT_EQ(bash("bash -n \"$root/" + std::string(name) + "\"").code, 0) << name;
     EXPECT_EQ(bash("test -x \"$root/" + std::string(name) + "\"").code, 0) << name;
   }
