@@ -8,7 +8,8 @@
 
 namespace drench {
 
-/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z; faces of 3.
+/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z; faces
+/// of 3, contact if present.
 WrittenFile write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Reads PLY (ASCII or little-endian; polygons are cut into triangles) or OBJ, by extension. Input
