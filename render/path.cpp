@@ -93,6 +93,10 @@ class PathTracer {
         return;
       }
       const Surface surface = scene_.surface<kMoving>(state.ray, hit);
+      if (kWater && surface.contact) {
+        pass_contact(state, surface, hit.distance);
+        continue;
+      }
       going = scatter(state, surface, hit.distance) && survives(state);
     }
   }
@@ -106,6 +110,16 @@ class PathTracer {
       if (interface) return scatter_interface(state, surface);
     }
     return scatter_cloth(state, surface);
+  }
+
+  /// Straight on between water and the sheet it lies on; what little is between counts as water.
+  /// Light samples do not come through, so that whatever light is found beyond counts whole.
+  void pass_contact(PathState& state, const Surface& surface, float distance) {
+    if (dot(state.ray.direction, surface.geometric_normal) > 0) absorb(state, distance);
+    state.inside = true;
+    state.bsdf_pdf = 0;
+    state.ray.origin = surface.leave(state.ray.direction);
+    --state.vertices;  // no vertex of the path
   }
 
   void absorb(PathState& state, float distance) {
@@ -204,6 +218,13 @@ class PathTracer {
       add_direct(state, surface, bsdf);
     const ClothScatter next = sample_scatter(state, surface, bsdf);
     if (!(next.pdf > 0)) return false;
+    // What goes through a sheet leaves the water on this side; contact on the other says if it
+    // enters some there.
+    if constexpr (kWater)
+      if (dot(next.direction, surface.geometric_normal) *
+              dot(state.ray.direction, surface.geometric_normal) >
+          0)
+        state.inside = false;
     depart(state, surface, next.direction);
     state.throughput *= next.weight;
     state.survival *= bsdf.albedo();

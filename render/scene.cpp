@@ -46,6 +46,8 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
     fail(fmt::format("{} normals for {} vertices", mesh.normal.size(), n));
   if (!mesh.uv.empty() && mesh.uv.size() != n)
     fail(fmt::format("{} texture coordinates for {} vertices", mesh.uv.size(), n));
+  if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
+    fail(fmt::format("{} contacts for {} triangles", mesh.contact.size(), mesh.triangle.size()));
   for (size_t k = 0; k < n; ++k)
     if (!finite(mesh.position[k]) || (!mesh.velocity.empty() && !finite(mesh.velocity[k])))
       fail(fmt::format("vertex {} is not finite", k));
@@ -229,6 +231,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& what, uint32
   object.triangle = mesh.triangle;
   object.normal = mesh.normal.empty() ? smooth_normals(mesh) : mesh.normal;
   object.uv = mesh.uv;
+  object.contact = mesh.contact;
   object.material = material;
   const auto at = [&](double frames) {
     std::vector<V3f> moved = mesh.position;
@@ -356,6 +359,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
   s.material = &materials_[object.material];
+  s.contact = !object.contact.empty() && object.contact[hit.triangle];
   return s;
 }
 

@@ -19,6 +19,7 @@ struct SceneObject {
   std::vector<V3f> position, position_close;  // m; the last entry is padding for Embree
   std::vector<V3f> normal;                    // unit, per vertex; empty: flat
   std::vector<V2f> uv;                        // may be empty
+  std::vector<uint8_t> contact;               // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
@@ -43,6 +44,7 @@ struct Surface {
   V3f shading_normal;    // unit, in the hemisphere of geometric_normal
   V2f uv;
   const ShadingMaterial* material = nullptr;
+  bool contact = false;  // of the fluid with a sheet: no air meets water here
 
   /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error.
   V3f leave(const V3f& direction) const;

@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/error.h"
 #include "surfacing/pack.h"
+#include "surfacing/sheets.h"
 
 namespace drench::surfacing {
 namespace {
@@ -68,14 +69,15 @@ void splat(const V3f p, float weight, float step, FieldBlock& field) {
   }
 }
 
-void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel, FieldBlock& field,
-                    NearParticles& near) {
+void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel,
+                    const Sheets& sheets, FieldBlock& field, NearParticles& near) {
   field.value.fill(0.f);
   const float reach = particles.lattice.reach;
   gather_near(particles, field.block, block_edge - 1, reach, near);
   const float step = 1 / reach, scale = kernel.scale();
   for (size_t j = 0; j < near.size(); ++j)
     splat(V3f(near.x[j], near.y[j], near.z[j]) * step, near.weight[j] * scale, step, field);
+  if (sheets.near(field.block)) sheets.cut(field, kernel.iso_value);
   for (int row = 0; row < rows; ++row)
     field.inside[row] = static_cast<uint8_t>(
         not_less_bits(load(field.value.data() + row * block_edge), pack(kernel.iso_value)));
@@ -292,12 +294,13 @@ std::vector<float> weigh_particles(const BinnedParticles& particles, const Colou
 }
 
 ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior, InteriorBlocks mode,
-                           double max_bytes) {
+                           const std::vector<uint8_t>& interior, const Sheets& sheets,
+                           InteriorBlocks mode, double max_bytes) {
   BlockSet set = blocks_in_reach(particles);
   std::vector<BlockKey> wanted;
   for (size_t b = 0; b < set.key.size(); ++b)
-    if (mode == InteriorBlocks::evaluate || b >= interior.size() || !interior[b])
+    if (mode == InteriorBlocks::evaluate || b >= interior.size() || !interior[b] ||
+        sheets.near(block_of(set.key[b])))
       wanted.push_back(set.key[b]);
   ColourField field;
   field.stats.candidates = set.key.size();
@@ -316,7 +319,7 @@ ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel&
       field.block[first_new + k].block = block_of(wanted[k]);
     }
     tbb::parallel_for(first_new, field.block.size(), [&](size_t f) {
-      evaluate_block(particles, kernel, field.block[f], nears.local());
+      evaluate_block(particles, kernel, sheets, field.block[f], nears.local());
     });
     wanted = contradicted(set, field.block, first_new);
     field.stats.grown += wanted.size();

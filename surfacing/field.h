@@ -59,6 +59,8 @@ struct ColourField {
   FieldStats stats;
 };
 
+class Sheets;
+
 /// Marks occupied blocks that a count of particles calls full, with all their bins: 1, else 0.
 std::vector<uint8_t> count_interior(const BinnedParticles& particles);
 
@@ -69,9 +71,10 @@ std::vector<float> weigh_particles(const BinnedParticles& particles, const Colou
 
 /// Evaluates every block that may hold surface. Interior blocks are left out unless told otherwise,
 /// and taken in again wherever a neighbour's border has a point outside, until nothing changes.
+/// The field is cut around sheets; no block near one is interior.
 /// @throws Error when the blocks would take more than max_bytes.
 ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior, InteriorBlocks mode,
-                           double max_bytes);
+                           const std::vector<uint8_t>& interior, const Sheets& sheets,
+                           InteriorBlocks mode, double max_bytes);
 
 }  // namespace drench::surfacing

@@ -4,11 +4,13 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "surfacing/contact.h"
 #include "surfacing/extract.h"
 #include "surfacing/field.h"
 #include "surfacing/smooth.h"
@@ -112,9 +114,6 @@ Lattice lattice_of(const ParticleFrame& particles, const SurfaceSettings& settin
   return lattice;
 }
 
-/// Memory that the sorted particles take, bytes.
-double particle_bytes(size_t n) { return 36.0 * static_cast<double>(n); }
-
 class Stopwatch {
  public:
   double lap() {
@@ -126,45 +125,78 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// Vertices in metres of the world, with their columns.
-TriangleMesh world_mesh(LatticeMesh mesh, const Lattice& lattice, std::vector<V3f> velocity,
-                        std::vector<V3f> normal) {
+/// Memory that is left for what comes after the sorted particles, bytes.
+double memory_left(size_t n, double memory_gib) {
+  const double needed = 36.0 * static_cast<double>(n), max_bytes = memory_gib * (1 << 30);
+  if (needed <= max_bytes) return max_bytes - needed;
+  throw Error(fmt::format("surfacing: {} particles need {:.3g} GiB; surface.memory_gib is {}", n,
+                          needed / (1 << 30), memory_gib));
+}
+
+/// Smooth, on its sheets, with normals; positions in voxels still.
+struct Finished {
+  LatticeMesh mesh;
+  SheetContact contact;
+  std::vector<V3f> normal;
+};
+Finished finish(LatticeMesh extracted, const Sheets& sheets, const Lattice& lattice, int passes,
+                bool measure_volume, SurfaceStats& report) {
+  constexpr float offset = 0.02f;  // spacings before a sheet
+  Finished result{std::move(extracted), {}, {}};
+  LatticeMesh& mesh = result.mesh;
+  const VertexRings rings = rings_of(mesh);
+  const Components parts = components_of(mesh);
+  result.contact = find_contact(mesh, rings, sheets);
+  smooth_mesh(mesh, rings, parts, passes);
+  report.crossing =
+      lay_on_sheets(mesh, result.contact, sheets, offset * lattice.voxels_per_spacing);
+  result.normal =
+      sheets.empty() ? normals_of(mesh, rings) : free_normals(mesh, rings, result.contact);
+  smooth_normals(result.normal, rings, passes > 0 ? 1 : 0);
+  report.components = parts.size();
+  report.vertices = mesh.position.size();
+  report.triangles = mesh.triangle.size();
+  if (measure_volume)
+    for (const double volume : volumes_of(mesh, rings, parts))
+      report.volume += volume * std::pow(lattice.voxel, 3);
+  return result;
+}
+
+/// In metres of the world, with all columns.
+TriangleMesh world_mesh(Finished finished, const Lattice& lattice, std::vector<V3f> velocity) {
   TriangleMesh result;
   result.velocity = std::move(velocity);
-  result.normal = std::move(normal);
-  result.triangle = std::move(mesh.triangle);
-  result.position = std::move(mesh.position);
+  result.normal = std::move(finished.normal);
+  result.triangle = std::move(finished.mesh.triangle);
+  result.position = std::move(finished.mesh.position);
   tbb::parallel_for(tbb::blocked_range<size_t>(0, result.position.size()), [&](const auto& range) {
     for (size_t v = range.begin(); v < range.end(); ++v)
       for (int axis = 0; axis < 3; ++axis)
         result.position[v][axis] = lattice.to_metres(result.position[v][axis], axis);
   });
+  if (finished.contact.side.empty()) return result;
+  result.contact.reserve(result.triangle.size());
+  for (const Triangle& t : result.triangle) result.contact.push_back(finished.contact.touches(t));
   return result;
 }
 
 }  // namespace
 
-TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings) {
-  return surface_frame(particles, settings, InteriorBlocks::skip, nullptr);
-}
-
 TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings,
-                           InteriorBlocks mode, SurfaceStats* stats) {
+                           std::span<const TriangleMesh> sheet_meshes, InteriorBlocks mode,
+                           SurfaceStats* stats) {
   SurfaceStats unused;
   SurfaceStats& report = stats ? *stats : unused;
   report = {};
   report.particles = particles.position.size();
   check_settings(particles, settings);
   if (particles.position.empty()) return {};
-  const double max_bytes = settings.memory_gib * (1 << 30);
-  if (particle_bytes(report.particles) > max_bytes)
-    throw Error(fmt::format("surfacing: {} particles need {:.3g} GiB; surface.memory_gib is {}",
-                            report.particles, particle_bytes(report.particles) / (1 << 30),
-                            settings.memory_gib));
+  const double left = memory_left(report.particles, settings.memory_gib);
   Stopwatch watch;
   BinnedParticles binned =
       bin_particles(particles.position, lattice_of(particles, settings, bounds_of(particles)));
   report.occupied_blocks = binned.block.size();
+  const Sheets sheets(sheet_meshes, binned);
   report.bin_s = watch.lap();
 
   const ColourKernel kernel{static_cast<float>(settings.support),
@@ -174,8 +206,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   binned.weight = weigh_particles(binned, kernel, interior);
   report.weight_s = watch.lap();
 
-  const double left = max_bytes - particle_bytes(report.particles);
-  ColourField field = evaluate_field(binned, kernel, interior, mode, left);
+  ColourField field = evaluate_field(binned, kernel, interior, sheets, mode, left);
   report.interior_blocks = field.stats.interior;
   report.evaluated_blocks = field.stats.evaluated;
   report.grown_blocks = field.stats.grown;
@@ -187,24 +218,19 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   field = ColourField{};
   report.extract_s = watch.lap();
 
-  const VertexRings rings = rings_of(mesh);
-  const Components parts = components_of(mesh);
-  smooth_mesh(mesh, rings, parts, settings.smoothing);
-  std::vector<V3f> normal = normals_of(mesh, rings);
-  smooth_normals(normal, rings, settings.smoothing > 0 ? 1 : 0);
-  report.components = parts.size();
-  report.vertices = mesh.position.size();
-  report.triangles = mesh.triangle.size();
-  if (stats)
-    for (const double volume : volumes_of(mesh, rings, parts))
-      report.volume += volume * std::pow(binned.lattice.voxel, 3);
+  Finished finished =
+      finish(std::move(mesh), sheets, binned.lattice, settings.smoothing, stats != nullptr, report);
   report.smooth_s = watch.lap();
 
   const float velocity_reach =
       std::min(2.5f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
-  std::vector<V3f> velocity = vertex_velocities(mesh, binned, particles.velocity, velocity_reach);
+  std::vector<V3f> velocity =
+      vertex_velocities(finished.mesh, binned, particles.velocity, velocity_reach);
+  move_with_sheets(finished.mesh, finished.contact, sheets, velocity);
   report.velocity_s = watch.lap();
-  return world_mesh(std::move(mesh), binned.lattice, std::move(velocity), std::move(normal));
+  TriangleMesh result = world_mesh(std::move(finished), binned.lattice, std::move(velocity));
+  report.contact = static_cast<size_t>(std::count(result.contact.begin(), result.contact.end(), 1));
+  return result;
 }
 
 }  // namespace drench

@@ -1,6 +1,8 @@
 #pragma once
 // Particles -> closed triangle mesh with velocities.
 
+#include <span>
+
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
 
@@ -17,6 +19,7 @@ struct SurfaceStats {
   size_t evaluated_blocks = 0, grown_blocks = 0;    // grown: added by the closure
   int closure_rounds = 0;
   size_t components = 0, vertices = 0, triangles = 0;
+  size_t contact = 0, crossing = 0;             // triangles on sheets, and through one all the same
   double volume = 0;                            // m^3, enclosed
   double bin_s = 0, weight_s = 0, field_s = 0;  // wall seconds of the steps
   double extract_s = 0, smooth_s = 0, velocity_s = 0;
@@ -27,6 +30,10 @@ struct SurfaceStats {
 /// @param particles  n >= 0 particles; positions in m, velocities in m/s, n each. Not modified.
 ///                   Densities are not read: where neighbours are missing is found from positions.
 /// @param settings   voxel and support in spacings; iso_value in (0, 1); smoothing passes >= 0.
+/// @param sheets     of cloth, with velocities. Fluid is cut apart where one goes through it and
+/// lies
+///                   0.02 spacings before it; faces between vertices that lie there are `contact`
+///                   and move with the sheet.
 /// @return closed manifold mesh, outward orientation, velocity in m/s interpolated from the
 /// particles
 ///         (a uniform or an affine motion comes out as it went in), unit normals; the lattice is
@@ -36,8 +43,9 @@ struct SurfaceStats {
 /// in
 ///         length, a setting is impossible, particles are spread beyond 2^24 voxels, or the blocks
 ///         and the mesh would need more than settings.memory_gib.
-TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings);
 TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings,
-                           InteriorBlocks interior, SurfaceStats* stats);
+                           std::span<const TriangleMesh> sheets = {},
+                           InteriorBlocks interior = InteriorBlocks::skip,
+                           SurfaceStats* stats = nullptr);
 
 }  // namespace drench

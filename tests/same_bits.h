@@ -23,6 +23,7 @@ inline void expect_same_bits(const TriangleMesh& a, const TriangleMesh& b) {
   EXPECT_TRUE(same_bits(a.uv, b.uv));
   EXPECT_TRUE(same_bits(a.rest_position, b.rest_position));
   EXPECT_TRUE(same_bits(a.triangle, b.triangle));
+  EXPECT_TRUE(same_bits(a.contact, b.contact));
 }
 
 }  // namespace drench::test

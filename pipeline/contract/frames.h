@@ -28,6 +28,7 @@ struct TriangleMesh {
   std::vector<Imath::V2f> uv;                   // cloth: texture and rest plane, or empty
   std::vector<Imath::V3f> rest_position;        // cloth: m, at rest, or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
+  std::vector<uint8_t> contact;                 // by triangle, 1: lies on a sheet; or empty
 };
 
 /// One sheet of cloth of one frame.

@@ -49,6 +49,8 @@ void check_columns(const TriangleMesh& mesh) {
       !fits(mesh.rest_position)) {
     throw std::logic_error("mesh file: vertex columns differ in length");
   }
+  if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
+    throw std::logic_error("write_mesh: as many contacts as triangles");
   for (const auto& t : mesh.triangle) {
     if (std::max({t.x, t.y, t.z}) >= n) throw std::logic_error("mesh file: index out of range");
   }
@@ -74,8 +76,8 @@ std::string header_of(const TriangleMesh& mesh, const std::vector<VertexColumns>
   }
   if (columns.empty()) header += "property float x\nproperty float y\nproperty float z\n";
   return header +
-         fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-                     mesh.triangle.size());
+         fmt::format("element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
+                     mesh.triangle.size(), mesh.contact.empty() ? "" : "property uchar contact\n");
 }
 
 /// Text of an OBJ, in one buffer that is never too small.
@@ -132,7 +134,7 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
   check_columns(mesh);
   const std::vector<VertexColumns> columns = columns_of(mesh);
   std::string bytes = header_of(mesh, columns);
-  bytes.reserve(bytes.size() + mesh.position.size() * 56 + mesh.triangle.size() * 13);
+  bytes.reserve(bytes.size() + mesh.position.size() * 56 + mesh.triangle.size() * 14);
   for (size_t i = 0; i < mesh.position.size(); ++i) {
     for (const VertexColumns& column : columns) {
       const size_t width = column.names.size();
@@ -141,9 +143,10 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
       append(bytes, row, width * sizeof(float));
     }
   }
-  for (const auto& t : mesh.triangle) {
+  for (size_t k = 0; k < mesh.triangle.size(); ++k) {
     bytes.push_back(3);
-    append(bytes, &t.x, 3 * sizeof(uint32_t));
+    append(bytes, &mesh.triangle[k].x, 3 * sizeof(uint32_t));
+    if (!mesh.contact.empty()) bytes.push_back(static_cast<char>(mesh.contact[k]));
   }
   return write_file_whole(path, bytes);
 }

@@ -8,7 +8,8 @@
 
 namespace drench {
 
-/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z; faces of 3.
+/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z; faces
+/// of 3, contact if present.
 WrittenFile write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Positions, normals if present, and triangles as Wavefront OBJ, for programs that read no PLY;

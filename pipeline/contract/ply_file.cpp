@@ -331,6 +331,7 @@ class PlyReader {
     if (std::count_if(element.properties.begin(), element.properties.end(), is_index_list) != 1) {
       fail("has faces without a list vertex_indices");
     }
+    std::vector<uint8_t> contact;
     for (uint64_t row = 0; row < element.count; ++row) {
       for (const Property& p : element.properties) {
         if (is_index_list(p)) {
@@ -338,10 +339,17 @@ class PlyReader {
         } else if (p.count_type) {
           skip_list(p);
         } else {
-          next_value(p.type);
+          const double value = next_value(p.type);
+          if (p.name == "contact") contact.push_back(value != 0);
         }
       }
     }
+    keep_contact(std::move(contact));
+  }
+
+  // Of polygons that were cut into triangles nobody knows which lies where.
+  void keep_contact(std::vector<uint8_t> contact) {
+    if (contact.size() == mesh_.triangle.size()) mesh_.contact = std::move(contact);
   }
 
   void read_polygon(const Property& p, uint64_t row) {

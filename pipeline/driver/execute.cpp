@@ -303,7 +303,7 @@ void Executor::make_mesh(int frame) {
   if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame));
   if (!decision->make) return progress_.not_needed(Step::mesh, frame);
   const Clock::time_point start = Clock::now();
-  check_input(layout::particles(frame));
+  for (const std::string& file : simulated_files(wanted_, frame)) check_input(file);
   StageReport report;
   compute(mesh_arena_, [&] { report = stages_.mesh(folder_, frame); });
   commit(report.files, step_name(Step::mesh), frame, decision->key);

@@ -332,7 +332,7 @@ Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup) {
 }
 
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup) {
-  const auto inputs = digests_of({layout::particles(frame)}, lookup);
+  const auto inputs = digests_of(simulated_files(wanted, frame), lookup);
   if (!inputs) return {};
   return decide(mesh_files(wanted, frame), step_key(wanted.mesh, Step::mesh, frame, *inputs),
                 lookup);

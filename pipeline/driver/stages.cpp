@@ -118,7 +118,12 @@ class ShotStages final : public Stages {
 
   StageReport mesh(const fs::path& folder, int frame) override {
     const ParticleFrame particles = read_particles(folder / layout::particles(frame));
-    const TriangleMesh surface = surface_frame(particles, shot_.surface);
+    std::vector<TriangleMesh> sheets;
+    for (const Cloth& cloth : shot_.cloth)
+      sheets.push_back(read_mesh(folder / layout::cloth(cloth.name, frame)));
+    SurfaceStats stats;
+    const TriangleMesh surface =
+        surface_frame(particles, shot_.surface, sheets, InteriorBlocks::skip, &stats);
     StageReport report;
     report.files.push_back(write_mesh(folder / layout::fluid_mesh(frame), surface));
     if (shot_.surface.obj) {
@@ -130,7 +135,9 @@ class ShotStages final : public Stages {
     }
     report.json = json{{"particles", particles.position.size()},
                        {"vertices", surface.position.size()},
-                       {"triangles", surface.triangle.size()}}
+                       {"triangles", surface.triangle.size()},
+                       {"contact", stats.contact},
+                       {"crossing", stats.crossing}}
                       .dump();
     report.line = fmt::format("particles={} triangles={}", particles.position.size(),
                               surface.triangle.size());

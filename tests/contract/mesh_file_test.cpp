@@ -35,6 +35,7 @@ TriangleMesh full_sheet() {
       const uint32_t k = j * 4 + i;
       mesh.triangle.emplace_back(k, k + 1, k + 5);
       mesh.triangle.emplace_back(k, k + 5, k + 4);
+      mesh.contact.push_back(0), mesh.contact.push_back(1);
     }
   }
   return mesh;
@@ -53,6 +54,7 @@ TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
   mesh.normal.clear();
   mesh.uv.clear();
   mesh.rest_position.clear();
+  mesh.contact.clear();
   write_mesh(folder / "sheet.ply", mesh);
   expect_same_bits(read_mesh(folder / "sheet.ply"), mesh);
 }

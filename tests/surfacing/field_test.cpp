@@ -1,6 +1,7 @@
 // The colour field itself, against a sum in double over all pairs.
 
 #include "surfacing/field.h"
+#include "surfacing/sheets.h"
 
 #include <gtest/gtest.h>
 
@@ -51,7 +52,7 @@ TEST(ColourField, IsTheSumOverAllParticles) {
     const auto interior = count_interior(binned);
     binned.weight = weigh_particles(binned, kernel, interior);
     const ColourField field =
-        evaluate_field(binned, kernel, interior, InteriorBlocks::evaluate, 1e9);
+        evaluate_field(binned, kernel, interior, Sheets{}, InteriorBlocks::evaluate, 1e9);
     ASSERT_GT(field.block.size(), 8u);
     for (const FieldBlock& block : field.block)
       for (int k = 0; k < block_size; k += 7) {

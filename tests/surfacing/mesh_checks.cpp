@@ -1,14 +1,20 @@
 #include "tests/surfacing/mesh_checks.h"
 
+#include <Imath/ImathBox.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+
+#include "pipeline/contract/triangle.h"
 
 namespace drench::surfacing_checks {
 namespace {
 
 using Imath::V3d;
+using Imath::V3f;
 
 uint64_t directed(uint32_t from, uint32_t to) { return static_cast<uint64_t>(from) << 32 | to; }
 
@@ -124,6 +130,61 @@ double sliver_share(const TriangleMesh& mesh, double degrees) {
     slivers += smallest < degrees;
   }
   return static_cast<double>(slivers) / static_cast<double>(mesh.triangle.size());
+}
+
+namespace {
+
+using Corners = std::array<V3d, 3>;
+Corners corners_of(const TriangleMesh& mesh, size_t t) {
+  const auto& index = mesh.triangle[t];
+  return {V3d(mesh.position[index.x]), V3d(mesh.position[index.y]), V3d(mesh.position[index.z])};
+}
+
+double volume_of(const V3d& a, const V3d& b, const V3d& c, const V3d& d) {
+  return (b - a).dot((c - a).cross(d - a));
+}
+
+bool edge_passes(const Corners& from, const Corners& through) {
+  for (int k = 0; k < 3; ++k) {
+    const V3d &p = from[k], &q = from[(k + 1) % 3];
+    if (volume_of(p, through[0], through[1], through[2]) *
+            volume_of(q, through[0], through[1], through[2]) >=
+        0)
+      continue;
+    const double u = volume_of(p, q, through[0], through[1]),
+                 v = volume_of(p, q, through[1], through[2]),
+                 w = volume_of(p, q, through[2], through[0]);
+    if ((u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+size_t crossings_of(const TriangleMesh& mesh, const TriangleMesh& sheet) {
+  size_t crossings = 0;
+  for (size_t s = 0; s < sheet.triangle.size(); ++s) {
+    const Corners b = corners_of(sheet, s);
+    Imath::Box3d box;
+    for (const V3d& p : b) box.extendBy(p);
+    for (size_t t = 0; t < mesh.triangle.size(); ++t) {
+      const Corners a = corners_of(mesh, t);
+      Imath::Box3d own;
+      for (const V3d& p : a) own.extendBy(p);
+      if (box.intersects(own)) crossings += edge_passes(a, b) || edge_passes(b, a);
+    }
+  }
+  return crossings;
+}
+
+double distance_to(const TriangleMesh& mesh, const V3f& point) {
+  double least = 1e30;
+  for (const auto& t : mesh.triangle)
+    least = std::min(least, double((closest_on_triangle(point, mesh.position[t.x],
+                                                        mesh.position[t.y], mesh.position[t.z]) -
+                                    point)
+                                       .length()));
+  return least;
 }
 
 }  // namespace drench::surfacing_checks

@@ -36,4 +36,11 @@ SphereError sphere_error(const TriangleMesh& mesh, double radius, double unit);
 /// Share of triangles with an angle below `degrees`.
 double sliver_share(const TriangleMesh& mesh, double degrees);
 
+/// Pairs of a triangle of the mesh and one of the sheet of which an edge of one passes through the
+/// inside of the other, by the signs of volumes in double.
+size_t crossings_of(const TriangleMesh& mesh, const TriangleMesh& sheet);
+
+/// From a point to a mesh, m.
+double distance_to(const TriangleMesh& mesh, const Imath::V3f& point);
+
 }  // namespace drench::surfacing_checks

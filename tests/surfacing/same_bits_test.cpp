@@ -46,8 +46,8 @@ TEST(SurfaceBits, AreTheSameWithAndWithoutSkippingTheInterior) {
        {relaxed_ball(60000, spacing, 10, 1), hollow, splash(100000, spacing, 1),
         shaken_box(V3f(0), V3i(40), spacing, 0.3, 1), random_cloud(30000, 2.0, spacing, 1)}) {
     SurfaceStats skipped, evaluated;
-    const TriangleMesh a = surface_frame(frame, {}, InteriorBlocks::skip, &skipped);
-    const TriangleMesh b = surface_frame(frame, {}, InteriorBlocks::evaluate, &evaluated);
+    const TriangleMesh a = surface_frame(frame, {}, {}, InteriorBlocks::skip, &skipped);
+    const TriangleMesh b = surface_frame(frame, {}, {}, InteriorBlocks::evaluate, &evaluated);
     expect_same(a, b);
     EXPECT_LT(skipped.evaluated_blocks, evaluated.evaluated_blocks);
   }

@@ -1,0 +1,170 @@
+#include "surfacing/contact.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+
+namespace drench::surfacing {
+namespace {
+
+/// Calls f(block, v) for the vertices of the blocks that are near a sheet.
+template <class F>
+void for_each_near_vertex(const LatticeMesh& mesh, const Sheets& sheets, F f) {
+  tbb::parallel_for(size_t{0}, mesh.block.size(), [&](size_t b) {
+    const BlockVertices& range = mesh.block[b];
+    if (!sheets.near(range.block)) return;
+    for (uint32_t v = range.begin; v < range.end; ++v) f(range.block, v);
+  });
+}
+
+V3i block_of_vertex(const LatticeMesh& mesh, uint32_t v) {
+  const auto after =
+      std::upper_bound(mesh.block.begin(), mesh.block.end(), v,
+                       [](uint32_t i, const BlockVertices& b) { return i < b.begin; });
+  return std::prev(after)->block;
+}
+
+/// Does the segment from p to q pass through the triangle?
+bool pierces(const V3d& p, const V3d& q, const std::array<V3d, 3>& t) {
+  const V3d u = t[1] - t[0], v = t[2] - t[0], normal = u.cross(v);
+  const double from = normal.dot(p - t[0]), to = normal.dot(q - t[0]);
+  if ((from > 0) == (to > 0)) return false;
+  const V3d at = p + (q - p) * (from / (from - to));
+  for (int k = 0; k < 3; ++k)
+    if (normal.dot((t[(k + 1) % 3] - t[k]).cross(at - t[k])) < 0) return false;
+  return true;
+}
+
+bool cross_each_other(const std::array<V3d, 3>& a, const std::array<V3d, 3>& b) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [a0, a1] = std::minmax({a[0][axis], a[1][axis], a[2][axis]});
+    const auto [b0, b1] = std::minmax({b[0][axis], b[1][axis], b[2][axis]});
+    if (a1 < b0 || b1 < a0) return false;
+  }
+  for (int k = 0; k < 3; ++k)
+    if (pierces(a[k], a[(k + 1) % 3], b) || pierces(b[k], b[(k + 1) % 3], a)) return true;
+  return false;
+}
+
+std::array<V3d, 3> corners_of(const std::array<V3f, 3>& t) {
+  return {V3d(t[0]), V3d(t[1]), V3d(t[2])};
+}
+
+bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets) {
+  const V3i block = block_of_vertex(mesh, t.x);
+  if (!sheets.near(block)) return false;
+  const std::array<V3d, 3> own{V3d(mesh.position[t.x]), V3d(mesh.position[t.y]),
+                               V3d(mesh.position[t.z])};
+  bool crosses = false;
+  sheets.for_each_near(block, [&](uint32_t k) {
+    crosses = crosses || cross_each_other(own, corners_of(sheets.corners(k)));
+  });
+  return crosses;
+}
+
+std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& sheets) {
+  return tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<uint32_t>(0, static_cast<uint32_t>(mesh.triangle.size()), 4096),
+      std::vector<uint32_t>{},
+      [&](const auto& range, std::vector<uint32_t> found) {
+        for (uint32_t t = range.begin(); t < range.end(); ++t)
+          if (crosses_a_sheet(mesh, mesh.triangle[t], sheets)) found.push_back(t);
+        return found;
+      },
+      [](std::vector<uint32_t> a, const std::vector<uint32_t>& b) {
+        a.insert(a.end(), b.begin(), b.end());
+        return a;
+      });
+}
+
+V3f laid(const Sheets& sheets, V3i block, const V3f& p, int side, float offset) {
+  const SheetFoot foot = sheets.foot(block, p);
+  if (!foot.found()) return p;
+  V3f away = p - foot.place;
+  // smoothing may have moved it through
+  if (away.dot(foot.normal) * static_cast<float>(side) < 0) away = -away;
+  const float length = away.length();
+  return foot.place + (length > 1e-3f ? away / length : foot.normal * float(side)) * offset;
+}
+
+/// p, farther from the nearest sheet.
+V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
+  const SheetFoot foot = sheets.foot(block, p);
+  if (!foot.found() || distance <= 0) return p;
+  return p + (p - foot.place).normalized() * distance;
+}
+
+}  // namespace
+
+SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets) {
+  if (sheets.empty()) return {};
+  SheetContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
+  const std::vector<V3f> normal = normals_of(mesh, rings);
+  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+    const SheetFoot foot = sheets.foot(block, mesh.position[v]);
+    if (foot.distance > Sheets::gap + 0.25f) return;
+    const V3f to = foot.place - mesh.position[v];
+    if (normal[v].dot(to) < 0.4f * foot.distance) return;  // the far side of a thin film
+    contact.side[v] = to.dot(foot.normal) < 0 ? 1 : -1;
+  });
+  return contact;
+}
+
+size_t lay_on_sheets(LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
+                     float offset) {
+  if (sheets.empty()) return 0;
+  const std::vector<V3f> smooth = mesh.position;
+  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+    if (contact.side[v]) mesh.position[v] = laid(sheets, block, smooth[v], contact.side[v], offset);
+  });
+  const std::vector<V3f> lying = mesh.position;
+  const auto moved_back = [&](uint32_t v, int step) {  // half the way, smooth, extracted, farther
+    if (contact.side[v] && step == 1) return (lying[v] + smooth[v]) * 0.5f;
+    if (contact.side[v] && step == 2) return smooth[v];
+    return pushed(sheets, block_of_vertex(mesh, v), contact.extracted[v], 0.25f * float(step - 3));
+  };
+  std::vector<uint8_t> steps(mesh.position.size(), 0);
+  std::vector<uint32_t> crossing = crossing_triangles(mesh, sheets);
+  for (int round = 0; round < 8 && !crossing.empty(); ++round) {
+    std::vector<uint32_t> back;
+    for (const uint32_t t : crossing)
+      for (int k = 0; k < 3; ++k) back.push_back(mesh.triangle[t][k]);
+    std::sort(back.begin(), back.end());
+    back.erase(std::unique(back.begin(), back.end()), back.end());
+    for (const uint32_t v : back) {
+      steps[v] = std::max<uint8_t>(steps[v] + 1, contact.side[v] ? 1 : 3);
+      mesh.position[v] = moved_back(v, steps[v]);
+    }
+    crossing = crossing_triangles(mesh, sheets);
+  }
+  return crossing.size();
+}
+
+std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
+                              const SheetContact& contact) {
+  std::vector<V3f> normal(mesh.position.size());
+  tbb::parallel_for(size_t{0}, normal.size(), [&](size_t v) {
+    V3f free(0);
+    for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k) {
+      const auto [a, b] = rings.wing[k];
+      if (!contact.touches({static_cast<uint32_t>(v), a, b}))
+        free += (mesh.position[a] - mesh.position[v]).cross(mesh.position[b] - mesh.position[v]);
+    }
+    normal[v] = free.normalized();
+  });
+  return normal;
+}
+
+void move_with_sheets(const LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
+                      std::vector<V3f>& velocity) {
+  if (sheets.empty()) return;
+  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+    if (!contact.side[v]) return;
+    const SheetFoot foot = sheets.foot(block, mesh.position[v]);
+    if (foot.found()) velocity[v] = sheets.velocity(foot);
+  });
+}
+
+}  // namespace drench::surfacing
