@@ -102,5 +102,7 @@ inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits 
 /// Rows of emitters, volumes, sinks and wind: where fluid comes from and goes to, and what drives
 /// it.
 std::vector<Parameter> source_rows();
+/// Rows of foam.
+std::vector<Parameter> foam_rows();
 
 }  // namespace drench::shot_table

@@ -527,6 +527,7 @@ const std::vector<Section>& sections() {
       typed<Probe>(repeated<&Shot::probe>(
           "probe", "", "A measurement, a row for every step in `sim/probe.NAME.csv`.")),
       single<&Shot::surface>("surface", "The surface built around the particles."),
+      single<&Shot::foam>("foam", "Spray, foam and bubbles, particles of their own."),
       single<&Shot::camera>("camera", "A thin-lens camera that looks along -Z of its own frame."),
       typed<Light>(repeated<&Shot::light>("light", "", "A light.")),
       typed<Material>(repeated<&Shot::material>(
@@ -542,7 +543,7 @@ const std::vector<Parameter>& parameters() {
     std::vector<Parameter> all;
     for (const auto& part :
          {shot_rows(), fluid_rows(), source_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
-          surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
+          foam_rows(), surface_and_camera_rows(), light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;
