@@ -12,6 +12,7 @@ std::string probe(const std::string& name) { return fmt::format("sim/probe.{}.cs
 std::string checkpoint(int frame) { return fmt::format("sim/checkpoint/frame.{:04d}.ckpt", frame); }
 std::string fluid_mesh(int frame) { return fmt::format("mesh/fluid.{:04d}.ply", frame); }
 std::string level_set(int frame) { return fmt::format("mesh/fluid.{:04d}.vdb", frame); }
+std::string foam(int frame) { return fmt::format("mesh/foam.{:04d}.vdb", frame); }
 std::string image(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.exr", shot, frame);
 }

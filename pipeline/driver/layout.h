@@ -19,6 +19,7 @@ std::string probe(const std::string& name);             // sim/probe.gauge.csv
 std::string checkpoint(int frame);                      // sim/checkpoint/frame.1011.ckpt
 std::string fluid_mesh(int frame);                      // mesh/fluid.1001.ply
 std::string level_set(int frame);                       // mesh/fluid.1001.vdb
+std::string foam(int frame);                            // mesh/foam.1001.vdb
 std::string image(const std::string& shot, int frame);  // render/pour.1001.exr
 std::string movie(const std::string& shot);             // pour.mp4
 
