@@ -6,7 +6,11 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/foam_file.h"
+#include "pipeline/contract/level_set.h"
+#include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/shot_file.h"
+#include "surfacing/foam.h"
+#include "tests/contract/sphere_mesh.h"
 #include "tests/driver/folder.h"
 #include "tests/driver/tiny_shot.h"
 #include "tests/driver/toy_shot.h"
@@ -158,6 +162,36 @@ TEST(FoamSteps, CostNothingWhereThereIsNone) {
 }
 
 // ---- the real stages
+
+// From its level set, voxels of half a spacing; the mesh itself lies up to 0.4 mm inside its ball.
+TEST(FoamOfAShot, StopsAtMeshes) {
+  const TemporaryFolder folder;
+  Shot shot;
+  shot.fluid.spacing = 0.01;
+  shot.gravity = V3d(0);
+  shot.domain.axis = {Axis::open, Axis::open, Axis::open};
+  Obstacle ball;
+  ball.type = ObstacleType::mesh;
+  ball.mesh_file = folder / "ball.ply";
+  ball.scale = 0.1;
+  ball.position = V3d(0.3, 1, 0);
+  write_mesh(ball.mesh_file, test::unit_sphere(48, 96));
+  shot.obstacle = {ball};
+  ParticleFrame fluid;
+  fluid.spacing = 0.01f;
+  for (const float height : {0.f, 0.03f, 0.08f}) {
+    FoamFrame foam;
+    foam.spacing = 0.01f, foam.next_id = 1;
+    foam.position.emplace_back(0.f, 1 + height, 0.f), foam.velocity.emplace_back(5.f, 0.f, 0.f);
+    foam.id.push_back(0), foam.age.push_back(0), foam.radius.push_back(0.001f);
+    foam.kind.push_back(FoamKind::spray);
+    for (int frame = 1002; frame < 1005; ++frame)
+      foam = foam_frame(shot, frame, foam, fluid, fluid, make_level_set);
+    EXPECT_EQ(foam.velocity[0], V3f(0));
+    EXPECT_LT(foam.position[0].x, 0.3f);
+    EXPECT_NEAR((foam.position[0] - V3f(0.3f, 1, 0)).length(), 0.101, 0.001) << height;
+  }
+}
 
 Wanted wanted_of(const TinyShot& shot, const std::vector<std::string>& set) {
   return want(read_shot(shot.file(), {.set = set}), {1001, 1002},
