@@ -19,6 +19,7 @@ struct FrameGeometry {
   TriangleMesh fluid;                   // closed; material shot.fluid.material; may be empty
   std::vector<ClothFrame> cloth;        // material of the shot's cloth of the same name
   std::vector<ObstacleFrame> obstacle;  // material of the shot's obstacle of the same name
+  FoamFrame foam{};                     // small white spheres; may be empty
 };
 
 /// One rendered frame: beauty in linear ACEScg with alpha, row-major from the top left.

@@ -18,6 +18,8 @@ constexpr float kVisibleMotion = 0.1f;  // pixels
 /// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
 constexpr float kRelativeError = 16 * 0x1p-24f;
 constexpr float kSharedError = 2 * 0x1p-24f;
+/// Of foam: froth scatters light many times and absorbs next to none.
+constexpr float kFoamReflectance = 0.9f;
 
 EmbreeDevice make_device() {
   // One instruction set on every machine, so that rays meet the same triangles everywhere.
@@ -56,6 +58,18 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
       fail(fmt::format("triangle {} names a vertex beyond the {} there are", k, n));
 }
 
+void check_foam(const FoamFrame& foam) {
+  const size_t n = foam.position.size();
+  if (foam.velocity.size() != n || foam.radius.size() != n)
+    throw Error(fmt::format("foam: {} positions, {} velocities and {} radii; make the foam anew", n,
+                            foam.velocity.size(), foam.radius.size()));
+  for (size_t k = 0; k < n; ++k)
+    if (!finite(foam.position[k]) || !finite(foam.velocity[k]) || !(foam.radius[k] > 0) ||
+        !(foam.radius[k] < kInfinity))
+      throw Error(
+          fmt::format("foam: particle {} is not finite or has no radius; make the foam anew", k));
+}
+
 /// Vertex normals weighted by area.
 std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
   std::vector<V3f> normal(mesh.position.size(), V3f(0));
@@ -83,6 +97,11 @@ Imath::Box3f bounds_of(const SceneObject& object) {
   Imath::Box3f box;
   for (const std::vector<V3f>* positions : {&object.position, &object.position_close})
     for (size_t k = 0; k + 1 < positions->size(); ++k) box.extendBy((*positions)[k]);
+  for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
+    for (const Imath::V4f& s : *spheres) {
+      box.extendBy(V3f(s.x, s.y, s.z) - V3f(s.w));
+      box.extendBy(V3f(s.x, s.y, s.z) + V3f(s.w));
+    }
   return box;
 }
 
@@ -151,6 +170,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                                              float(shot.fluid.spacing)));
     }
   }
+  if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
     if (cloth.mesh.triangle.empty()) continue;
@@ -250,8 +270,44 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& what, uint32
   objects_.push_back(std::move(object));
 }
 
-void Scene::build(SceneObject& object) {
-  object.bounds = bounds_of(object);
+bool Scene::moves_visibly(const FoamFrame& foam) const {
+  const float shutter = float((close_ - open_) / fps_);  // s
+  if (shutter == 0) return false;
+  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  for (size_t k = 0; k < foam.position.size(); ++k) {
+    const float distance = (foam.position[k] - camera_.open().position).length();
+    if (foam.velocity[k].length() > limit * std::max(0.f, distance - foam.radius[k])) return true;
+  }
+  return false;
+}
+
+void Scene::add_foam(const FoamFrame& foam) {
+  check_foam(foam);
+  ShadingMaterial white;
+  white.reflectance = V3f(kFoamReflectance);
+  white.transmittance = white.absorption = V3f(0);
+  materials_.push_back(white);
+  SceneObject object;
+  object.material = uint32_t(materials_.size() - 1);
+  const auto at = [&](double frames) {
+    std::vector<Imath::V4f> spheres;
+    spheres.reserve(foam.position.size());
+    for (size_t k = 0; k < foam.position.size(); ++k) {
+      const V3f p = foam.position[k] + foam.velocity[k] * float(frames / fps_);
+      spheres.emplace_back(p.x, p.y, p.z, foam.radius[k]);
+    }
+    return spheres;
+  };
+  if (moves_visibly(foam)) {
+    object.sphere = at(open_);
+    object.sphere_close = at(close_);
+  } else {
+    object.sphere = at(0);
+  }
+  objects_.push_back(std::move(object));
+}
+
+EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
   EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
@@ -263,6 +319,23 @@ void Scene::build(SceneObject& object) {
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              object.triangle.data(), 0, 3 * sizeof(uint32_t),
                              object.triangle.size());
+  return geometry;
+}
+
+EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
+  EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
+  rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
+  unsigned step = 0;
+  for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
+    if (!spheres->empty())
+      rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, step++, RTC_FORMAT_FLOAT4,
+                                 spheres->data(), 0, sizeof(Imath::V4f), spheres->size());
+  return geometry;
+}
+
+void Scene::build(SceneObject& object) {
+  object.bounds = bounds_of(object);
+  const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
   rtcSetGeometryMask(geometry.get(), 0xffffffffu);
   rtcCommitGeometry(geometry.get());
   object.scene.reset(rtcNewScene(device_.get()));
@@ -327,6 +400,25 @@ bool Scene::occluded(const Ray& ray, float distance) const {
   return false;
 }
 
+namespace {
+
+/// Where a ray met a sphere, on it to rounding.
+template <bool moving>
+void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surface& s) {
+  Imath::V4f sphere = object.sphere[hit.triangle];
+  if constexpr (moving)
+    if (object.moves()) sphere += (object.sphere_close[hit.triangle] - sphere) * ray.time;
+  const V3f center(sphere.x, sphere.y, sphere.z);
+  s.geometric_normal = s.shading_normal =
+      normalized(ray.origin + ray.direction * hit.distance - center);
+  s.position = center + s.geometric_normal * sphere.w;
+  s.uv = V2f(0);
+  const V3f size = absolute(center) + V3f(sphere.w);
+  s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
+}
+
+}  // namespace
+
 template <bool moving>
 Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   Surface s;
@@ -340,6 +432,11 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
     return s;
   }
   const SceneObject& object = objects_[hit.index];
+  s.material = &materials_[object.material];
+  if (!object.sphere.empty()) {
+    meet_sphere<moving>(object, ray, hit, s);
+    return s;
+  }
   const auto& t = object.triangle[hit.triangle];
   V3f a = object.position[t.x], b = object.position[t.y], c = object.position[t.z];
   if constexpr (moving)
@@ -358,7 +455,6 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
-  s.material = &materials_[object.material];
   s.contact = !object.contact.empty() && object.contact[hit.triangle];
   return s;
 }

@@ -3,6 +3,7 @@
 // lights, and which features of the path loop the frame needs.
 
 #include <Imath/ImathBox.h>
+#include <Imath/ImathVec.h>
 
 #include "pipeline/contract/frames.h"
 #include "render/camera.h"
@@ -13,28 +14,29 @@
 
 namespace drench {
 
-/// One mesh, at shutter open and, if it moves, at shutter close.
+/// One mesh, or many spheres, at shutter open and, if it moves, at shutter close.
 struct SceneObject {
   std::vector<Imath::Vec3<uint32_t>> triangle;
-  std::vector<V3f> position, position_close;  // m; the last entry is padding for Embree
-  std::vector<V3f> normal;                    // unit, per vertex; empty: flat
-  std::vector<V2f> uv;                        // may be empty
-  std::vector<uint8_t> contact;               // by triangle, 1: lies on a sheet; may be empty
+  std::vector<V3f> position, position_close;     // m; the last entry is padding for Embree
+  std::vector<Imath::V4f> sphere, sphere_close;  // m: centre and radius; in place of triangles
+  std::vector<V3f> normal;                       // unit, per vertex; empty: flat
+  std::vector<V2f> uv;                           // may be empty
+  std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
-  bool moves() const { return !position_close.empty(); }
+  bool moves() const { return !position_close.empty() || !sphere_close.empty(); }
 };
 
 /// What a ray met first.
 struct Hit {
   enum class Kind { nothing, light, ground, object };
   Kind kind = Kind::nothing;
-  float distance = 0;  // m; infinity for nothing
-  uint32_t index = 0;  // of the light or object
-  uint32_t triangle = 0;
-  float u = 0, v = 0;  // barycentric weights of vertices 1 and 2
+  float distance = 0;     // m; infinity for nothing
+  uint32_t index = 0;     // of the light or object
+  uint32_t triangle = 0;  // or sphere
+  float u = 0, v = 0;     // barycentric weights of vertices 1 and 2
 };
 
 /// A point of a surface.
@@ -73,11 +75,15 @@ class Scene {
  private:
   void add_fluid(const Shot& shot, const TriangleMesh& mesh);
   void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
+  void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void build(SceneObject& object);
+  EmbreeGeometry triangles_of(const SceneObject& object) const;
+  EmbreeGeometry spheres_of(const SceneObject& object) const;
   void find_features();
   bool moves_visibly(const TriangleMesh& mesh) const;
+  bool moves_visibly(const FoamFrame& foam) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
   double open_ = 0, close_ = 0;  // shutter relative to the frame, frames

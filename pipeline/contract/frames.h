@@ -19,6 +19,21 @@ struct ParticleFrame {
   float rest_density = 1000;         // kg/m^3
 };
 
+enum class FoamKind : uint8_t { spray, foam, bubble };
+
+/// Spray, foam and bubbles of one frame, all columns of one length. Both the state that the next
+/// frame starts from and what is drawn.
+struct FoamFrame {
+  std::vector<Imath::V3f> position;  // m, world
+  std::vector<Imath::V3f> velocity;  // m/s
+  std::vector<uint32_t> id;          // unique over the shot, rising
+  std::vector<float> age;            // s on the surface or on a wall: what counts to its lifetime
+  std::vector<float> radius;         // m
+  std::vector<FoamKind> kind;
+  float spacing = 0;     // m, of the fluid
+  uint32_t next_id = 0;  // of the next particle that is born
+};
+
 /// A triangle mesh: the fluid's surface (closed, outward) or a sheet of cloth (open).
 /// Vertex columns have the length of `position`, or are empty where noted.
 struct TriangleMesh {

@@ -1,33 +1,22 @@
 #include "pipeline/contract/particles_file.h"
 
-#include <fmt/format.h>
-#include <openvdb/points/PointConversion.h>
-#include <openvdb/points/PointCount.h>
-#include <openvdb/points/PointDataGrid.h>
-
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/point_grid.h"
 #include "pipeline/contract/vdb_archive.h"
 
 namespace drench {
 
 namespace fs = std::filesystem;
-namespace points = openvdb::points;
-using openvdb::Index64;
 
 namespace {
 
-using PositionCodec = points::FixedPointCodec</*OneByte=*/false>;
 using VelocityArray = points::TypedAttributeArray<openvdb::Vec3f, points::TruncateCodec>;
 using HalfArray = points::TypedAttributeArray<float, points::TruncateCodec>;
-using FloatArray = points::TypedAttributeArray<float, points::NullCodec>;
-using IdArray = points::TypedAttributeArray<int32_t, points::NullCodec>;  // Houdini's type of id
 
 constexpr float largest_half = 65504;
-constexpr double voxel_in_spacings = 2;
 
 void check_frame(const fs::path& path, const ParticleFrame& frame) {
   const size_t n = frame.position.size();
@@ -55,65 +44,27 @@ void check_frame(const fs::path& path, const ParticleFrame& frame) {
   }
 }
 
-/// A vector as OpenVDB's functions want it.
-template <class To, class From>
-std::vector<To> converted(const std::vector<From>& column) {
-  std::vector<To> result;
-  result.reserve(column.size());
-  for (const From& value : column) {
-    if constexpr (std::is_arithmetic_v<From>) {
-      result.push_back(To(value));
-    } else {
-      result.push_back(To(value.x, value.y, value.z));
-    }
-  }
-  return result;
-}
-
-template <class Array, class Value>
-void add_column(points::PointDataGrid& grid, const openvdb::tools::PointIndexGrid& index,
-                const std::string& name, const std::vector<Value>& column) {
-  points::appendAttribute<typename Array::ValueType, typename Array::Codec>(grid.tree(), name);
-  const points::PointAttributeVector<Value> wrapper(column);
-  points::populateAttribute<points::PointDataTree, openvdb::tools::PointIndexTree,
-                            points::PointAttributeVector<Value>>(grid.tree(), index.tree(), name,
-                                                                 wrapper);
-}
-
 points::PointDataGrid::Ptr grid_of(const ParticleFrame& frame) {
-  const auto transform =
-      openvdb::math::Transform::createLinearTransform(voxel_in_spacings * double(frame.spacing));
-  const auto positions = converted<openvdb::Vec3f>(frame.position);
-  const points::PointAttributeVector<openvdb::Vec3f> wrapper(positions);
-  const auto index =
-      openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapper, *transform);
-  const auto grid = points::createPointDataGrid<PositionCodec, points::PointDataGrid>(
-      *index, wrapper, *transform);
+  const IndexedPoints made = point_grid(frame.position, frame.spacing);
+  const points::PointDataGrid::Ptr& grid = made.grid;
   if (!grid->tree().empty()) {
-    add_column<VelocityArray>(*grid, *index, "v", converted<openvdb::Vec3f>(frame.velocity));
+    made.add_column<VelocityArray>("v", converted<openvdb::Vec3f>(frame.velocity));
     if (!frame.density.empty()) {
       const float largest = *std::max_element(frame.density.begin(), frame.density.end());
       const auto density = converted<float>(frame.density);
       if (largest < largest_half) {
-        add_column<HalfArray>(*grid, *index, "density", density);
+        made.add_column<HalfArray>("density", density);
       } else {
-        add_column<FloatArray>(*grid, *index, "density", density);
+        made.add_column<FloatArray>("density", density);
       }
     }
-    if (!frame.id.empty()) add_column<IdArray>(*grid, *index, "id", converted<int32_t>(frame.id));
+    if (!frame.id.empty()) made.add_column<IdArray>("id", converted<int32_t>(frame.id));
   }
   grid->setName("particles");
   grid->insertMeta("spacing", openvdb::FloatMetadata(frame.spacing));
   grid->insertMeta("rest_density", openvdb::FloatMetadata(frame.rest_density));
   grid->insertMeta("count", openvdb::Int64Metadata(int64_t(frame.position.size())));
   return grid;
-}
-
-template <class T>
-T meta_value(const openvdb::GridBase& grid, const char* name) {
-  const auto meta = grid.getMetadata<openvdb::TypedMetadata<T>>(name);
-  if (!meta) throw std::runtime_error(fmt::format("it lacks the metadata '{}'", name));
-  return meta->value();
 }
 
 void append_leaf(const points::PointDataGrid& grid, const points::PointDataTree::LeafNodeType& leaf,
@@ -139,20 +90,8 @@ void append_leaf(const points::PointDataGrid& grid, const points::PointDataTree:
   }
 }
 
-template <class T>
-void reorder(std::vector<T>& column, const std::vector<uint32_t>& order) {
-  if (column.empty()) return;
-  std::vector<T> sorted;
-  sorted.reserve(column.size());
-  for (const uint32_t i : order) sorted.push_back(column[i]);
-  column = std::move(sorted);
-}
-
 void sort_by_id(ParticleFrame& frame) {
-  std::vector<uint32_t> order(frame.id.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](uint32_t a, uint32_t b) { return frame.id[a] < frame.id[b]; });
+  const std::vector<uint32_t> order = order_of_ids(frame.id);
   reorder(frame.position, order);
   reorder(frame.velocity, order);
   reorder(frame.density, order);
@@ -165,15 +104,11 @@ ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
   ParticleFrame frame;
   frame.spacing = meta_value<float>(*grid, "spacing");
   frame.rest_density = meta_value<float>(*grid, "rest_density");
-  const int64_t count = meta_value<int64_t>(*grid, "count");
-  if (count < 0 || Index64(count) != points::pointCount(grid->tree())) {
-    throw std::runtime_error("it holds another number of particles than it says");
-  }
-  frame.position.reserve(size_t(count));
-  frame.velocity.reserve(size_t(count));
+  const size_t count = checked_count(*grid);
+  frame.position.reserve(count);
+  frame.velocity.reserve(count);
   for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) append_leaf(*grid, *leaf, frame);
-  if (frame.position.size() != size_t(count))
-    throw std::runtime_error("some particles are missing");
+  if (frame.position.size() != count) throw std::runtime_error("some particles are missing");
   if (!frame.id.empty()) sort_by_id(frame);
   return frame;
 }

@@ -237,6 +237,18 @@ struct SurfaceSettings {
   double memory_gib = 8;    // refuse grids that would need more
 };
 
+/// Spray, foam and bubbles (surfacing/foam.h). Without [foam] there are none.
+struct FoamSettings {
+  bool present = false;
+  // Particles that each fluid particle makes on a way of one spacing: of the fluid closing in on
+  // it, and of its own out of the fluid at a crest.
+  double trapped_air = 20, wave_crest = 5;
+  double threshold = 0.1;    // speed from which air is caught / sqrt(g a + sigma / (rho a))
+  double lifetime = 3;       // s, mean of foam
+  double rise_speed = 0.25;  // m/s, of bubbles in still fluid
+  double radius = 0.08;      // mean of a foam particle / spacing
+};
+
 /// A keyframed thin-lens camera, looking along -Z of its own frame.
 struct Camera {
   Animated<V3d> position{V3d(0, 1, 3)}, target{V3d(0, 0.5, 0)};  // m
@@ -315,6 +327,7 @@ struct Shot {
   Coupling coupling;
   std::vector<Probe> probe;
   SurfaceSettings surface;
+  FoamSettings foam;
   Camera camera;
   std::vector<Light> light;
   std::vector<Material> material;  // built-in water, cotton, ground unless redefined

@@ -113,6 +113,7 @@ class Reader {
       draft_.sources.where.emplace(path, where);
       if (section.name == "ground" && mode_ == Mode::write) draft_.shot.ground.present = true;
       if (section.name == "wind" && mode_ == Mode::write) draft_.shot.wind.present = true;
+      if (section.name == "foam" && mode_ == Mode::write) draft_.shot.foam.present = true;
       read_table(section, section.at(owner, 0), path, *table);
     } else if (mode_ == Mode::override_values) {
       override_some(section, owner, path, node);

@@ -102,6 +102,9 @@ inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits 
 /// Rows of emitters, volumes, sinks and wind: where fluid comes from and goes to, and what drives
 /// it.
 std::vector<Parameter> source_rows();
+/// Rows of the surface.
 std::vector<Parameter> surface_rows();
+/// Rows of foam.
+std::vector<Parameter> foam_rows();
 
 }  // namespace drench::shot_table

@@ -513,6 +513,7 @@ const std::vector<Section>& sections() {
       typed<Probe>(repeated<&Shot::probe>(
           "probe", "", "A measurement, a row for every step in `sim/probe.NAME.csv`.")),
       single<&Shot::surface>("surface", "The surface built around the particles."),
+      single<&Shot::foam>("foam", "Spray, foam and bubbles, particles of their own."),
       single<&Shot::camera>("camera", "A thin-lens camera that looks along -Z of its own frame."),
       typed<Light>(repeated<&Shot::light>("light", "", "A light.")),
       typed<Material>(repeated<&Shot::material>(
@@ -526,9 +527,9 @@ const std::vector<Section>& sections() {
 const std::vector<Parameter>& parameters() {
   static const std::vector<Parameter> table = [] {
     std::vector<Parameter> all;
-    for (const auto& part :
-         {shot_rows(), fluid_rows(), source_rows(), cloth_rows(), obstacle_rows(), probe_rows(),
-          surface_rows(), camera_rows(), light_rows(), material_rows(), picture_rows()}) {
+    for (const auto& part : {shot_rows(), fluid_rows(), source_rows(), cloth_rows(),
+                             obstacle_rows(), probe_rows(), foam_rows(), surface_rows(),
+                             camera_rows(), light_rows(), material_rows(), picture_rows()}) {
       all.insert(all.end(), part.begin(), part.end());
     }
     return all;

@@ -28,6 +28,7 @@ std::string stages_text(unsigned stages) {
   };
   add(shot_table::simulate, "simulate");
   add(shot_table::mesh, "mesh");
+  add(shot_table::foam, "foam");
   add(shot_table::render, "render");
   return text.empty() ? "-" : text;
 }
@@ -102,6 +103,7 @@ std::string shot_lock(const Shot& shot) {
 Digest stage_settings_digest(const Shot& shot, Stage stage) {
   const unsigned bit = stage == Stage::simulate ? shot_table::simulate
                        : stage == Stage::mesh   ? shot_table::mesh
+                       : stage == Stage::foam   ? shot_table::foam
                                                 : shot_table::render;
   Hasher hasher;
   hasher.text("drench shot settings").value(uint32_t(bit));
@@ -324,7 +326,8 @@ std::string starting_shot(const std::string& name) {
       "a ball of water falls on a sheet held at its corners.\n"
       "# Keys behind '#' show their defaults. `drench init NAME --reference` writes every one.",
       [](const Parameter& p, const std::string& value) {
-        if (p.section == "wind") return std::string();  // its header alone would be air
+        // Their headers alone would be air and foam.
+        if (p.section == "wind" || p.section == "foam") return std::string();
         const bool standard = value.empty() || (p.field && value == default_text(p));
         const std::string unit = p.unit.empty() ? "" : fmt::format("{}: ", p.unit);
         return fmt::format("{}{} = {}  # {}{}\n", standard ? "# " : "", p.key,

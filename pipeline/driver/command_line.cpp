@@ -69,8 +69,8 @@ void add_commands(CLI::App& app, Arguments& arguments) {
            "shots/pour.toml --quality preview", all_steps());
   add_make(app, arguments, "simulate", "a shot to cache", "shots/pour.toml --frames 1001-1024",
            {Step::simulate});
-  add_make(app, arguments, "mesh", "caches to fluid surfaces", "shots/pour.toml --frames 1010",
-           {Step::mesh});
+  add_make(app, arguments, "mesh", "caches to fluid surfaces and foam",
+           "shots/pour.toml --frames 1010", {Step::mesh, Step::foam});
   add_make(app, arguments, "render", "meshes to EXR frames, a contact sheet and a movie",
            "shots/pour.toml --set render.samples=256",
            {Step::render, Step::contact_sheet, Step::movie});

@@ -46,6 +46,7 @@ class Executor {
   void advance_to(int frame);
   void mesh_frames();
   void make_mesh(int frame);
+  void make_foam(int frame);
   void render_frames();
   void make_image(int frame);
   void make_dailies(Step step);
@@ -85,6 +86,7 @@ class Executor {
   int committed_ = 0;  // frame of the last commit of simulation_, or of the state it started with
   bool has_committed_ = false;
 
+  int next_foam_;  // frame that foam was not looked at yet; foam comes in order
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
   tbb::task_arena simulate_arena_, mesh_arena_, render_arena_;
   std::counting_semaphore<stage_threads> slots_;
@@ -113,6 +115,7 @@ Executor::Executor(const Wanted& wanted, const Plan& plan, const fs::path& folde
       keys_(simulation_keys(wanted, wanted.frames.back())),
       checkpoints_(folder, manifest, wanted, keys_, options.checkpoint_every,
                    options.checkpoints_kept),
+      next_foam_(wanted.first),
       simulate_arena_(arena_size(options.threads)),
       mesh_arena_(arena_size(options.threads)),
       render_arena_(arena_size(options.threads)),
@@ -310,9 +313,26 @@ void Executor::make_mesh(int frame) {
   finished(Step::mesh, frame, start, report);
 }
 
+void Executor::make_foam(int frame) {
+  const std::optional<Decision> decision = decide_foam(wanted_, frame, lookup_);
+  if (!decision)
+    throw PlanAgain(fmt::format("what the foam of frame {} is made of is missing", frame));
+  if (!decision->make) return progress_.not_needed(Step::foam, frame);
+  const Clock::time_point start = Clock::now();
+  for (const std::string& file : foam_inputs(wanted_, frame)) check_input(file);
+  StageReport report;
+  compute(mesh_arena_, [&] { report = stages_.foam(folder_, frame); });
+  commit(report.files, step_name(Step::foam), frame, decision->key);
+  finished(Step::foam, frame, start, report);
+}
+
 void Executor::mesh_frames() {
   while (const std::optional<int> frame = to_mesh_.pop()) {
     if (wanted_.may(Step::mesh) && wanted_.fluid) make_mesh(*frame);
+    for (; wanted_.may(Step::foam) && wanted_.has_foam && next_foam_ <= *frame; ++next_foam_) {
+      if (stopping()) return;
+      make_foam(next_foam_);
+    }
     if (!to_render_.push(*frame)) return;
   }
   to_render_.finish();

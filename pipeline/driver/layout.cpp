@@ -13,6 +13,7 @@ std::string checkpoint(int frame) { return fmt::format("sim/checkpoint/frame.{:0
 std::string fluid_mesh(int frame) { return fmt::format("mesh/fluid.{:04d}.ply", frame); }
 std::string fluid_obj(int frame) { return fmt::format("mesh/fluid.{:04d}.obj", frame); }
 std::string level_set(int frame) { return fmt::format("mesh/fluid.{:04d}.vdb", frame); }
+std::string foam(int frame) { return fmt::format("mesh/foam.{:04d}.vdb", frame); }
 std::string image(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.exr", shot, frame);
 }

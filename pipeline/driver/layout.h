@@ -20,6 +20,7 @@ std::string checkpoint(int frame);                      // sim/checkpoint/frame.
 std::string fluid_mesh(int frame);                      // mesh/fluid.1001.ply
 std::string fluid_obj(int frame);                       // mesh/fluid.1001.obj
 std::string level_set(int frame);                       // mesh/fluid.1001.vdb
+std::string foam(int frame);                            // mesh/foam.1001.vdb
 std::string image(const std::string& shot, int frame);  // render/pour.1001.exr
 std::string movie(const std::string& shot);             // pour.mp4
 

@@ -67,6 +67,7 @@ class Planner {
 
   void plan_simulation();
   void plan_mesh();
+  void plan_foam();
   void plan_render();
   void plan_dailies(Step step);
   Plan finish(const Snapshot& snapshot, int timeline_last);
@@ -90,7 +91,7 @@ class Planner {
   const Wanted& wanted_;
   const Lookup lookup_;
   Plan plan_;
-  std::map<int, Action> simulated_, meshed_, rendered_;
+  std::map<int, Action> simulated_, meshed_, foamed_, rendered_;
 };
 
 bool Planner::usable_checkpoint(const std::string& file, const Digest& key) const {
@@ -222,6 +223,27 @@ void Planner::plan_mesh() {
   check_inputs(missing, "simulate");
 }
 
+/// Every frame from the first on, whichever are asked for: each starts from the one before.
+void Planner::plan_foam() {
+  if (!wanted_.has_foam) return;
+  std::vector<std::string> missing;
+  Action before = Action::skip;
+  for (int frame = wanted_.first; frame <= wanted_.frames.back(); ++frame) {
+    Action input = before;
+    if (wanted_.may(Step::simulate) && simulated_[frame] != Action::skip) input = Action::depends;
+    const std::optional<Decision> decision = decide_foam(wanted_, frame, lookup_);
+    if (!decision && input == Action::skip) {
+      for (const std::string& file : foam_inputs(wanted_, frame)) {
+        const auto known = lookup_(file);
+        if (!known || known->state != FileState::intact) missing.push_back(file);
+      }
+    }
+    add_made_from(Step::foam, frame, decision, input, {layout::foam(frame)}, wanted_.foam);
+    before = foamed_[frame] = plan_.tasks.back().action;
+  }
+  check_inputs(missing, "simulate");
+}
+
 void Planner::plan_render() {
   if (!wanted_.may(Step::mesh)) {
     warn_of_stale_caches();
@@ -231,6 +253,8 @@ void Planner::plan_render() {
   for (const int frame : wanted_.frames) {
     Action input = Action::skip;
     if (wanted_.may(Step::mesh) && meshed_[frame] != Action::skip) input = Action::depends;
+    if (wanted_.has_foam && wanted_.may(Step::foam) && foamed_[frame] != Action::skip)
+      input = Action::depends;
     if (wanted_.may(Step::simulate) && simulated_[frame] != Action::skip) input = Action::depends;
     const std::optional<Decision> decision = decide_render(wanted_, frame, lookup_);
     if (!decision && input == Action::skip) {
@@ -273,12 +297,13 @@ Plan Planner::finish(const Snapshot& snapshot, int timeline_last) {
     if (of_probe && std::find(probes.begin(), probes.end(), file) == probes.end())
       plan_.beyond.push_back(file);
     const bool framed = known.record.step == "simulate" || known.record.step == "mesh" ||
-                        known.record.step == "render";
+                        known.record.step == "foam" || known.record.step == "render";
     if (!framed) continue;
     const int frame = known.record.frame;
     const std::string image = layout::image(wanted_.shot, frame);
     std::vector<std::string> wanted = simulated_files(wanted_, frame);
     for (std::string& mesh : mesh_files(wanted_, frame)) wanted.push_back(std::move(mesh));
+    if (wanted_.has_foam) wanted.push_back(layout::foam(frame));
     const bool named =
         file == image || std::find(wanted.begin(), wanted.end(), file) != wanted.end();
     if (frame > last || frame < wanted_.first || !named) plan_.beyond.push_back(file);
@@ -338,6 +363,13 @@ std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Looku
                 lookup);
 }
 
+std::optional<Decision> decide_foam(const Wanted& wanted, int frame, const Lookup& lookup) {
+  auto inputs = digests_of(foam_inputs(wanted, frame), lookup);
+  if (!inputs) return {};
+  for (auto& input : sequence_inputs(wanted, frame, frame)) inputs->push_back(input);
+  return decide({layout::foam(frame)}, step_key(wanted.foam, Step::foam, frame, *inputs), lookup);
+}
+
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup) {
   auto inputs = digests_of(render_inputs(wanted, frame), lookup);
   if (!inputs) return {};
@@ -366,6 +398,7 @@ Plan make_plan(const Wanted& wanted, const Snapshot& snapshot, int timeline_last
   Planner planner(wanted, snapshot);
   if (wanted.may(Step::simulate)) planner.plan_simulation();
   if (wanted.may(Step::mesh)) planner.plan_mesh();
+  if (wanted.may(Step::foam)) planner.plan_foam();
   if (wanted.may(Step::render)) planner.plan_render();
   if (wanted.may(Step::contact_sheet)) planner.plan_dailies(Step::contact_sheet);
   if (wanted.may(Step::movie)) planner.plan_dailies(Step::movie);

@@ -65,6 +65,7 @@ inline constexpr const char* probe_step = "probe";
 /// frame up to the one they are recorded with, which may be a later one.
 Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup);
+std::optional<Decision> decide_foam(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup);
 /// Contact sheet or movie of all wanted frames.
 std::optional<Decision> decide_dailies(const Wanted& wanted, Step step, const Lookup& lookup);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/foam_file.h"
 #include "pipeline/contract/level_set.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/obstacle.h"
@@ -13,6 +14,7 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "render/renderer.h"
+#include "surfacing/foam.h"
 #include "surfacing/surface.h"
 
 namespace drench {
@@ -144,10 +146,32 @@ class ShotStages final : public Stages {
     return report;
   }
 
+  StageReport foam(const fs::path& folder, int frame) override {
+    FoamStats stats;
+    FoamFrame foam = no_foam(shot_);
+    if (frame != shot_.timeline.first) {
+      foam = foam_frame(shot_, frame, read_foam(folder / layout::foam(frame - 1)),
+                        read_particles(folder / layout::particles(frame - 1)),
+                        read_particles(folder / layout::particles(frame)), make_level_set, &stats);
+    }
+    StageReport report;
+    report.files.push_back(write_foam(folder / layout::foam(frame), foam));
+    report.json =
+        json{{"spray", stats.spray},      {"foam", stats.foam}, {"bubbles", stats.bubbles},
+             {"born", stats.born},        {"died", stats.died}, {"lost", stats.lost},
+             {"substeps", stats.substeps}}
+            .dump();
+    report.line = fmt::format("spray={} foam={} bubbles={} born={}", stats.spray, stats.foam,
+                              stats.bubbles, stats.born);
+    return report;
+  }
+
   StageReport render(const fs::path& folder, int frame, const Attributes& attributes,
                      const std::function<void(double)>& progress) override {
     FrameGeometry geometry;
     if (shot_.fluid.present()) geometry.fluid = read_mesh(folder / layout::fluid_mesh(frame));
+    if (shot_.foam.present && shot_.fluid.present())
+      geometry.foam = read_foam(folder / layout::foam(frame));
     for (const Cloth& cloth : shot_.cloth) {
       geometry.cloth.push_back({cloth.name, read_mesh(folder / layout::cloth(cloth.name, frame))});
     }

@@ -46,6 +46,8 @@ class Stages {
   virtual ~Stages() = default;
   virtual std::unique_ptr<Simulation> start_simulation() = 0;
   virtual StageReport mesh(const std::filesystem::path& folder, int frame) = 0;
+  /// The foam of a frame, from the files of that frame and the one before. Called in order.
+  virtual StageReport foam(const std::filesystem::path& folder, int frame) = 0;
   /// @param progress  called with the finished share; may throw Stopped.
   virtual StageReport render(const std::filesystem::path& folder, int frame,
                              const Attributes& attributes,

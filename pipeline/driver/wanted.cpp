@@ -107,6 +107,21 @@ StageKey simulate_key(const Shot& shot, const std::string& device_class) {
   return builder.finish();
 }
 
+/// Walls, obstacles, gravity, spacing and seed are the simulation's: all its settings but
+/// the probes stand for them.
+StageKey foam_key(const Shot& shot) {
+  Shot physics = shot;
+  physics.probe.clear();
+  return StageKeyBuilder("foam", build_id::mesh,
+                         sections_of(shot, {"shot", "domain", "fluid", "cloth", "obstacle", "sink",
+                                            "wind", "coupling", "foam"}))
+      .settings(stage_settings_digest(physics, Stage::simulate))
+      .settings(stage_settings_digest(shot, Stage::foam))
+      .number("fps", shot.timeline.fps)
+      .number("first", shot.timeline.first)
+      .finish();
+}
+
 StageKey render_key(const Shot& shot) {
   StageKeyBuilder builder(
       "render", build_id::render,
@@ -128,6 +143,8 @@ std::string_view step_name(Step step) {
       return "simulate";
     case Step::mesh:
       return "mesh";
+    case Step::foam:
+      return "foam";
     case Step::render:
       return "render";
     case Step::contact_sheet:
@@ -159,6 +176,8 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.mesh = StageKeyBuilder("mesh", build_id::mesh, sections_of(shot, {"surface"}))
                     .settings(stage_settings_digest(shot, Stage::mesh))
                     .finish();
+  wanted.has_foam = wanted.fluid && shot.foam.present;
+  if (wanted.has_foam) wanted.foam = foam_key(shot);
   wanted.render = render_key(shot);
   wanted.dailies =
       StageKeyBuilder("dailies", build_id::dailies, {}).number("fps", shot.timeline.fps).finish();
@@ -187,9 +206,15 @@ std::vector<std::string> mesh_files(const Wanted& wanted, int frame) {
   return files;
 }
 
+std::vector<std::string> foam_inputs(const Wanted& wanted, int frame) {
+  if (frame == wanted.first) return {layout::particles(frame)};
+  return {layout::particles(frame - 1), layout::particles(frame), layout::foam(frame - 1)};
+}
+
 std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
   std::vector<std::string> files;
   if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
+  if (wanted.has_foam) files.push_back(layout::foam(frame));
   for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
   return files;
 }

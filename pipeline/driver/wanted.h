@@ -4,7 +4,10 @@
 //
 //   simulate(f) = H(stage, f, simulate(f - 1))        stage = settings, input files, build, device
 //   mesh(f)     = H(stage, f, digest of particles)    digests, not keys: inputs that come out the
-//   render(f)   = H(stage, f, digests of meshes)      same stop a change from spreading further
+//   foam(f)     = H(stage, f, digests of particles    same stop a change from spreading further;
+//                   f - 1 and f and of foam f - 1)    foam is made in order, frame by frame
+//   render(f)   = H(stage, f, digests of meshes and
+//                   of foam)
 
 #include <map>
 #include <string>
@@ -15,7 +18,7 @@
 
 namespace drench {
 
-enum class Step { simulate, mesh, render, contact_sheet, movie };
+enum class Step { simulate, mesh, foam, render, contact_sheet, movie };
 std::string_view step_name(Step step);
 
 /// What a stage depends on besides the files of the stage before.
@@ -33,10 +36,11 @@ struct Wanted {
   bool fluid = false;              // false: nothing to mesh
   bool obj = false;                // mesh also writes an OBJ
   bool level_set = false;          // mesh also writes a VDB
+  bool has_foam = false;           // every frame from the first on has a file of foam
   std::vector<std::string> cloth;  // names of the sheets
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
   std::vector<std::string> probe;  // names of the probes: one file each for all frames
-  StageKey simulate, mesh, render, dailies;  // dailies: contact sheet and movie
+  StageKey simulate, mesh, foam, render, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;
 
   bool may(Step step) const;
@@ -53,6 +57,9 @@ std::vector<std::string> simulated_files(const Wanted& wanted, int frame);
 /// Files of the probes, which hold every frame up to the one they are recorded with.
 std::vector<std::string> probe_files(const Wanted& wanted);
 std::vector<std::string> mesh_files(const Wanted& wanted, int frame);
+/// Files that a frame's foam is made of: the fluid of the frame, and fluid and foam of the frame
+/// before unless it is the first.
+std::vector<std::string> foam_inputs(const Wanted& wanted, int frame);
 /// Files that rendering a frame reads.
 std::vector<std::string> render_inputs(const Wanted& wanted, int frame);
 

@@ -87,7 +87,7 @@ void change(const Parameter& p, void* field, const std::filesystem::path& file) 
 
 std::set<Stage> changed_stages(const Shot& before, const Shot& after) {
   std::set<Stage> changed;
-  for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::render}) {
+  for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::foam, Stage::render}) {
     if (stage_settings_digest(before, stage) != stage_settings_digest(after, stage)) {
       changed.insert(stage);
     }
@@ -99,6 +99,7 @@ std::set<Stage> stages_of(unsigned bits) {
   std::set<Stage> stages;
   if (bits & shot_table::simulate) stages.insert(Stage::simulate);
   if (bits & shot_table::mesh) stages.insert(Stage::mesh);
+  if (bits & shot_table::foam) stages.insert(Stage::foam);
   if (bits & shot_table::render) stages.insert(Stage::render);
   return stages;
 }
@@ -155,6 +156,9 @@ TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
     }
     if (p.section == "surface") {
       EXPECT_EQ(p.stages & ~shot_table::mesh, 0u) << p.key;
+    }
+    if (p.section == "foam") {
+      EXPECT_EQ(p.stages, shot_table::foam) << p.key;
     }
     if (p.key == "material") {
       EXPECT_EQ(p.stages, shot_table::render) << p.section;

@@ -115,7 +115,7 @@ TEST_F(ShotFile, LocksToAShotThatReadsTheSame) {
     EXPECT_EQ(shot_lock(again), lock);
     EXPECT_EQ(again.name, shot.name);
     EXPECT_EQ(again.cloth[1].mesh_file, shot.cloth[1].mesh_file);
-    for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::render}) {
+    for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::foam, Stage::render}) {
       EXPECT_EQ(stage_settings_digest(again, stage), stage_settings_digest(shot, stage));
     }
   }

@@ -113,6 +113,9 @@ target = "sheet"
 type = "tip"
 cloth = "sheet"
 
+[foam]
+lifetime = 2
+
 [camera]
 position = [[1001, [0, 1, 3]], [1024, [1, 1, 3]]]
 fov_deg = [[1001, 40], [1024, 35.5]]

@@ -76,6 +76,9 @@ Wanted toy_wanted(const ToySettings& settings) {
   if (!settings.fluid) wanted.cloth = {"flag"};
   wanted.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
   wanted.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
+  wanted.has_foam = settings.foam;
+  if (settings.foam) wanted.steps.push_back(Step::foam);
+  if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
   wanted.render = toy_key("camera", settings.camera, "1");
   wanted.dailies = toy_key("dailies", "", "1");
   return wanted;
@@ -98,6 +101,27 @@ StageReport ToyStages::mesh(const fs::path& folder, int frame) {
   return report;
 }
 
+/// A mean over frames: one wrong frame before shows in all that follow.
+StageReport ToyStages::foam(const fs::path& folder, int frame) {
+  log(Step::foam, frame, true);
+  if (hook) hook(Step::foam, frame);
+  const auto number = [&](const std::string& file) {
+    return std::strtod(text_of(folder / file).c_str(), nullptr);
+  };
+  const double fluid = number(layout::particles(frame));
+  double foam = 0;
+  if (frame != settings_.first) {
+    const double change = fluid - number(layout::particles(frame - 1));
+    foam = (1 - settings_.foam_rate) * number(layout::foam(frame - 1)) +
+           settings_.foam_rate * std::abs(change);
+  }
+  StageReport report;
+  report.files.push_back(
+      write_file_whole(folder / layout::foam(frame), fmt::format("{:a}\n", foam)));
+  log(Step::foam, frame, false);
+  return report;
+}
+
 StageReport ToyStages::render(const fs::path& folder, int frame, const Attributes&,
                               const std::function<void(double)>& progress) {
   log(Step::render, frame, true);
@@ -106,8 +130,9 @@ StageReport ToyStages::render(const fs::path& folder, int frame, const Attribute
   const std::string input =
       settings_.fluid ? layout::fluid_mesh(frame) : layout::cloth("flag", frame);
   StageReport report;
+  const std::string foam = settings_.foam ? text_of(folder / layout::foam(frame)) : "";
   report.files.push_back(write_file_whole(folder / layout::image("toy", frame),
-                                          settings_.camera + " " + text_of(folder / input)));
+                                          settings_.camera + " " + text_of(folder / input) + foam));
   log(Step::render, frame, false);
   return report;
 }

@@ -23,6 +23,8 @@ struct ToySettings {
   std::string camera = "left";
   std::string program = "1";
   bool fluid = true;
+  bool foam = false;
+  double foam_rate = 0.25;
   std::vector<Step> steps{Step::simulate, Step::mesh, Step::render, Step::contact_sheet};
 };
 
@@ -41,6 +43,7 @@ class ToyStages : public Stages {
 
   std::unique_ptr<Simulation> start_simulation() override;
   StageReport mesh(const std::filesystem::path& folder, int frame) override;
+  StageReport foam(const std::filesystem::path& folder, int frame) override;
   StageReport render(const std::filesystem::path& folder, int frame, const Attributes& attributes,
                      const std::function<void(double)>& progress) override;
   StageReport contact_sheet(const std::filesystem::path& folder,

@@ -1,0 +1,104 @@
+#pragma once
+// Columns of particles in OpenVDB point grids. Only for the files that read and write them.
+
+#include <fmt/format.h>
+#include <openvdb/points/PointConversion.h>
+#include <openvdb/points/PointCount.h>
+#include <openvdb/points/PointDataGrid.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace drench {
+
+namespace points = openvdb::points;
+
+using PositionCodec = points::FixedPointCodec</*OneByte=*/false>;
+using FloatArray = points::TypedAttributeArray<float, points::NullCodec>;
+using IdArray = points::TypedAttributeArray<int32_t, points::NullCodec>;  // Houdini's type of id
+
+inline constexpr double voxel_in_spacings = 2;
+
+/// A column as OpenVDB's functions want it.
+template <class To, class From>
+std::vector<To> converted(const std::vector<From>& column) {
+  std::vector<To> result;
+  result.reserve(column.size());
+  for (const From& value : column) {
+    if constexpr (std::is_arithmetic_v<From> || std::is_enum_v<From>) {
+      result.push_back(To(value));
+    } else {
+      result.push_back(To(value.x, value.y, value.z));
+    }
+  }
+  return result;
+}
+
+/// A grid with positions alone, and the index that further columns are added by.
+struct IndexedPoints {
+  openvdb::tools::PointIndexGrid::Ptr index;
+  points::PointDataGrid::Ptr grid;
+
+  template <class Array, class Value>
+  void add_column(const std::string& name, const std::vector<Value>& column) const {
+    points::appendAttribute<typename Array::ValueType, typename Array::Codec>(grid->tree(), name);
+    const points::PointAttributeVector<Value> wrapper(column);
+    points::populateAttribute<points::PointDataTree, openvdb::tools::PointIndexTree,
+                              points::PointAttributeVector<Value>>(grid->tree(), index->tree(),
+                                                                   name, wrapper);
+  }
+};
+
+template <class Vector>
+IndexedPoints point_grid(const std::vector<Vector>& position, float spacing) {
+  const auto transform =
+      openvdb::math::Transform::createLinearTransform(voxel_in_spacings * double(spacing));
+  const auto positions = converted<openvdb::Vec3f>(position);
+  const points::PointAttributeVector<openvdb::Vec3f> wrapper(positions);
+  IndexedPoints result;
+  result.index =
+      openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapper, *transform);
+  result.grid = points::createPointDataGrid<PositionCodec, points::PointDataGrid>(
+      *result.index, wrapper, *transform);
+  return result;
+}
+
+template <class T>
+T meta_value(const openvdb::GridBase& grid, const char* name) {
+  const auto meta = grid.getMetadata<openvdb::TypedMetadata<T>>(name);
+  if (!meta) throw std::runtime_error(fmt::format("it lacks the metadata '{}'", name));
+  return meta->value();
+}
+
+/// The "count" that the grid says it holds. @throws std::runtime_error if it holds another.
+inline size_t checked_count(const points::PointDataGrid& grid) {
+  const int64_t count = meta_value<int64_t>(grid, "count");
+  if (count < 0 || openvdb::Index64(count) != points::pointCount(grid.tree())) {
+    throw std::runtime_error("it holds another number of particles than it says");
+  }
+  return size_t(count);
+}
+
+/// Indices in the order of rising ids.
+inline std::vector<uint32_t> order_of_ids(const std::vector<uint32_t>& id) {
+  std::vector<uint32_t> order(id.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](uint32_t a, uint32_t b) { return id[a] < id[b]; });
+  return order;
+}
+
+template <class T>
+void reorder(std::vector<T>& column, const std::vector<uint32_t>& order) {
+  if (column.empty()) return;
+  std::vector<T> sorted;
+  sorted.reserve(column.size());
+  for (const uint32_t i : order) sorted.push_back(column[i]);
+  column = std::move(sorted);
+}
+
+}  // namespace drench
