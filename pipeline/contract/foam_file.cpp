@@ -99,7 +99,7 @@ FoamFrame frame_of(const openvdb::GridBase::Ptr& base) {
 WrittenFile write_foam(const fs::path& path, const FoamFrame& frame) {
   check_frame(path, frame);
   initialize_vdb();
-  return write_file_whole(path, vdb_bytes(grid_of(frame)));
+  return write_file_whole(path, vdb_bytes({grid_of(frame)}));
 }
 
 FoamFrame read_foam(const fs::path& path) {
