@@ -16,10 +16,10 @@ namespace drench {
 
 /// The moving geometry of one frame. Blurred from stored velocity: x + t v / fps over the shutter.
 struct FrameGeometry {
-  TriangleMesh fluid;                   // closed; material shot.fluid.material; may be empty
-  std::vector<ClothFrame> cloth;        // material of the shot's cloth of the same name
-  std::vector<ObstacleFrame> obstacle;  // material of the shot's obstacle of the same name
-  FoamFrame foam{};                     // small white spheres; may be empty
+  TriangleMesh fluid;                     // closed; material shot.fluid.material; may be empty
+  std::vector<ClothFrame> cloth;          // material of the shot's cloth of the same name
+  std::vector<ObstacleFrame> obstacle{};  // material of the shot's obstacle of the same name
+  FoamFrame foam{};                       // small white spheres; may be empty
 };
 
 /// One rendered frame: beauty in linear ACEScg with alpha, row-major from the top left.

@@ -31,10 +31,11 @@ std::vector<double> volumes_of(const LatticeMesh& mesh, const VertexRings& rings
 /// Unit normals, the area-weighted mean of the triangles around each vertex.
 std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
 
-/// Moves vertices by `passes` Laplacian passes (factor 1/2, uniform weights) forth, and as many
-/// over the displacement back: what the passes moved smoothly, the shrinkage of round shapes, is
-/// returned, and bumps stay removed. Each part then gets back the volume it had, exactly but for
-/// rounding: a small one (a drop) by scaling, others by an even shift along the normals.
+/// Filters vertices as `passes` Laplacian passes (factor 1/2, uniform weights) forth and as many
+/// over the displacement back would, in fewer (Chebyshev polynomials; Taubin, Zhang, Golub 1996):
+/// what the passes moved smoothly, the shrinkage of round shapes, is returned, and bumps stay
+/// removed. Each part then gets back the volume it had, exactly but for rounding: a small one (a
+/// drop) by scaling, others by an even shift along the normals.
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
 
 /// Averages unit normals over the ring, `passes` times.
