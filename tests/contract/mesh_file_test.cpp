@@ -121,6 +121,7 @@ TEST(ObjFile, HoldsANormalForEveryVertex) {
   mesh.rest_position.clear();
   mesh.normal = {{0, 0.6f, 0.8f}, {1, 0, 0}, {0, -1, 1e-9f}};
   mesh.triangle = {{0, 1, 2}, {2, 1, 0}};
+  mesh.contact = {0, 1};
   write_obj(folder / "mesh.obj", mesh);
   EXPECT_EQ(read_text(folder / "mesh.obj"),
             "# Drench: metres\nv 0.1 0.01 1e-20\nv 1.1 0.01 1e-20\nv 2.1 0.01 1e-20\n"
