@@ -1,7 +1,5 @@
 #include "tests/surfacing/scenes.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -33,79 +31,7 @@ ParticleFrame frame_of(const std::vector<V3d>& points, double spacing) {  // poi
   return frame;
 }
 
-/// Points sorted into cells of one repulsion radius.
-struct CellGrid {
-  int edge;
-  double radius, half;
-  std::vector<uint32_t> first, member;
-
-  CellGrid(const std::vector<V3d>& points, double cell, double half_size)
-      : edge(static_cast<int>(2 * half_size / cell) + 3), radius(cell), half(half_size) {
-    first.assign(static_cast<size_t>(edge) * edge * edge + 1, 0);
-    for (const V3d& p : points) ++first[index(place(p)) + 1];
-    for (size_t c = 1; c < first.size(); ++c) first[c] += first[c - 1];
-    std::vector<uint32_t> next(first.begin(), first.end() - 1);
-    member.resize(points.size());
-    for (uint32_t i = 0; i < points.size(); ++i) member[next[index(place(points[i]))]++] = i;
-  }
-  V3i place(V3d p) const { return V3i((p + V3d(half)) / radius) + V3i(1); }
-  size_t index(V3i c) const { return (static_cast<size_t>(c.z) * edge + c.y) * edge + c.x; }
-};
-
-V3d repulsion(const std::vector<V3d>& points, const CellGrid& grid, uint32_t i) {
-  V3d sum(0);
-  const V3i at = grid.place(points[i]);
-  for (int z = -1; z <= 1; ++z)
-    for (int y = -1; y <= 1; ++y) {
-      const size_t row = grid.index(at + V3i(-1, y, z));
-      for (uint32_t k = grid.first[row]; k < grid.first[row + 3]; ++k) {
-        const V3d d = points[i] - points[grid.member[k]];
-        const double r2 = d.length2();
-        if (r2 == 0 || r2 >= grid.radius * grid.radius) continue;
-        const double r = std::sqrt(r2), near = 1 - r / grid.radius;
-        sum += d * (near * near / r);
-      }
-    }
-  return sum;
-}
-
 }  // namespace
-
-double ball_radius(size_t n, double spacing) {
-  return spacing * std::cbrt(3 * static_cast<double>(n) / (4 * std::numbers::pi));
-}
-
-ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed) {
-  const double radius = ball_radius(n, 1);
-  const int half = static_cast<int>(radius) + 2;
-  std::mt19937 random(seed);
-  const V3d shift = even_vector(random, 0.5);
-  std::vector<V3d> points;
-  for (int z = -half; z <= half; ++z)
-    for (int y = -half; y <= half; ++y)
-      for (int x = -half; x <= half; ++x)
-        if (const V3d p = V3d(x, y, z) + shift; p.length() < radius + 1) points.push_back(p);
-  std::vector<double> distance;
-  for (const V3d& p : points) distance.push_back(p.length2());
-  std::nth_element(distance.begin(), distance.begin() + static_cast<long>(n), distance.end());
-  const double limit = distance[n];
-  std::erase_if(points, [&](const V3d& p) { return p.length2() >= limit; });
-  for (V3d& p : points) p += even_vector(random, 0.25);
-  for (int step = 0; step < steps; ++step) {
-    const CellGrid grid(points, 1.4, half + 1);
-    std::vector<V3d> moved(points.size());
-    tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(points.size()), [&](uint32_t i) {
-      moved[i] = points[i] + 0.15 * repulsion(points, grid, i);
-      const double r = moved[i].length(), wall = radius - 0.5;
-      if (r > wall) moved[i] *= wall / r;
-    });
-    points.swap(moved);
-  }
-  ParticleFrame frame = frame_of(points, spacing);
-  for (size_t i = 0; i < points.size(); ++i)
-    frame.velocity[i] = V3f(frame.position[i].z, 0, -frame.position[i].x);
-  return frame;
-}
 
 ParticleFrame two_balls(size_t n, double spacing, int steps, double gap) {
   ParticleFrame frame = relaxed_ball(n, spacing, steps, 1);

@@ -3,18 +3,9 @@
 
 #include <cstdint>
 
-#include "pipeline/contract/frames.h"
+#include "tests/surfacing/shapes.h"
 
 namespace drench::surfacing_scenes {
-
-/// Radius of the ball that n particles fill, m: n spacing^3 = 4/3 pi R^3.
-double ball_radius(size_t n, double spacing);
-
-/// n particles in a ball about the world's origin: the lattice points closest to its middle, shaken
-/// by a quarter of a spacing and pushed apart by `steps` of short-range repulsion inside a wall
-/// that, as the walls of a shot, stands half a spacing outside the outermost centres. Velocity: one
-/// turn of 1 rad/s about Y.
-ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed);
 
 /// Two balls of n particles each whose walls stand `gap` spacings apart along X.
 ParticleFrame two_balls(size_t n, double spacing, int steps, double gap);

@@ -102,7 +102,7 @@ std::vector<V3d> deepest(const Shape& shape, V3d shift) {
 }  // namespace
 
 Shape ball(double n) {
-  const double r = std::cbrt(3 * n / (4 * pi));
+  const double r = ball_radius(static_cast<size_t>(n), 1);
   return {"ball", n, V3d(r), [r](V3d p) { return p.length() - r; }, everywhere};
 }
 
@@ -184,6 +184,14 @@ ParticleFrame relaxed(const Shape& shape, double spacing, int steps, uint32_t se
     frame.velocity.push_back(V3f(float(p.z * spacing), 0, float(-p.x * spacing)));
   }
   return frame;
+}
+
+double ball_radius(size_t n, double spacing) {
+  return spacing * std::cbrt(3 * static_cast<double>(n) / (4 * pi));
+}
+
+ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed) {
+  return relaxed(ball(static_cast<double>(n)), spacing, steps, seed);
 }
 
 ShapeError shape_error(const TriangleMesh& mesh, const Shape& shape, double spacing) {

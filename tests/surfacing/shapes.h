@@ -1,6 +1,7 @@
 #pragma once
 // Shapes with a closed form, filled with relaxed particles: what a surface is measured against.
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -31,6 +32,10 @@ std::vector<Shape> all_shapes(double n);
 /// and pushed apart by `steps` of short-range repulsion inside a wall that, as the walls of a shot,
 /// stands half a spacing outside the outermost centres. Velocity: one turn of 1 rad/s about Y.
 ParticleFrame relaxed(const Shape& shape, double spacing, int steps, uint32_t seed);
+
+/// Radius of the ball that n particles fill, m: n spacing^3 = 4/3 pi R^3.
+double ball_radius(size_t n, double spacing);
+ParticleFrame relaxed_ball(size_t n, double spacing, int steps, uint32_t seed);
 
 /// Of a mesh's vertices against a shape, where it counts; lengths in spacings, angles in degrees.
 struct ShapeError {
