@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
-#include "render/contact.h"
 #include "render/path.h"
 
 namespace drench {
@@ -82,16 +81,6 @@ std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
   return normal;
 }
 
-/// Surfaces that should touch the ground end a little above or below it, and a film of air under
-/// water mirrors. The lowest part of the fluid, one spacing high, is stretched to end one spacing
-/// below the ground: contact without a gap, continuous above.
-void press_onto_ground(std::vector<V3f>& position, float ground, float spacing) {
-  for (V3f& p : position) {
-    const float height = p.y - ground;
-    if (height < spacing) p.y -= spacing - std::max(height, -spacing);
-  }
-}
-
 /// Of the vertices over the shutter; the last entry is padding.
 Imath::Box3f bounds_of(const SceneObject& object) {
   Imath::Box3f box;
@@ -162,14 +151,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                       "use a diffuse one",
                       shot.ground.material));
   }
-  if (!geometry.fluid.triangle.empty()) {
-    if (geometry.obstacle.empty()) {
-      add_fluid(shot, geometry.fluid);
-    } else {
-      add_fluid(shot, pressed_onto_obstacles(device_.get(), geometry.fluid, geometry.obstacle,
-                                             float(shot.fluid.spacing)));
-    }
-  }
+  if (!geometry.fluid.triangle.empty()) add_fluid(shot, geometry.fluid);
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
@@ -201,11 +183,7 @@ void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
   fluid_ = int(objects_.size()) - 1;
   fluid_absorption_ = materials_[material].absorption;
   fluid_ior_ = materials_[material].ior;
-  SceneObject& fluid = objects_.back();
-  if (has_ground_)
-    for (std::vector<V3f>* p : {&fluid.position, &fluid.position_close})
-      press_onto_ground(*p, ground_center_.y, float(shot.fluid.spacing));
-
+  const SceneObject& fluid = objects_.back();
   for (const ShapeLight& light : lights_.shapes()) {
     V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
     if (light.type == LightType::sphere) reach = V3f(light.radius);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/contract/files.h"
+#include "sim/births.h"
 #include "sim/solver.h"
 
 namespace drench::sim {
@@ -14,6 +15,7 @@ struct Checkpoint {
   double time = 0;  // s since the first frame
   uint64_t steps = 0;
   int next_id = 0;
+  std::vector<Birth> births;
   std::vector<uint64_t> emitted;  // layers that left each emitter, particles of a mesh
   HostState state;
   std::vector<double> probes;  // rows so far, ProbeSeries

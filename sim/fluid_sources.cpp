@@ -260,7 +260,8 @@ InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set
   const std::vector<Source> sources = all_sources(shot, make_level_set);
   InitialFluid fluid;
   Occupancy occupied(shot.fluid.spacing, shot.domain);
-  for (const Source& source : sources) {
+  for (size_t k = 0; k < sources.size(); ++k) {
+    const Source& source = sources[k];
     const size_t before = fluid.position.size();
     for (const V3d& place : source.position) {
       const V3d p = inside(shot.domain, place);
@@ -270,6 +271,7 @@ InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set
       }
       fluid.position.push_back(p);
       fluid.velocity.push_back(source.velocity);
+      fluid.source.push_back(int(k));
     }
     if (fluid.position.size() == before && !source.position.empty()) {
       throw Error(fmt::format(

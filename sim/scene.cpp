@@ -495,6 +495,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     }
     start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
     start.velocity.push(float(u.x), float(u.y), float(u.z));
+    scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
     start.id.push_back(int(start.id.size()));
   }
   start.memory_triangle.assign(start.id.size(), -1);

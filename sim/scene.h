@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
+#include "sim/births.h"
 #include "sim/mesh_emitter.h"
 #include "sim/obstacles.h"
 #include "sim/solver.h"
@@ -97,7 +98,8 @@ std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const 
 /// from it, so that nothing is filled twice.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
-  size_t overlapping = 0;  // particles that later sources lost
+  std::vector<int> source;  // as in Birth
+  size_t overlapping = 0;   // particles that later sources lost
 };
 /// @param make_level_set  needed for volumes. @throws Error as fill_volume, or if a source loses
 /// all.
@@ -114,6 +116,7 @@ struct Scene {
   std::vector<MeshEmitter> mesh_emitter;
   Wind wind;
   HostState start;
+  Births births;                                 // of the start
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
 
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.

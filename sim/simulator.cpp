@@ -55,6 +55,7 @@ struct Simulator::Implementation {
   double time = 0;  // s since the first frame; negative in the pre-roll
   uint64_t steps = 0;
   int next_id = 0;
+  sim::Births births;
   std::vector<uint64_t> emitted;
   std::vector<uint64_t> reported;  // HostState::removed of the last report
   int reported_id = 0;             // next_id of the last report
@@ -73,9 +74,10 @@ struct Simulator::Implementation {
     emitted.assign(layer.size(), 0);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 4").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 5").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(scene.start.id.size());
+    births = scene.births;
     solver->load(scene.start);
     limits = solver->measure();
     time = 0 - shot.preroll;  // no -0
@@ -110,12 +112,17 @@ struct Simulator::Implementation {
         sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
         limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
         inlet.center += inlet.velocity * (until - leaves);
+        births.add({next_id, emitter_source(e), leaves});
         add_layer(layer[e], inlet, until);
       }
     }
     for (sim::MeshEmitter& e : scene.mesh_emitter) {
       if (e.active(until)) fill(e, until);
     }
+  }
+
+  int emitter_source(size_t e) const {
+    return int(shot.fluid.sources() - shot.fluid.emitter.size() + e);
   }
 
   void check_room(size_t emitter, size_t more, double now) const {
@@ -130,6 +137,7 @@ struct Simulator::Implementation {
   void fill(sim::MeshEmitter& emitter, double now) {
     sim::HostVec position, velocity;
     std::vector<int> id;
+    births.add({next_id, emitter_source(emitter.index()), now});
     for (const auto& [p, u] : emitter.missing(scene, solver->positions(), now)) {
       if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
       position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
@@ -304,6 +312,9 @@ struct Simulator::Implementation {
       out.position.push_back(world(state.position, i));
       out.velocity.emplace_back(state.velocity.x[i], state.velocity.y[i], state.velocity.z[i]);
       out.id.push_back(uint32_t(state.id[i]));
+      const sim::Birth& birth = births.of(state.id[i]);
+      if (shot.fluid.write_source) out.source.push_back(uint8_t(birth.source));
+      if (shot.fluid.write_age) out.age.push_back(float(time - birth.time));
     }
     return out;
   }
@@ -374,8 +385,9 @@ std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame,   s.time,           s.steps,         s.next_id,
-                             s.emitted, s.solver->save(), s.probes.rows(), s.layout};
+  sim::Checkpoint checkpoint{s.frame,          s.time,          s.steps,
+                             s.next_id,        s.births.runs(), s.emitted,
+                             s.solver->save(), s.probes.rows(), s.layout};
   checkpoint.state.limits = s.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);
   s.last_checkpoint = path;
@@ -392,6 +404,7 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   }
   s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
   s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted;
+  s.births.resume(std::move(checkpoint.births));
   s.limits = checkpoint.state.limits;
   s.probes.resume(std::move(checkpoint.probes));
   s.solver->load(checkpoint.state);

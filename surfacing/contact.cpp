@@ -80,7 +80,7 @@ std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& 
 }
 
 V3f laid(const Sheets& sheets, V3i block, const V3f& p, int side, float offset) {
-  const SheetFoot foot = sheets.foot(block, p);
+  const Foot foot = sheets.foot(block, p);
   if (!foot.found()) return p;
   V3f away = p - foot.place;
   // smoothing may have moved it through
@@ -91,7 +91,7 @@ V3f laid(const Sheets& sheets, V3i block, const V3f& p, int side, float offset) 
 
 /// p, farther from the nearest sheet.
 V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
-  const SheetFoot foot = sheets.foot(block, p);
+  const Foot foot = sheets.foot(block, p);
   if (!foot.found() || distance <= 0) return p;
   return p + (p - foot.place).normalized() * distance;
 }
@@ -103,7 +103,7 @@ SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, con
   SheetContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
   const std::vector<V3f> normal = normals_of(mesh, rings);
   for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-    const SheetFoot foot = sheets.foot(block, mesh.position[v]);
+    const Foot foot = sheets.foot(block, mesh.position[v]);
     if (foot.distance > Sheets::gap + 0.25f) return;
     const V3f to = foot.place - mesh.position[v];
     if (normal[v].dot(to) < 0.4f * foot.distance) return;  // the far side of a thin film
@@ -162,7 +162,7 @@ void move_with_sheets(const LatticeMesh& mesh, const SheetContact& contact, cons
   if (sheets.empty()) return;
   for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
     if (!contact.side[v]) return;
-    const SheetFoot foot = sheets.foot(block, mesh.position[v]);
+    const Foot foot = sheets.foot(block, mesh.position[v]);
     if (foot.found()) velocity[v] = sheets.velocity(foot);
   });
 }

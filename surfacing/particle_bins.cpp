@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace drench::surfacing {
@@ -213,6 +214,16 @@ void gather_near(const BinnedParticles& particles, V3i block, float edge, float 
         gather_bins(particles, b, V3f(step * block_edge), from, to, edge, reach, near);
       }
   near.pad();
+}
+
+size_t nearest_of(const NearParticles& near, const V3f& p) {
+  size_t best = 0;
+  float least = std::numeric_limits<float>::max();
+  for (size_t j = 0; j < near.size(); ++j) {
+    const float square = (V3f(near.x[j], near.y[j], near.z[j]) - p).length2();
+    if (square < least) least = square, best = j;
+  }
+  return best;
 }
 
 }  // namespace drench::surfacing

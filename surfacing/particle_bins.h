@@ -51,6 +51,10 @@ struct NearParticles {
 void gather_near(const BinnedParticles& particles, V3i block, float edge, float reach,
                  NearParticles& near);
 
+/// The particle nearest to a point, voxels from the block's corner; of equals the first. There must
+/// be one.
+size_t nearest_of(const NearParticles& near, const V3f& p);
+
 /// Eight points of one block, voxels from its corner.
 struct PointPack {
   std::array<float, pack_width> x, y, z;

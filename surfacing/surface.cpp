@@ -10,9 +10,11 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "surfacing/attributes.h"
 #include "surfacing/contact.h"
 #include "surfacing/extract.h"
 #include "surfacing/field.h"
+#include "surfacing/overlap.h"
 #include "surfacing/smooth.h"
 #include "surfacing/velocity.h"
 
@@ -39,6 +41,11 @@ void check_settings(const ParticleFrame& particles, const SurfaceSettings& setti
   if (particles.velocity.size() != n)
     throw Error(fmt::format("surfacing: {} positions but {} velocities; a frame needs one each", n,
                             particles.velocity.size()));
+  for (const size_t rows :
+       {particles.source.size(), particles.age.size(), particles.wetness.size()})
+    if (rows != 0 && rows != n)
+      throw Error(fmt::format("surfacing: {} positions but a column of {}; a frame needs one each",
+                              n, rows));
   if (n >= UINT32_MAX)
     throw Error(fmt::format("surfacing: {} particles; at most {} fit", n, UINT32_MAX - 1));
 }
@@ -133,25 +140,46 @@ double memory_left(size_t n, double memory_gib) {
                           needed / (1 << 30), memory_gib));
 }
 
-/// Smooth, on its sheets, with normals; positions in voxels still.
+/// Sheets and obstacles near the particles, on the lattice.
+struct NearThings {
+  Sheets sheets;
+  NearTriangles obstacles;
+  std::optional<float> ground;  // voxels from the lattice's origin
+
+  NearThings(const Surroundings& around, const BinnedParticles& binned)
+      : sheets(around.sheets, binned),
+        obstacles(around.obstacles, binned, 2 * binned.lattice.voxels_per_spacing, "obstacle",
+                  "export its mesh again") {
+    if (around.ground)
+      ground = static_cast<float>(binned.lattice.to_voxels(double{*around.ground}, 1));
+  }
+};
+
+/// Smooth, in solids, on sheets, with normals; positions in voxels still.
 struct Finished {
   LatticeMesh mesh;
   SheetContact contact;
   std::vector<V3f> normal;
 };
-Finished finish(LatticeMesh extracted, const Sheets& sheets, const Lattice& lattice, int passes,
+Finished finish(LatticeMesh extracted, const NearThings& things, const Lattice& lattice, int passes,
                 bool measure_volume, SurfaceStats& report) {
   constexpr float offset = 0.02f;  // spacings before a sheet
   Finished result{std::move(extracted), {}, {}};
   LatticeMesh& mesh = result.mesh;
   const VertexRings rings = rings_of(mesh);
   const Components parts = components_of(mesh);
-  result.contact = find_contact(mesh, rings, sheets);
+  const float spacing = lattice.voxels_per_spacing;
+  result.contact = find_contact(mesh, rings, things.sheets);
   smooth_mesh(mesh, rings, parts, passes);
-  report.crossing =
-      lay_on_sheets(mesh, result.contact, sheets, offset * lattice.voxels_per_spacing);
-  result.normal =
-      sheets.empty() ? normals_of(mesh, rings) : free_normals(mesh, rings, result.contact);
+  result.normal = normals_of(mesh, rings);
+  const std::vector<uint8_t> moved =
+      overlap_solids(mesh, result.contact, things.obstacles, things.ground, spacing);
+  if (!things.sheets.empty()) {
+    report.crossing = lay_on_sheets(mesh, result.contact, things.sheets, offset * spacing);
+    std::vector<V3f> free = free_normals(mesh, rings, result.contact);
+    for (size_t v = 0; v < free.size(); ++v)  // what is in a solid keeps what it had outside
+      if (moved.empty() || !moved[v]) result.normal[v] = free[v];
+  }
   smooth_normals(result.normal, rings, passes > 0 ? 1 : 0);
   report.components = parts.size();
   report.vertices = mesh.position.size();
@@ -162,10 +190,8 @@ Finished finish(LatticeMesh extracted, const Sheets& sheets, const Lattice& latt
   return result;
 }
 
-/// In metres of the world, with all columns.
-TriangleMesh world_mesh(Finished finished, const Lattice& lattice, std::vector<V3f> velocity) {
-  TriangleMesh result;
-  result.velocity = std::move(velocity);
+/// In metres of the world, beside the columns that it has.
+TriangleMesh world_mesh(Finished finished, const Lattice& lattice, TriangleMesh result) {
   result.normal = std::move(finished.normal);
   result.triangle = std::move(finished.mesh.triangle);
   result.position = std::move(finished.mesh.position);
@@ -183,8 +209,7 @@ TriangleMesh world_mesh(Finished finished, const Lattice& lattice, std::vector<V
 }  // namespace
 
 TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings& settings,
-                           std::span<const TriangleMesh> sheet_meshes, InteriorBlocks mode,
-                           SurfaceStats* stats) {
+                           const Surroundings& around, InteriorBlocks mode, SurfaceStats* stats) {
   SurfaceStats unused;
   SurfaceStats& report = stats ? *stats : unused;
   report = {};
@@ -196,7 +221,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   BinnedParticles binned =
       bin_particles(particles.position, lattice_of(particles, settings, bounds_of(particles)));
   report.occupied_blocks = binned.block.size();
-  const Sheets sheets(sheet_meshes, binned);
+  const NearThings things(around, binned);
   report.bin_s = watch.lap();
 
   const ColourKernel kernel{static_cast<float>(settings.support),
@@ -206,7 +231,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   binned.weight = weigh_particles(binned, kernel, interior);
   report.weight_s = watch.lap();
 
-  ColourField field = evaluate_field(binned, kernel, interior, sheets, mode, left);
+  ColourField field = evaluate_field(binned, kernel, interior, things.sheets, mode, left);
   report.interior_blocks = field.stats.interior;
   report.evaluated_blocks = field.stats.evaluated;
   report.grown_blocks = field.stats.grown;
@@ -219,16 +244,17 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.extract_s = watch.lap();
 
   Finished finished =
-      finish(std::move(mesh), sheets, binned.lattice, settings.smoothing, stats != nullptr, report);
+      finish(std::move(mesh), things, binned.lattice, settings.smoothing, stats != nullptr, report);
   report.smooth_s = watch.lap();
 
-  const float velocity_reach =
+  const float column_reach =
       std::min(2.5f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
-  std::vector<V3f> velocity =
-      vertex_velocities(finished.mesh, binned, particles.velocity, velocity_reach);
-  move_with_sheets(finished.mesh, finished.contact, sheets, velocity);
+  TriangleMesh columns;
+  columns.velocity = vertex_velocities(finished.mesh, binned, particles.velocity, column_reach);
+  move_with_sheets(finished.mesh, finished.contact, things.sheets, columns.velocity);
+  add_attributes(finished.mesh, binned, particles, column_reach, columns);
   report.velocity_s = watch.lap();
-  TriangleMesh result = world_mesh(std::move(finished), binned.lattice, std::move(velocity));
+  TriangleMesh result = world_mesh(std::move(finished), binned.lattice, std::move(columns));
   report.contact = static_cast<size_t>(std::count(result.contact.begin(), result.contact.end(), 1));
   return result;
 }

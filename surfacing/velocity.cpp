@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <array>
-#include <limits>
 
 namespace drench::surfacing {
 namespace {
@@ -83,19 +82,6 @@ struct Moments {
   }
 };
 
-V3f nearest_velocity(const NearParticles& near, const std::vector<V3f>& velocity, V3f p) {
-  float best = std::numeric_limits<float>::max();
-  V3f result(0);
-  for (size_t j = 0; j < near.size(); ++j) {
-    const float distance = (V3f(near.x[j], near.y[j], near.z[j]) - p).length2();
-    if (distance < best) {
-      best = distance;
-      result = velocity[j];
-    }
-  }
-  return result;
-}
-
 /// Velocities at vertices [begin, begin + count) of one block, count <= 8.
 void pack_velocities(const std::vector<V3f>& position, uint32_t begin, uint32_t count, V3f corner,
                      const NearParticles& near, const std::vector<V3f>& relative, float reach,
@@ -119,7 +105,7 @@ void pack_velocities(const std::vector<V3f>& position, uint32_t begin, uint32_t 
   for (uint32_t k = 0; k < count; ++k)
     result[k] = weight[k] > 1e-12f
                     ? V3f(u[k], v[k], w[k])
-                    : nearest_velocity(near, relative, {points.x[k], points.y[k], points.z[k]});
+                    : relative[nearest_of(near, {points.x[k], points.y[k], points.z[k]})];
 }
 
 }  // namespace

@@ -15,6 +15,9 @@ struct ParticleFrame {
   std::vector<Imath::V3f> velocity;  // m/s
   std::vector<float> density;        // kg/m^3, or empty
   std::vector<uint32_t> id;          // unique over the shot, or empty
+  std::vector<uint8_t> source;       // of the shot's sources, in Shot order; or empty
+  std::vector<float> age;            // s since it came, or empty
+  std::vector<float> wetness;        // 0 to 1, or empty; nothing in Drench fills it yet
   float spacing = 0;                 // m, a; a particle's mass is rest_density a^3
   float rest_density = 1000;         // kg/m^3
 };
@@ -42,6 +45,8 @@ struct TriangleMesh {
   std::vector<Imath::V3f> normal;               // unit, or empty
   std::vector<Imath::V2f> uv;                   // cloth: texture and rest plane, or empty
   std::vector<Imath::V3f> rest_position;        // cloth: m, at rest, or empty
+  std::vector<float> source;                    // fluid: of the nearest particle, or empty
+  std::vector<float> age, wetness;              // fluid: as of its particles, or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
   std::vector<uint8_t> contact;                 // by triangle, 1: lies on a sheet; or empty
 };

@@ -31,6 +31,9 @@ struct VertexColumns {
 std::vector<VertexColumns> columns_of(const TriangleMesh& mesh) {
   const auto start = [](const auto& column) { return &column.data()->x; };
   std::vector<VertexColumns> columns;
+  const auto add_real = [&](const char* name, const std::vector<float>& column) {
+    if (!column.empty()) columns.push_back({{name}, column.data()});
+  };
   if (mesh.position.empty()) return columns;
   columns.push_back({{"x", "y", "z"}, start(mesh.position)});
   columns.push_back({{"vx", "vy", "vz"}, start(mesh.velocity)});
@@ -39,6 +42,7 @@ std::vector<VertexColumns> columns_of(const TriangleMesh& mesh) {
   if (!mesh.rest_position.empty()) {
     columns.push_back({{"rest_x", "rest_y", "rest_z"}, start(mesh.rest_position)});
   }
+  add_real("source", mesh.source), add_real("age", mesh.age), add_real("wetness", mesh.wetness);
   return columns;
 }
 
@@ -46,7 +50,7 @@ void check_columns(const TriangleMesh& mesh) {
   const size_t n = mesh.position.size();
   const auto fits = [&](const auto& column) { return column.empty() || column.size() == n; };
   if (mesh.velocity.size() != n || !fits(mesh.normal) || !fits(mesh.uv) ||
-      !fits(mesh.rest_position)) {
+      !fits(mesh.rest_position) || !fits(mesh.source) || !fits(mesh.age) || !fits(mesh.wetness)) {
     throw std::logic_error("mesh file: vertex columns differ in length");
   }
   if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())

@@ -75,6 +75,14 @@ void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
                   file.string(), corner(open->first.first), corner(open->first.second)));
 }
 
+void orient_outward(TriangleMesh& mesh) {
+  double volume = 0;
+  for (const Triangle& t : mesh.triangle)
+    volume += V3d(mesh.position[t.x]).dot(V3d(mesh.position[t.y]).cross(V3d(mesh.position[t.z])));
+  if (volume < 0)
+    for (Triangle& t : mesh.triangle) std::swap(t.y, t.z);
+}
+
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
   const auto first = uint32_t(mesh.position.size());
   const V3d normal = u.cross(v).normalized();
@@ -174,6 +182,7 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale) {
   TriangleMesh mesh = read_mesh(file);
   check_closed(mesh, file);
+  orient_outward(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
   return mesh;
 }

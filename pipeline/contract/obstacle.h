@@ -30,7 +30,7 @@ bool is_sequence(const std::filesystem::path& mesh_file);
 /// The file of a film frame. @throws std::logic_error if the name is no sequence.
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame);
 
-/// A closed mesh in its own coordinates times `scale`, m.
+/// A closed mesh in its own coordinates times `scale`, m, turned outward.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale);
 

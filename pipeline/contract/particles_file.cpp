@@ -15,13 +15,31 @@ namespace {
 
 using VelocityArray = points::TypedAttributeArray<openvdb::Vec3f, points::TruncateCodec>;
 using HalfArray = points::TypedAttributeArray<float, points::TruncateCodec>;
+using SourceArray = IdArray;  // one number in a block is kept once
 
 constexpr float largest_half = 65504;
 
+/// The columns of one number a particle, halves in the file unless a value is too large for one.
+struct RealColumn {
+  const char* name;
+  std::vector<float> ParticleFrame::*values;
+};
+constexpr RealColumn real_columns[] = {{"density", &ParticleFrame::density},
+                                       {"age", &ParticleFrame::age},
+                                       {"wetness", &ParticleFrame::wetness}};
+
+/// The name of a column whose value of particle i is not finite, or null.
+const char* real_not_finite(const ParticleFrame& frame, size_t i) {
+  for (const auto& [name, values] : real_columns)
+    if (!(frame.*values).empty() && !std::isfinite((frame.*values)[i])) return name;
+  return nullptr;
+}
+
 void check_frame(const fs::path& path, const ParticleFrame& frame) {
   const size_t n = frame.position.size();
-  if (frame.velocity.size() != n || (!frame.density.empty() && frame.density.size() != n) ||
-      (!frame.id.empty() && frame.id.size() != n) || !(frame.spacing > 0)) {
+  const auto fits = [&](const auto& column) { return column.empty() || column.size() == n; };
+  if (frame.velocity.size() != n || !fits(frame.density) || !fits(frame.id) ||
+      !fits(frame.source) || !fits(frame.age) || !fits(frame.wetness) || !(frame.spacing > 0)) {
     throw std::logic_error("write_particles: columns differ in length, or no spacing");
   }
   // Beyond this a voxel has no 32-bit coordinate.
@@ -30,17 +48,27 @@ void check_frame(const fs::path& path, const ParticleFrame& frame) {
     return !(std::abs(v.x) <= limit && std::abs(v.y) <= limit && std::abs(v.z) <= limit);
   };
   for (size_t i = 0; i < n; ++i) {
-    const bool density_fails = !frame.density.empty() && !std::isfinite(frame.density[i]);
+    const char* const not_finite = real_not_finite(frame, i);
     if (beyond(frame.position[i], farthest) || beyond(frame.velocity[i], largest_half) ||
-        density_fails) {
+        not_finite) {
       const Imath::V3f &x = frame.position[i], &v = frame.velocity[i];
       throw Error(
           fmt::format("{}: particle {} has position [{}, {}, {}] m and velocity [{}, {}, {}] "
                       "m/s{}; the file was "
                       "not written. The simulation has blown up: use a smaller time step",
                       path.string(), i, x.x, x.y, x.z, v.x, v.y, v.z,
-                      density_fails ? " and a density that is not finite" : ""));
+                      not_finite ? fmt::format(", whose {} is not finite", not_finite) : ""));
     }
+  }
+}
+
+void add_real(const IndexedPoints& made, const char* name, const std::vector<float>& column) {
+  if (column.empty()) return;
+  const auto [least, most] = std::minmax_element(column.begin(), column.end());
+  if (std::max(-*least, *most) < largest_half) {
+    made.add_column<HalfArray>(name, column);
+  } else {
+    made.add_column<FloatArray>(name, column);
   }
 }
 
@@ -49,16 +77,10 @@ points::PointDataGrid::Ptr grid_of(const ParticleFrame& frame) {
   const points::PointDataGrid::Ptr& grid = made.grid;
   if (!grid->tree().empty()) {
     made.add_column<VelocityArray>("v", converted<openvdb::Vec3f>(frame.velocity));
-    if (!frame.density.empty()) {
-      const float largest = *std::max_element(frame.density.begin(), frame.density.end());
-      const auto density = converted<float>(frame.density);
-      if (largest < largest_half) {
-        made.add_column<HalfArray>("density", density);
-      } else {
-        made.add_column<FloatArray>("density", density);
-      }
-    }
+    for (const auto& [name, values] : real_columns) add_real(made, name, frame.*values);
     if (!frame.id.empty()) made.add_column<IdArray>("id", converted<int32_t>(frame.id));
+    if (!frame.source.empty())
+      made.add_column<SourceArray>("source", converted<int32_t>(frame.source));
   }
   grid->setName("particles");
   grid->insertMeta("spacing", openvdb::FloatMetadata(frame.spacing));
@@ -67,35 +89,43 @@ points::PointDataGrid::Ptr grid_of(const ParticleFrame& frame) {
   return grid;
 }
 
-void append_leaf(const points::PointDataGrid& grid, const points::PointDataTree::LeafNodeType& leaf,
-                 ParticleFrame& frame) {
+using Leaf = points::PointDataTree::LeafNodeType;
+
+bool has(const Leaf& leaf, const char* name) {
+  return leaf.attributeSet().descriptor().find(name) != points::AttributeSet::INVALID_POS;
+}
+
+/// Appends a leaf's values of a column of one number a particle, if there are any.
+template <class Stored, class To>
+void append_column(const Leaf& leaf, const char* name, std::vector<To>& column) {
+  if (!has(leaf, name)) return;
+  const auto values = points::AttributeHandle<Stored>::create(leaf.constAttributeArray(name));
+  for (auto point = leaf.beginIndexOn(); point; ++point)
+    column.push_back(static_cast<To>(values->get(*point)));
+}
+
+void append_leaf(const points::PointDataGrid& grid, const Leaf& leaf, ParticleFrame& frame) {
   const points::AttributeHandle<openvdb::Vec3f> position(leaf.constAttributeArray("P"));
   const points::AttributeHandle<openvdb::Vec3f> velocity(leaf.constAttributeArray("v"));
-  const auto& descriptor = leaf.attributeSet();
-  const auto density =
-      descriptor.find("density") != points::AttributeSet::INVALID_POS
-          ? points::AttributeHandle<float>::create(leaf.constAttributeArray("density"))
-          : nullptr;
-  const auto id = descriptor.find("id") != points::AttributeSet::INVALID_POS
-                      ? points::AttributeHandle<int32_t>::create(leaf.constAttributeArray("id"))
-                      : nullptr;
   for (auto point = leaf.beginIndexOn(); point; ++point) {
     const openvdb::Vec3d cell = point.getCoord().asVec3d();
     const openvdb::Vec3d x = grid.indexToWorld(cell + openvdb::Vec3d(position.get(*point)));
     const openvdb::Vec3f v = velocity.get(*point);
     frame.position.emplace_back(float(x.x()), float(x.y()), float(x.z()));
     frame.velocity.emplace_back(v.x(), v.y(), v.z());
-    if (density) frame.density.push_back(density->get(*point));
-    if (id) frame.id.push_back(uint32_t(id->get(*point)));
   }
+  for (const auto& [name, values] : real_columns) append_column<float>(leaf, name, frame.*values);
+  append_column<int32_t>(leaf, "id", frame.id);
+  append_column<int32_t>(leaf, "source", frame.source);
 }
 
 void sort_by_id(ParticleFrame& frame) {
   const std::vector<uint32_t> order = order_of_ids(frame.id);
   reorder(frame.position, order);
   reorder(frame.velocity, order);
-  reorder(frame.density, order);
+  for (const auto& [name, values] : real_columns) reorder(frame.*values, order);
   reorder(frame.id, order);
+  reorder(frame.source, order);
 }
 
 ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
@@ -108,7 +138,10 @@ ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
   frame.position.reserve(count);
   frame.velocity.reserve(count);
   for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) append_leaf(*grid, *leaf, frame);
-  if (frame.position.size() != count) throw std::runtime_error("some particles are missing");
+  const auto fits = [&](const auto& column) { return column.empty() || column.size() == count; };
+  bool whole = frame.position.size() == count && fits(frame.id) && fits(frame.source);
+  for (const auto& [name, values] : real_columns) whole = whole && fits(frame.*values);
+  if (!whole) throw std::runtime_error("some particles are missing");
   if (!frame.id.empty()) sort_by_id(frame);
   return frame;
 }

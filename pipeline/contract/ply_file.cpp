@@ -45,6 +45,15 @@ struct PlyHeader {
   size_t body = 0;  // offset of the first byte after the header
 };
 
+/// Vertex columns of one number.
+struct RealColumn {
+  std::string_view name;
+  std::vector<float> TriangleMesh::*values;
+};
+constexpr RealColumn real_columns[] = {{"source", &TriangleMesh::source},
+                                       {"age", &TriangleMesh::age},
+                                       {"wetness", &TriangleMesh::wetness}};
+
 class PlyReader {
  public:
   PlyReader(const fs::path& path, std::string_view text) : path_(path), text_(text) {}
@@ -254,7 +263,7 @@ class PlyReader {
     const auto slot = [&](auto& column, size_t component) {
       using Vector = typename std::decay_t<decltype(column)>::value_type;
       column.resize(mesh_.position.size(), Vector(0));
-      return column.empty() ? nullptr : &column.data()->x + component;
+      return column.empty() ? nullptr : reinterpret_cast<float*>(column.data()) + component;
     };
     constexpr std::array<std::string_view, 3> x{"x", "y", "z"}, v{"vx", "vy", "vz"},
         n{"nx", "ny", "nz"}, r{"rest_x", "rest_y", "rest_z"};
@@ -266,10 +275,14 @@ class PlyReader {
     }
     if (name == "u" || name == "s") return slot(mesh_.uv, 0);
     if (name == "v" || name == "t") return slot(mesh_.uv, 1);
+    for (const auto& [real, values] : real_columns)
+      if (name == real) return slot(mesh_.*values, 0);
     return nullptr;
   }
 
   static size_t stride_of(std::string_view name) {
+    for (const auto& [real, values] : real_columns)
+      if (name == real) return 1;
     return name == "u" || name == "v" || name == "s" || name == "t" ? 2 : 3;
   }
 

@@ -127,14 +127,16 @@ struct Fluid {
   double surface_tension = 0;         // N/m, incompressible
   double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none
   double sound_speed = 0;             // m/s; 0: ten times the largest speed expected
+  bool write_source = false, write_age = false;  // columns of the particle files
   std::string material = "water";
   std::vector<FluidBox> box;
   std::vector<FluidSphere> sphere;
   std::vector<FluidEmitter> emitter;
   std::vector<FluidDrops> drops;
   std::vector<FluidVolume> volume;
-  bool present() const {
-    return !(box.empty() && sphere.empty() && emitter.empty() && drops.empty() && volume.empty());
+  bool present() const { return sources() > 0; }
+  size_t sources() const {
+    return box.size() + sphere.size() + drops.size() + volume.size() + emitter.size();
   }
 };
 

@@ -228,6 +228,10 @@ class Checker {
   }
 
   void check_fluid() const {
+    if (shot_.fluid.write_source && shot_.fluid.sources() > 256)
+      fail("fluid.write_source", fmt::format("the shot has {} sources of fluid; at most 256 can be "
+                                             "told apart. Leave it out, or use fewer",
+                                             shot_.fluid.sources()));
     const Fluid& fluid = shot_.fluid;
     if (fluid.solver == FluidSolver::incompressible && !shot_.cloth.empty() &&
         shot_.coupling.scheme == CouplingScheme::paper) {

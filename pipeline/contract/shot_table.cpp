@@ -105,7 +105,7 @@ std::vector<Parameter> shot_rows() {
 
 std::vector<Parameter> fluid_rows() {
   return {
-      row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh | render,
+      row<&Fluid::spacing>("fluid", "spacing", "m", {1e-5, 10}, simulate | mesh,
                            "distance a of particles at rest; a particle has mass rest_density a^3"),
       row<&Fluid::support_ratio>("fluid", "support_ratio", "", {0, 6}, simulate,
                                  "support radius of the kernels / spacing; 0 is 2.15 for the "
@@ -135,6 +135,12 @@ std::vector<Parameter> fluid_rows() {
           "fluid", "sound_speed", "m/s", {0, 1e4}, simulate,
           "of the weakly compressible solver: stiffness; 0 chooses ten times the "
           "largest speed expected"),
+      row<&Fluid::write_source>(
+          "fluid", "write_source", "", none, simulate,
+          "particles and the mesh's vertices get the number of their source: boxes, spheres, "
+          "drops, volumes, then emitters, each in the order of the shot, from 0"),
+      row<&Fluid::write_age>("fluid", "write_age", "", none, simulate,
+                             "particles and the mesh's vertices get their time in the shot, s"),
       row<&Fluid::material>("fluid", "material", "", none, render, "name of a [[material]]"),
 
       row<&FluidBox::min>("fluid.box", "min", "m", place, simulate, "lower corner").needed(),
@@ -219,35 +225,35 @@ std::vector<Parameter> cloth_rows() {
 }
 
 std::vector<Parameter> obstacle_rows() {
-  constexpr unsigned both = simulate | render;
+  constexpr unsigned all = simulate | mesh | render;
   return {
-      row<&Obstacle::type>("obstacle", "type", "", none, both, "its shape")
+      row<&Obstacle::type>("obstacle", "type", "", none, all, "its shape")
           .one_of({"plane", "box", "sphere", "mesh"})
           .needed()
           .identity(),
-      row<&Obstacle::name>("obstacle", "name", "", none, both,
+      row<&Obstacle::name>("obstacle", "name", "", none, all,
                            "obstacle, obstacle2, ... unless given")
           .identity(),
-      row<&Obstacle::position>("obstacle", "position", "m", place, both,
+      row<&Obstacle::position>("obstacle", "position", "m", place, all,
                                "a point of the plane, the centre of the box or sphere, the origin "
                                "of the mesh; may be animated"),
-      row<&Obstacle::rotation_deg>("obstacle", "rotation_deg", "deg", {-360000, 360000}, both,
+      row<&Obstacle::rotation_deg>("obstacle", "rotation_deg", "deg", {-360000, 360000}, all,
                                    "about x, then y, then z through position; may be animated"),
-      row<&Obstacle::position>("obstacle", "interp", "", none, both,
+      row<&Obstacle::position>("obstacle", "interp", "", none, all,
                                "between the keys of position and rotation_deg")
           .as(Kind::track_mode)
           .one_of({"linear", "smooth"}),
-      row<&Obstacle::normal>("obstacle", "normal", "", place, both,
+      row<&Obstacle::normal>("obstacle", "normal", "", place, all,
                              "points from the solid to the fluid; any length but 0")
           .only(plane),
-      row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, both, "edges").only(box),
-      row<&Obstacle::radius>("obstacle", "radius", "m", {0, 1e5}, both, "radius").only(ball),
-      row<&Obstacle::mesh_file>("obstacle", "mesh", "", none, both,
+      row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, all, "edges").only(box),
+      row<&Obstacle::radius>("obstacle", "radius", "m", {0, 1e5}, all, "radius").only(ball),
+      row<&Obstacle::mesh_file>("obstacle", "mesh", "", none, all,
                                 "closed PLY or OBJ; with %04d in the name one file for every frame "
                                 "of the shot, of the same triangles")
           .as(Kind::mesh_files)
           .only(mesh_type),
-      row<&Obstacle::scale>("obstacle", "scale", "", {1e-6, 1e6}, both,
+      row<&Obstacle::scale>("obstacle", "scale", "", {1e-6, 1e6}, all,
                             "metres for a unit of the file")
           .only(mesh_type),
       row<&Obstacle::friction>("obstacle", "friction", "", {0, 100}, simulate,
@@ -388,9 +394,9 @@ std::vector<Parameter> material_rows() {
 
 std::vector<Parameter> picture_rows() {
   return {
-      row<&Ground::present>("ground", "present", "", none, render,
+      row<&Ground::present>("ground", "present", "", none, mesh | render,
                             "a horizontal plane that is drawn; true when [ground] is written"),
-      row<&Ground::height>("ground", "height", "m", place, render, "its y"),
+      row<&Ground::height>("ground", "height", "m", place, mesh | render, "its y"),
       row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
       row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
       row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),

@@ -357,8 +357,9 @@ Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup) {
 }
 
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup) {
-  const auto inputs = digests_of(simulated_files(wanted, frame), lookup);
+  auto inputs = digests_of(simulated_files(wanted, frame), lookup);
   if (!inputs) return {};
+  for (auto& input : sequence_inputs(wanted, frame, frame)) inputs->push_back(input);
   return decide(mesh_files(wanted, frame), step_key(wanted.mesh, Step::mesh, frame, *inputs),
                 lookup);
 }

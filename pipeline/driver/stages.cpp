@@ -120,12 +120,16 @@ class ShotStages final : public Stages {
 
   StageReport mesh(const fs::path& folder, int frame) override {
     const ParticleFrame particles = read_particles(folder / layout::particles(frame));
-    std::vector<TriangleMesh> sheets;
+    std::vector<TriangleMesh> sheets, obstacles;
     for (const Cloth& cloth : shot_.cloth)
       sheets.push_back(read_mesh(folder / layout::cloth(cloth.name, frame)));
+    for (const Obstacle& obstacle : shot_.obstacle)
+      obstacles.push_back(obstacle_surface(shot_, obstacle, frame));
+    Surroundings around{sheets, obstacles, {}};
+    if (shot_.ground.present) around.ground = float(shot_.ground.height);
     SurfaceStats stats;
     const TriangleMesh surface =
-        surface_frame(particles, shot_.surface, sheets, InteriorBlocks::skip, &stats);
+        surface_frame(particles, shot_.surface, around, InteriorBlocks::skip, &stats);
     StageReport report;
     report.files.push_back(write_mesh(folder / layout::fluid_mesh(frame), surface));
     if (shot_.surface.obj) {

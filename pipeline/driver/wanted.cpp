@@ -122,6 +122,14 @@ StageKey foam_key(const Shot& shot) {
       .finish();
 }
 
+StageKey mesh_key(const Shot& shot) {
+  StageKeyBuilder builder("mesh", build_id::mesh,
+                          sections_of(shot, {"surface", "obstacle", "ground"}));
+  builder.settings(stage_settings_digest(shot, Stage::mesh));
+  add_obstacle_meshes(shot, builder);
+  return builder.finish();
+}
+
 StageKey render_key(const Shot& shot) {
   StageKeyBuilder builder(
       "render", build_id::render,
@@ -173,9 +181,12 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.sequence = sequence_digests(shot);
   for (const Probe& probe : shot.probe) wanted.probe.push_back(probe.name);
   wanted.simulate = simulate_key(shot, device_class);
-  wanted.mesh = StageKeyBuilder("mesh", build_id::mesh, sections_of(shot, {"surface"}))
-                    .settings(stage_settings_digest(shot, Stage::mesh))
-                    .finish();
+  wanted.obstacles_move =
+      std::any_of(shot.obstacle.begin(), shot.obstacle.end(), [](const Obstacle& o) {
+        return o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1 ||
+               is_sequence(o.mesh_file);
+      });
+  wanted.mesh = mesh_key(shot);
   wanted.has_foam = wanted.fluid && shot.foam.present;
   if (wanted.has_foam) wanted.foam = foam_key(shot);
   wanted.render = render_key(shot);

@@ -39,6 +39,7 @@ struct Wanted {
   bool has_foam = false;           // every frame from the first on has a file of foam
   std::vector<std::string> cloth;  // names of the sheets
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
+  bool obstacles_move = false;     // equal particles then do not make equal meshes
   std::vector<std::string> probe;  // names of the probes: one file each for all frames
   StageKey simulate, mesh, foam, render, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;

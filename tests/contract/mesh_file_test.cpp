@@ -31,6 +31,7 @@ TriangleMesh full_sheet() {
       mesh.normal.emplace_back(0.f, 0.6f, 0.8f);
       mesh.uv.emplace_back(a / 4, b / 3);
       mesh.rest_position.emplace_back(b, a, -0.f);
+      mesh.source.push_back(float(i)), mesh.age.push_back(a * b), mesh.wetness.push_back(b / 3);
       if (i == 3 || j == 2) continue;
       const uint32_t k = j * 4 + i;
       mesh.triangle.emplace_back(k, k + 1, k + 5);
@@ -54,9 +55,13 @@ TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
   mesh.normal.clear();
   mesh.uv.clear();
   mesh.rest_position.clear();
+  mesh.source.clear(), mesh.wetness.clear();
   mesh.contact.clear();
   write_mesh(folder / "sheet.ply", mesh);
   expect_same_bits(read_mesh(folder / "sheet.ply"), mesh);
+  mesh.age[3] = std::numeric_limits<float>::infinity();
+  EXPECT_NE(error_of([&] { write_mesh(folder / "sheet.ply", mesh); }).find("age of vertex 3"),
+            std::string::npos);
 }
 
 TEST(MeshFile, HoldsAnEmptyMesh) {
@@ -119,6 +124,7 @@ TEST(ObjFile, HoldsANormalForEveryVertex) {
   mesh.velocity.resize(3);
   mesh.uv.clear();
   mesh.rest_position.clear();
+  mesh.source.clear(), mesh.age.clear(), mesh.wetness.clear();
   mesh.normal = {{0, 0.6f, 0.8f}, {1, 0, 0}, {0, -1, 1e-9f}};
   mesh.triangle = {{0, 1, 2}, {2, 1, 0}};
   mesh.contact = {0, 1};

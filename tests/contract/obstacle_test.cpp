@@ -141,6 +141,14 @@ TEST(ObstacleSequence, HasAFileForEveryFrameAndVelocityBetweenThem) {
   EXPECT_THROW(obstacle_surface(shot, ball, 1003), Error);
 }
 
+TEST(ObstacleMesh, IsTurnedOutward) {
+  const TemporaryFolder folder;
+  TriangleMesh inward = test::unit_sphere(6, 8);
+  for (auto& t : inward.triangle) std::swap(t.y, t.z);
+  write_mesh(folder / "inward.ply", inward);
+  EXPECT_EQ(read_closed_mesh(folder / "inward.ply", 1).triangle, test::unit_sphere(6, 8).triangle);
+}
+
 TEST(ObstacleMesh, MustBeClosed) {
   const TemporaryFolder folder;
   TriangleMesh open = test::unit_sphere(6, 8);

@@ -72,6 +72,30 @@ TEST(ParticlesFile, KeepsLargeIdsAndFrameWithoutOptionalColumns) {
   EXPECT_TRUE(read_particles(folder / "p.vdb").id.empty());
 }
 
+// Halves have 11 bits; sources are whole numbers.
+TEST(ParticlesFile, ReturnsSourceAgeAndWetness) {
+  const TemporaryFolder folder;
+  ParticleFrame frame = cloud(3000);
+  for (size_t i = 0; i < frame.id.size(); ++i) {
+    frame.source.push_back(uint8_t(i % 256));
+    frame.age.push_back(0.01f * float(i) - 2);
+    frame.wetness.push_back(float(i) / 3000);
+  }
+  write_particles(folder / "p.vdb", frame);
+  const ParticleFrame read = read_particles(folder / "p.vdb");
+  ASSERT_EQ(read.source.size(), frame.source.size());
+  for (size_t i = 0; i < frame.id.size(); ++i) {
+    const size_t k = frame.id[i];  // sorted by id, and ids are 0 to n - 1
+    ASSERT_EQ(read.source[k], frame.source[i]);
+    ASSERT_NEAR(read.age[k], frame.age[i], std::abs(frame.age[i]) / 2048);
+    ASSERT_NEAR(read.wetness[k], frame.wetness[i], 1 / 2048.);
+  }
+  frame.age[5] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(
+      error_of([&] { write_particles(folder / "q.vdb", frame); }).find("whose age is not finite"),
+      std::string::npos);
+}
+
 TEST(ParticlesFile, HoldsNoParticles) {
   const TemporaryFolder folder;
   ParticleFrame frame;

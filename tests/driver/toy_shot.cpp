@@ -76,6 +76,7 @@ Wanted toy_wanted(const ToySettings& settings) {
   if (!settings.fluid) wanted.cloth = {"flag"};
   wanted.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
   wanted.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
+  wanted.obstacles_move = settings.obstacles_move;
   wanted.has_foam = settings.foam;
   if (settings.foam) wanted.steps.push_back(Step::foam);
   if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");

@@ -24,6 +24,7 @@ struct ToySettings {
   std::string program = "1";
   bool fluid = true;
   bool foam = false;
+  bool obstacles_move = false;
   double foam_rate = 0.25;
   std::vector<Step> steps{Step::simulate, Step::mesh, Step::render, Step::contact_sheet};
 };

@@ -91,7 +91,7 @@ TEST_P(Contact, NothingCrossesASheet) {
     const std::vector<TriangleMesh> sheet{turned(sheet_of(12, scene.place), 0.4 * seed)};
     SurfaceStats stats;
     const TriangleMesh mesh =
-        surface_frame(around(sheet[0], seed), {}, sheet, InteriorBlocks::skip, &stats);
+        surface_frame(around(sheet[0], seed), {}, {sheet}, InteriorBlocks::skip, &stats);
     EXPECT_EQ(defects_of(mesh), Defects{});
     EXPECT_EQ(crossings_of(mesh, sheet[0]), 0u);
     EXPECT_EQ(stats.crossing, 0u);
@@ -113,7 +113,7 @@ TEST(ContactOfPools, LieOnTheSheetAndStayApart) {
     if (both)
       append(frame, shaken_box(V3f(-10, -6, -10) * spacing, V3i(20, 6, 20), spacing, 0.05, 2));
     SurfaceStats stats;
-    const TriangleMesh mesh = surface_frame(frame, {}, sheet, InteriorBlocks::skip, &stats);
+    const TriangleMesh mesh = surface_frame(frame, {}, {sheet}, InteriorBlocks::skip, &stats);
     EXPECT_EQ(topology_of(mesh).components, both ? 2u : 1u);
     EXPECT_EQ(crossings_of(mesh, sheet[0]), 0u);
     double area = 0, deepest = 0, highest = 0;
@@ -139,7 +139,7 @@ TEST(ContactOfPools, MovesWithTheSheet) {
   const std::vector<TriangleMesh> sheet{
       sheet_of(24, [](float u, float v) { return V3f(16 * u, 0, 16 * v); })};
   const ParticleFrame frame = shaken_box(V3f(-0.1f, 0, -0.1f), V3i(20, 6, 20), spacing, 0.05, 1);
-  const TriangleMesh mesh = surface_frame(frame, {}, sheet);
+  const TriangleMesh mesh = surface_frame(frame, {}, {sheet});
   size_t seen = 0;
   for (size_t t = 0; t < mesh.triangle.size(); ++t)
     for (int k = 0; k < 3; ++k) {
@@ -156,7 +156,7 @@ TEST(ContactOfPools, HasTheSameBitsForAnyThreadCount) {
   const auto with_threads = [&](int threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
     tbb::task_arena arena(threads);
-    return arena.execute([&] { return surface_frame(frame, {}, sheet); });
+    return arena.execute([&] { return surface_frame(frame, {}, {sheet}); });
   };
   const TriangleMesh one = with_threads(1);
   test::expect_same_bits(one, with_threads(2));
@@ -168,7 +168,7 @@ TEST(ContactOfPools, SaysWhatIsWrongWithASheet) {
   const ParticleFrame frame = shaken_box(V3f(0), V3i(4), spacing, 0.1, 1);
   const TriangleMesh good = sheet_of(2, [](float u, float v) { return V3f(u, 0, v); });
   const auto complaint = [&](TriangleMesh bad) {
-    return test::error_of([&] { surface_frame(frame, {}, std::vector{good, bad}); });
+    return test::error_of([&] { surface_frame(frame, {}, {std::vector{good, bad}}); });
   };
   TriangleMesh bad = good;
   bad.position[3].y = std::nanf("");
@@ -184,7 +184,7 @@ TEST(ContactOfPools, FarSheetsChangeNothing) {
   const std::vector<TriangleMesh> sheet{
       sheet_of(4, [](float u, float v) { return V3f(16 * u, 40, 1e4f * v); })};
   const ParticleFrame frame = shaken_box(V3f(0), V3i(12), spacing, 0.2, 1);
-  const TriangleMesh with = surface_frame(frame, {}, sheet), without = surface_frame(frame, {});
+  const TriangleMesh with = surface_frame(frame, {}, {sheet}), without = surface_frame(frame, {});
   EXPECT_EQ(with.position, without.position);
   EXPECT_EQ(with.triangle, without.triangle);
   EXPECT_EQ(with.normal, without.normal);
