@@ -45,6 +45,8 @@ class Executor {
   void start_simulation();
   void advance_to(int frame);
   void mesh_frames();
+  bool is_held(int frame) const;
+  StageReport held_mesh(int frame) const;
   void make_mesh(int frame);
   void make_foam(int frame);
   void render_frames();
@@ -301,6 +303,34 @@ void Executor::simulate_frames() {
 
 // ---- mesh and render ----
 
+/// Whether the mesh of the frame before is that of this one: of the same bytes, with nothing around
+/// that moves.
+bool Executor::is_held(int frame) const {
+  if (wanted_.obstacles_move || frame == wanted_.first) return false;
+  const std::vector<std::string> now = simulated_files(wanted_, frame),
+                                 before = simulated_files(wanted_, frame - 1);
+  for (size_t k = 0; k < now.size(); ++k) {
+    const auto file = manifest_.find(now[k]), earlier = manifest_.find(before[k]);
+    if (!file || !earlier || file->digest != earlier->digest) return false;
+  }
+  const std::optional<Decision> decision = decide_mesh(wanted_, frame - 1, lookup_);
+  return decision && !decision->make;
+}
+
+StageReport Executor::held_mesh(int frame) const {
+  StageReport report;
+  const std::vector<std::string> files = mesh_files(wanted_, frame),
+                                 before = mesh_files(wanted_, frame - 1);
+  for (size_t k = 0; k < files.size(); ++k) {
+    const std::vector<std::byte> bytes = read_file(folder_ / before[k]);
+    report.files.push_back(write_file_whole(
+        folder_ / files[k], {reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+  }
+  report.line = fmt::format("as frame {}", frame - 1);
+  report.json = fmt::format("{{\"held\":{}}}", frame - 1);
+  return report;
+}
+
 void Executor::make_mesh(int frame) {
   const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
   if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame));
@@ -308,7 +338,8 @@ void Executor::make_mesh(int frame) {
   const Clock::time_point start = Clock::now();
   for (const std::string& file : simulated_files(wanted_, frame)) check_input(file);
   StageReport report;
-  compute(mesh_arena_, [&] { report = stages_.mesh(folder_, frame); });
+  compute(mesh_arena_,
+          [&] { report = is_held(frame) ? held_mesh(frame) : stages_.mesh(folder_, frame); });
   commit(report.files, step_name(Step::mesh), frame, decision->key);
   finished(Step::mesh, frame, start, report);
 }

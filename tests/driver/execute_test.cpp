@@ -138,6 +138,7 @@ TEST(Execute, StopsAChangeAtTheFirstFileThatComesOutTheSame) {
 TEST(Execute, RendersOnlyFramesWhoseMeshChanged) {
   const TemporaryFolder folder;
   ToySettings settings;
+  settings.obstacles_move = true;  // or the later frames would not be meshed at all
   settings.mesh_digits = 1;
   settings.growth = 2;
   const Made first(settings, folder);
@@ -146,6 +147,24 @@ TEST(Execute, RendersOnlyFramesWhoseMeshChanged) {
   EXPECT_EQ(second.count(Step::mesh), 25);
   EXPECT_EQ(second.frames(Step::render), (std::vector<int>{1}));
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+// The state stands still from the second frame on, and so do its files.
+TEST(Execute, TakesTheMeshOfAHeldFrameFromTheFrameBefore) {
+  const TemporaryFolder folder;
+  ToySettings settings;
+  settings.growth = 2;
+  const Made held(settings, folder);
+  EXPECT_EQ(held.frames(Step::mesh), (std::vector<int>{1, 2}));
+  EXPECT_EQ(held.count(Step::render), 25);
+  std::filesystem::remove(folder.path() / layout::fluid_mesh(7));
+  const Made mended(settings, folder);
+  EXPECT_EQ(mended.count(Step::mesh), 0);
+  const std::map<std::string, std::string> files = digests_in(folder.path());
+  settings.obstacles_move = true;
+  EXPECT_EQ(files, undisturbed(settings));
+  std::filesystem::remove(folder.path() / layout::fluid_mesh(7));
+  EXPECT_EQ(Made(settings, folder).count(Step::mesh), 1);
 }
 
 TEST(Execute, MakesAMissingImageAlone) {
