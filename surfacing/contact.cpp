@@ -147,11 +147,10 @@ std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
   std::vector<V3f> normal(mesh.position.size());
   tbb::parallel_for(size_t{0}, normal.size(), [&](size_t v) {
     V3f free(0);
-    for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k) {
-      const auto [a, b] = rings.wing[k];
+    rings.for_each_triangle(static_cast<uint32_t>(v), [&](uint32_t a, uint32_t b) {
       if (!contact.touches({static_cast<uint32_t>(v), a, b}))
         free += (mesh.position[a] - mesh.position[v]).cross(mesh.position[b] - mesh.position[v]);
-    }
+    });
     normal[v] = free.normalized();
   });
   return normal;

@@ -13,7 +13,6 @@
 namespace drench::surfacing {
 namespace {
 
-constexpr int rows = block_edge * block_edge;
 constexpr int corner_edge = block_edge + 1;  // lattice points along the edge of a block's cells
 
 /// What a block owns: the cut edges that start at its lattice points, and its cells' triangles.
@@ -21,12 +20,12 @@ struct BlockPlan {
   uint32_t field = 0;
   uint32_t first_vertex = 0, vertices = 0;
   uint32_t first_triangle = 0, triangles = 0;
-  std::array<std::array<uint8_t, rows>, 3> cut{};    // axis, row: bit x is set if the edge is cut
-  std::array<std::array<uint16_t, rows>, 3> rank{};  // cut edges before the row
+  std::array<std::array<uint64_t, block_edge>, 3> cut{};   // axis, z: bit 8 y + x: the edge is cut
+  std::array<std::array<uint16_t, block_edge>, 3> rank{};  // cut edges before the layer
 
-  uint32_t vertex(int axis, int row, int x) const {
-    const unsigned before = cut[axis][row] & ((1u << x) - 1);
-    return first_vertex + rank[axis][row] + static_cast<uint32_t>(std::popcount(before));
+  uint32_t vertex(int axis, int x, int y, int z) const {
+    const uint64_t before = cut[axis][z] & ((uint64_t{1} << (block_edge * y + x)) - 1);
+    return first_vertex + rank[axis][z] + static_cast<uint32_t>(std::popcount(before));
   }
 };
 
@@ -90,26 +89,37 @@ bool may_hold_surface(const FieldBlock& field) {
   return std::any_of(field.inside.begin(), field.inside.end(), [](uint8_t v) { return v != 0; });
 }
 
-void plan_block(const ColourField& field, BlockPlan& plan) {
-  const Upper upper = upper_blocks(field, plan.field);
-  const bool any = std::any_of(upper.begin(), upper.end(), [&](uint32_t f) {
-    return f != BlockMap::none && may_hold_surface(field.block[f]);
+/// Blocks, in order, of which an upper neighbour or they themselves may hold surface.
+std::vector<uint32_t> blocks_with_surface(const ColourField& field) {
+  std::vector<uint8_t> any(field.order.size());
+  tbb::parallel_for(size_t{0}, any.size(), [&](size_t k) {
+    const Upper upper = upper_blocks(field, field.order[k]);
+    any[k] = std::any_of(upper.begin(), upper.end(), [&](uint32_t f) {
+      return f != BlockMap::none && may_hold_surface(field.block[f]);
+    });
   });
-  if (!any) return;
-  const InsideRows inside = inside_rows(field, upper);
+  std::vector<uint32_t> blocks;
+  for (size_t k = 0; k < any.size(); ++k)
+    if (any[k]) blocks.push_back(field.order[k]);
+  return blocks;
+}
+
+void plan_block(const ColourField& field, BlockPlan& plan) {
+  const InsideRows inside = inside_rows(field, upper_blocks(field, plan.field));
   uint32_t count = 0;
   for (int axis = 0; axis < 3; ++axis)
-    for (int z = 0; z < block_edge; ++z)
+    for (int z = 0; z < block_edge; ++z) {
+      uint64_t& cut = plan.cut[axis][z];
       for (int y = 0; y < block_edge; ++y) {
         const unsigned here = inside[z][y];
         const unsigned there = axis == 0   ? here >> 1
                                : axis == 1 ? inside[z][y + 1]
                                            : inside[z + 1][y];
-        const int row = z * block_edge + y;
-        plan.cut[axis][row] = static_cast<uint8_t>(here ^ there);
-        plan.rank[axis][row] = static_cast<uint16_t>(count);
-        count += static_cast<uint32_t>(std::popcount(plan.cut[axis][row]));
+        cut |= uint64_t{static_cast<uint8_t>(here ^ there)} << block_edge * y;
       }
+      plan.rank[axis][z] = static_cast<uint16_t>(count);
+      count += static_cast<uint32_t>(std::popcount(cut));
+    }
   plan.vertices = count;
   const auto& table = marching_cubes_table();
   for_each_cut_cell(
@@ -128,15 +138,16 @@ void emit_vertices(const ColourField& field, const BlockPlan& plan, float iso_va
   const V3f corner(field.block[plan.field].block * block_edge);
   uint32_t next = plan.first_vertex;
   for (int axis = 0; axis < 3; ++axis)
-    for (int row = 0; row < rows; ++row)
-      for (unsigned bits = plan.cut[axis][row]; bits != 0; bits &= bits - 1) {
-        const V3i at(std::countr_zero(bits), row % block_edge, row / block_edge);
+    for (int z = 0; z < block_edge; ++z)
+      for (uint64_t bits = plan.cut[axis][z]; bits != 0; bits &= bits - 1) {
+        const int place = std::countr_zero(bits);
+        const V3i at(place % block_edge, place / block_edge, z);
         V3i end = at;
         ++end[axis];
         const uint32_t other = end[axis] < block_edge ? plan.field : upper[1 << axis];
         end[axis] %= block_edge;
         const auto value = [&](uint32_t f, V3i p) {
-          return field.block[f].value[(p.z * block_edge + p.y) * block_edge + p.x];
+          return field.value[f][(p.z * block_edge + p.y) * block_edge + p.x];
         };
         V3f p = corner + V3f(at);
         p[axis] += cut_at(value(plan.field, at), value(other, end), iso_value);
@@ -156,8 +167,8 @@ void emit_triangles(const ColourField& field, const std::vector<BlockPlan>& plan
       const CubeEdge e = cube_edge(edge);
       const int ex = x + (e.start & 1), ey = y + (e.start >> 1 & 1), ez = z + (e.start >> 2);
       const uint32_t owner = upper[ex / block_edge | ey / block_edge << 1 | ez / block_edge << 2];
-      return plans[plan_of[owner]].vertex(e.axis, ez % block_edge * block_edge + ey % block_edge,
-                                          ex % block_edge);
+      return plans[plan_of[owner]].vertex(e.axis, ex % block_edge, ey % block_edge,
+                                          ez % block_edge);
     };
     const CubeCase& cube = table[index];
     for (int t = 0; t < cube.triangles; ++t) {
@@ -169,10 +180,11 @@ void emit_triangles(const ColourField& field, const std::vector<BlockPlan>& plan
 
 }  // namespace
 
-LatticeMesh extract_surface(const ColourField& field, float iso_value, double max_bytes) {
-  std::vector<BlockPlan> plans(field.order.size());
+LatticeMesh extract_surface(ColourField field, float iso_value, double max_bytes) {
+  const std::vector<uint32_t> with_surface = blocks_with_surface(field);
+  std::vector<BlockPlan> plans(with_surface.size());
   tbb::parallel_for(size_t{0}, plans.size(), [&](size_t k) {
-    plans[k].field = field.order[k];
+    plans[k].field = with_surface[k];
     plan_block(field, plans[k]);
   });
   std::erase_if(plans, [](const BlockPlan& p) { return p.vertices == 0 && p.triangles == 0; });
@@ -186,7 +198,7 @@ LatticeMesh extract_surface(const ColourField& field, float iso_value, double ma
     triangles += plan.triangles;
   }
   // A vertex has position, velocity, normal and, while smoothing, three more points and its edges.
-  const double bytes = static_cast<double>(vertices) * 150 + static_cast<double>(triangles) * 12;
+  const double bytes = static_cast<double>(vertices) * 110 + static_cast<double>(triangles) * 12;
   if (bytes > max_bytes || triangles > UINT32_MAX / 3)
     throw Error(
         fmt::format("surfacing: {} triangles need {:.3g} GiB, more than the {:.3g} GiB left of "
@@ -194,13 +206,15 @@ LatticeMesh extract_surface(const ColourField& field, float iso_value, double ma
                     triangles, bytes / (1 << 30), max_bytes / (1 << 30)));
   LatticeMesh mesh;
   mesh.position.resize(vertices);
-  mesh.triangle.resize(triangles);
   for (const BlockPlan& plan : plans)
     if (plan.vertices > 0)
       mesh.block.push_back(
           {field.block[plan.field].block, plan.first_vertex, plan.first_vertex + plan.vertices});
+  tbb::parallel_for(size_t{0}, plans.size(),
+                    [&](size_t k) { emit_vertices(field, plans[k], iso_value, mesh.position); });
+  field.value = std::vector<BlockValues>();  // frees them
+  mesh.triangle.resize(triangles);
   tbb::parallel_for(size_t{0}, plans.size(), [&](size_t k) {
-    emit_vertices(field, plans[k], iso_value, mesh.position);
     emit_triangles(field, plans, plan_of, plans[k], mesh.triangle);
   });
   return mesh;

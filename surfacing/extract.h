@@ -23,7 +23,8 @@ struct LatticeMesh {
   std::vector<BlockVertices> block;
 };
 
+/// @param field      is used up: its values go before there are triangles
 /// @param max_bytes  that the mesh and what is made from it may take; Error with the number if not.
-LatticeMesh extract_surface(const ColourField& field, float iso_value, double max_bytes);
+LatticeMesh extract_surface(ColourField field, float iso_value, double max_bytes);
 
 }  // namespace drench::surfacing

@@ -50,7 +50,7 @@ Pack add_spline(Pack sum, Pack distance_squared, Pack weight2, Pack weight8) {
 }
 
 /// Adds one particle to every row of the block that it reaches. p in supports from lattice point 0.
-void splat(const V3f p, float weight, float step, FieldBlock& field) {
+void splat(const V3f p, float weight, float step, BlockValues& value) {
   const auto away = [&](float v) { return std::max({-v, v - (block_edge - 1) * step, 0.f}); };
   const Pack dx = lanes() * step - p.x;
   const Pack dx2 = dx * dx;
@@ -60,7 +60,7 @@ void splat(const V3f p, float weight, float step, FieldBlock& field) {
     const float dz = z * step - p.z;
     const float free_z = free_x - dz * dz;
     if (free_z <= 0) continue;
-    float* row = field.value.data() + z * rows;
+    float* row = value.data() + z * rows;
     for (int y = 0; y < block_edge; ++y, row += block_edge) {
       const float dy = y * step - p.y;
       if (dy * dy >= free_z) continue;
@@ -70,17 +70,18 @@ void splat(const V3f p, float weight, float step, FieldBlock& field) {
 }
 
 void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel,
-                    const Sheets& sheets, FieldBlock& field, NearParticles& near) {
-  field.value.fill(0.f);
+                    const Sheets& sheets, FieldBlock& field, BlockValues& value,
+                    NearParticles& near) {
+  value.fill(0.f);
   const float reach = particles.lattice.reach;
   gather_near(particles, field.block, block_edge - 1, reach, near);
   const float step = 1 / reach, scale = kernel.scale();
   for (size_t j = 0; j < near.size(); ++j)
-    splat(V3f(near.x[j], near.y[j], near.z[j]) * step, near.weight[j] * scale, step, field);
-  if (sheets.near(field.block)) sheets.cut(field, kernel.iso_value);
+    splat(V3f(near.x[j], near.y[j], near.z[j]) * step, near.weight[j] * scale, step, value);
+  if (sheets.near(field.block)) sheets.cut(field.block, value, kernel.iso_value);
   for (int row = 0; row < rows; ++row)
     field.inside[row] = static_cast<uint8_t>(
-        not_less_bits(load(field.value.data() + row * block_edge), pack(kernel.iso_value)));
+        not_less_bits(load(value.data() + row * block_edge), pack(kernel.iso_value)));
 }
 
 /// Blocks and what is known of them while the set grows. Occupied blocks come first, in the order
@@ -180,7 +181,7 @@ std::vector<BlockKey> contradicted(const BlockSet& set, const std::vector<FieldB
 }
 
 void check_memory(size_t blocks, double max_bytes) {
-  const double bytes = static_cast<double>(blocks) * sizeof(FieldBlock);
+  const double bytes = static_cast<double>(blocks) * bytes_a_block;
   if (bytes <= max_bytes) return;
   throw Error(
       fmt::format("surfacing: {} lattice blocks need {:.3g} GiB, more than the {:.3g} GiB left of "
@@ -309,7 +310,10 @@ ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel&
   while (!wanted.empty()) {
     const size_t first_new = field.block.size();
     check_memory(first_new + wanted.size(), max_bytes);
+    // Growing would copy them all and keep both; the closure adds a hundredth.
+    if (first_new == 0) field.value.reserve(wanted.size() + wanted.size() / 16 + 64);
     field.block.resize(first_new + wanted.size());
+    field.value.resize(first_new + wanted.size());
     for (size_t k = 0; k < wanted.size(); ++k) {
       if (set.map.insert(wanted[k], static_cast<uint32_t>(set.key.size()))) {
         set.key.push_back(wanted[k]);
@@ -319,7 +323,7 @@ ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel&
       field.block[first_new + k].block = block_of(wanted[k]);
     }
     tbb::parallel_for(first_new, field.block.size(), [&](size_t f) {
-      evaluate_block(particles, kernel, sheets, field.block[f], nears.local());
+      evaluate_block(particles, kernel, sheets, field.block[f], field.value[f], nears.local());
     });
     wanted = contradicted(set, field.block, first_new);
     field.stats.grown += wanted.size();

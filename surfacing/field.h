@@ -40,9 +40,10 @@ struct ColourKernel {
 };
 
 /// The values of a block's 8^3 lattice points; x runs fastest.
+using BlockValues = std::array<float, block_size>;
+
 struct FieldBlock {
   V3i block;
-  std::array<float, block_size> value;
   std::array<uint8_t, block_edge * block_edge> inside;  // a byte a row, bit x: value >= iso
 };
 
@@ -54,10 +55,13 @@ struct FieldStats {
 /// Evaluated blocks; every lattice point elsewhere is on the same side as all its neighbours.
 struct ColourField {
   std::vector<FieldBlock> block;
-  std::vector<uint32_t> order;  // of the blocks by their keys
-  BlockMap map;                 // evaluated block -> index in `block`
+  std::vector<BlockValues> value;  // of each
+  std::vector<uint32_t> order;     // of the blocks by their keys
+  BlockMap map;                    // evaluated block -> index in `block`
   FieldStats stats;
 };
+
+inline constexpr size_t bytes_a_block = sizeof(FieldBlock) + sizeof(BlockValues);
 
 class Sheets;
 

@@ -29,12 +29,12 @@ Sheets::Sheets(std::span<const TriangleMesh> meshes, const BinnedParticles& part
   }
 }
 
-void Sheets::cut(FieldBlock& field, float iso_value) const {
+void Sheets::cut(V3i block, BlockValues& value, float iso_value) const {
   constexpr float slope = 0.25f;  // of the field in a voxel, about that at a surface
   std::array<float, block_size> square;
   square.fill(reach * reach);
-  const V3f origin(field.block * block_edge);
-  for_each_near(field.block, [&](uint32_t triangle) {
+  const V3f origin(block * block_edge);
+  for_each_near(block, [&](uint32_t triangle) {
     const auto& t = corners(triangle);
     const TriangleBox box = box_of(t, reach);
     V3i low, high;
@@ -52,7 +52,7 @@ void Sheets::cut(FieldBlock& field, float iso_value) const {
   });
   for (size_t k = 0; k < block_size; ++k) {
     if (square[k] >= reach * reach) continue;
-    field.value[k] = std::min(field.value[k], iso_value + slope * (std::sqrt(square[k]) - gap));
+    value[k] = std::min(value[k], iso_value + slope * (std::sqrt(square[k]) - gap));
   }
 }
 

@@ -25,7 +25,7 @@ class Sheets : public NearTriangles {
   Sheets(std::span<const TriangleMesh> meshes, const BinnedParticles& particles);
 
   /// Cuts the field of a block to the gap.
-  void cut(FieldBlock& field, float iso_value) const;
+  void cut(V3i block, BlockValues& value, float iso_value) const;
   /// Of the sheet at a foot, m/s.
   V3f velocity(const Foot& foot) const;
 

@@ -1,5 +1,6 @@
 #include "surfacing/smooth.h"
 
+#include <immintrin.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -7,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace drench::surfacing {
 namespace {
@@ -39,18 +41,31 @@ std::vector<float> forth_and_back(int n) {
   return coefficient;
 }
 
-V3f mean_of_neighbours(const std::vector<V3f>& value, const VertexRings& rings, uint32_t v) {
-  V3f sum(0);
+/// A column with one more row, so that four floats can be read from any.
+std::vector<V3f> padded(const std::vector<V3f>& column) {
+  std::vector<V3f> copy;
+  copy.reserve(column.size() + 1);
+  copy.assign(column.begin(), column.end());
+  copy.emplace_back(0.f);
+  return copy;
+}
+
+V3f mean_of_neighbours(const std::vector<V3f>& padded, const VertexRings& rings, uint32_t v) {
+  __m128 sum = _mm_setzero_ps();
   const uint32_t begin = rings.first[v], end = rings.first[v + 1];
-  for (uint32_t k = begin; k < end; ++k) sum += value[rings.wing[k][0]];
-  return sum / static_cast<float>(end - begin);
+  for (uint32_t k = begin; k < end; ++k)
+    sum = _mm_add_ps(sum, _mm_loadu_ps(&padded[rings.neighbour[k]].x));
+  sum = _mm_div_ps(sum, _mm_set1_ps(static_cast<float>(end - begin)));
+  alignas(16) float mean[4];
+  _mm_store_ps(mean, sum);
+  return {mean[0], mean[1], mean[2]};
 }
 
 /// value = sum of coefficient[k] T_k(A) value, A the mean of the neighbours, T_k by their
 /// recurrence.
 void filter(std::vector<V3f>& value, const VertexRings& rings,
             const std::vector<float>& coefficient) {
-  std::vector<V3f> before = value, now(value.size());
+  std::vector<V3f> before = padded(value), now(before.size(), V3f(0));
   for_each_vertex(value.size(), [&](uint32_t v) {
     now[v] = mean_of_neighbours(before, rings, v);
     value[v] = before[v] * coefficient[0] + now[v] * coefficient[1];
@@ -104,9 +119,9 @@ T sum_over(const Components& parts, size_t part, F f) {
 
 V3f normal_times_area(const LatticeMesh& mesh, const VertexRings& rings, uint32_t v) {
   V3f sum(0);
-  for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k)
-    sum += (mesh.position[rings.wing[k][0]] - mesh.position[v])
-               .cross(mesh.position[rings.wing[k][1]] - mesh.position[v]);
+  rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
+    sum += (mesh.position[a] - mesh.position[v]).cross(mesh.position[b] - mesh.position[v]);
+  });
   return sum;
 }
 
@@ -122,23 +137,11 @@ double volume_of(const LatticeMesh& mesh, const VertexRings& rings, const Compon
   return sum_over<double>(parts, part, [&](uint32_t v) {
     const V3d p = V3d(mesh.position[v]) - about;
     double sum = 0;
-    for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k)
-      if (v < rings.wing[k][0] && v < rings.wing[k][1])  // each triangle once
-        sum += p.dot((V3d(mesh.position[rings.wing[k][0]]) - about)
-                         .cross(V3d(mesh.position[rings.wing[k][1]]) - about));
+    rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
+      if (v < a && v < b)  // each triangle once
+        sum += p.dot((V3d(mesh.position[a]) - about).cross(V3d(mesh.position[b]) - about));
+    });
     return sum / 6;
-  });
-}
-
-double area_of(const LatticeMesh& mesh, const VertexRings& rings, const Components& parts,
-               size_t part) {
-  return sum_over<double>(parts, part, [&](uint32_t v) {
-    double sum = 0;
-    for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k)
-      sum += (mesh.position[rings.wing[k][0]] - mesh.position[v])
-                 .cross(mesh.position[rings.wing[k][1]] - mesh.position[v])
-                 .length();
-    return sum / 6;  // half a cross product, and each triangle is met three times
   });
 }
 
@@ -161,22 +164,55 @@ void scale_part(LatticeMesh& mesh, const Components& parts, size_t part, double 
   });
 }
 
-/// Shifts a part along its normals to the wanted volume; two Newton steps, since the area follows.
+/// Volumes of a part whose vertices go by s times their normals: coefficients of 1, s, s^2, s^3.
+Imath::V4d volume_by_shift(const LatticeMesh& mesh, const VertexRings& rings,
+                           const Components& parts, size_t part, const std::vector<V3f>& normal) {
+  const V3d about(mesh.position[parts.vertex[parts.first[part]]]);
+  return sum_over<Imath::V4d>(parts, part, [&](uint32_t v) {
+    const V3d p = V3d(mesh.position[v]) - about, n(normal[v]);
+    Imath::V4d sum(0);
+    rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
+      if (v > a || v > b) return;  // each triangle once
+      const V3d pa = V3d(mesh.position[a]) - about, pb = V3d(mesh.position[b]) - about,
+                na(normal[a]), nb(normal[b]);
+      const V3d zero = pa.cross(pb), one = pa.cross(nb) + na.cross(pb), two = na.cross(nb);
+      sum += {p.dot(zero), n.dot(zero) + p.dot(one), n.dot(one) + p.dot(two), n.dot(two)};
+    });
+    return sum / 6.;
+  });
+}
+
+/// Shifts a part along its normals to the wanted volume, which is a cubic of the shift.
 void shift_part(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, size_t part,
-                double wanted) {
-  for (int step = 0; step < 2; ++step) {
-    const double missing = wanted - volume_of(mesh, rings, parts, part);
-    const double area = area_of(mesh, rings, parts, part);
-    const float shift = static_cast<float>(std::clamp(missing / area, -0.5, 0.5));
-    std::vector<V3f> offset(parts.first[part + 1] - parts.first[part]);
-    tbb::parallel_for(size_t{0}, offset.size(), [&](size_t k) {
-      const uint32_t v = parts.vertex[parts.first[part] + k];
-      offset[k] = shift * unit_or_up(normal_times_area(mesh, rings, v));
-    });
-    tbb::parallel_for(size_t{0}, offset.size(), [&](size_t k) {
-      mesh.position[parts.vertex[parts.first[part] + k]] += offset[k];
-    });
+                double wanted, std::vector<V3f>& normal) {
+  for_each_member(parts, part,
+                  [&](uint32_t v) { normal[v] = unit_or_up(normal_times_area(mesh, rings, v)); });
+  const Imath::V4d c = volume_by_shift(mesh, rings, parts, part, normal);
+  double shift = 0;
+  for (int step = 0; step < 4; ++step)
+    shift -= (c[0] - wanted + shift * (c[1] + shift * (c[2] + shift * c[3]))) /
+             (c[1] + shift * (2 * c[2] + shift * 3 * c[3]));
+  const float voxels = static_cast<float>(std::clamp(shift, -0.5, 0.5));
+  for_each_member(parts, part, [&](uint32_t v) { mesh.position[v] += voxels * normal[v]; });
+}
+
+/// Of the triangles around v makes the ring of its neighbours.
+void order_ring(const LatticeMesh& mesh, uint32_t v, std::span<uint32_t> ring,
+                std::vector<std::array<uint32_t, 2>>& side) {
+  const auto edge_from = [&](uint32_t t) {  // the side of triangle t across from v
+    const Triangle& triangle = mesh.triangle[t];
+    const int k = triangle.x == v ? 0 : triangle.y == v ? 1 : 2;
+    return std::array{triangle[(k + 1) % 3], triangle[(k + 2) % 3]};
+  };
+  side.resize(ring.size());
+  std::transform(ring.begin(), ring.end(), side.begin(), edge_from);
+  std::swap(side[0], *std::min_element(side.begin(), side.end()));
+  for (size_t k = 0; k + 1 < side.size(); ++k) {
+    const auto next = std::find_if(side.begin() + ptrdiff_t(k) + 1, side.end(),
+                                   [&](const auto& s) { return s[0] == side[k][1]; });
+    if (next != side.end()) std::swap(side[k + 1], *next);
   }
+  std::transform(side.begin(), side.end(), ring.begin(), [](const auto& s) { return s[0]; });
 }
 
 }  // namespace
@@ -190,19 +226,22 @@ VertexRings rings_of(const LatticeMesh& mesh) {
       std::atomic_ref(rings.first[mesh.triangle[t][k] + 1]).fetch_add(1, std::memory_order_relaxed);
   });
   for (size_t v = 0; v < vertices; ++v) rings.first[v + 1] += rings.first[v];
-  rings.wing.resize(rings.first[vertices]);
+  rings.neighbour.resize(rings.first[vertices]);  // of triangles, to begin with
   std::vector<uint32_t> next(rings.first.begin(), rings.first.end() - 1);
   for_each_vertex(mesh.triangle.size(), [&](uint32_t t) {
-    const Triangle& triangle = mesh.triangle[t];
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t slot =
-          std::atomic_ref(next[triangle[k]]).fetch_add(1, std::memory_order_relaxed);
-      rings.wing[slot] = {triangle[(k + 1) % 3], triangle[(k + 2) % 3]};
-    }
+    for (int k = 0; k < 3; ++k)
+      rings.neighbour[std::atomic_ref(next[mesh.triangle[t][k]])
+                          .fetch_add(1, std::memory_order_relaxed)] = t;
   });
-  for_each_vertex(vertices, [&](uint32_t v) {  // threads took slots in any order
-    std::sort(rings.wing.begin() + rings.first[v], rings.wing.begin() + rings.first[v + 1]);
-  });
+  tbb::parallel_for(tbb::blocked_range<uint32_t>(0, static_cast<uint32_t>(vertices), 2048),
+                    [&](const auto& range) {
+                      std::vector<std::array<uint32_t, 2>> side;
+                      for (uint32_t v = range.begin(); v < range.end(); ++v)
+                        order_ring(mesh, v,
+                                   {rings.neighbour.begin() + rings.first[v],
+                                    rings.neighbour.begin() + rings.first[v + 1]},
+                                   side);
+                    });
   return rings;
 }
 
@@ -249,9 +288,8 @@ std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings) {
 }
 
 void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int passes) {
-  std::vector<V3f> before(normal.size());
   for (int pass = 0; pass < passes; ++pass) {
-    before.swap(normal);
+    const std::vector<V3f> before = padded(normal);
     for_each_vertex(normal.size(), [&](uint32_t v) {
       normal[v] = 0.5f * (before[v] + mean_of_neighbours(before, rings, v));
     });
@@ -264,10 +302,11 @@ void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& 
   const std::vector<double> wanted = volumes_of(mesh, rings, parts);
   const std::vector<V3f> raw = mesh.position;
   filter(mesh.position, rings, forth_and_back(passes));
+  std::vector<V3f> normal(mesh.position.size());
   tbb::parallel_for(size_t{0}, parts.size(), [&](size_t c) {
     constexpr uint32_t drop = 1000;  // vertices; scaling suits a compact part of any shape
     if (parts.first[c + 1] - parts.first[c] > drop)
-      return shift_part(mesh, rings, parts, c, wanted[c]);
+      return shift_part(mesh, rings, parts, c, wanted[c], normal);
     // A cavity has a negative volume; a part that collapsed is not smoothed at all.
     const double kept = volume_of(mesh, rings, parts, c) / wanted[c];
     if (kept > 0.01) return scale_part(mesh, parts, c, 1 / kept);

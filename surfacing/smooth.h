@@ -8,11 +8,21 @@
 
 namespace drench::surfacing {
 
-/// The triangles around each vertex: of triangle (v, a, b) the pair {a, b}, sorted by a. On a
-/// closed manifold mesh the first entries are the vertex's neighbours, each once.
+/// The neighbours of each vertex of a closed manifold mesh, each once, in the order in which the
+/// triangles (v, a, b) around it follow each other: b is the next one's a. The first is the lowest.
 struct VertexRings {
-  std::vector<uint32_t> first;  // vertices + 1
-  std::vector<std::array<uint32_t, 2>> wing;
+  std::vector<uint32_t> first;      // vertices + 1
+  std::vector<uint32_t> neighbour;  // grouped by vertex
+
+  /// Calls f(a, b) for the triangles (v, a, b).
+  template <class F>
+  void for_each_triangle(uint32_t v, F f) const {
+    uint32_t before = neighbour[first[v + 1] - 1];
+    for (uint32_t k = first[v]; k < first[v + 1]; ++k) {
+      f(before, neighbour[k]);
+      before = neighbour[k];
+    }
+  }
 };
 VertexRings rings_of(const LatticeMesh& mesh);
 

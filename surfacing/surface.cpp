@@ -238,9 +238,8 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.closure_rounds = field.stats.closure_rounds;
   report.field_s = watch.lap();
 
-  LatticeMesh mesh = extract_surface(
-      field, kernel.iso_value, left - static_cast<double>(field.block.size() * sizeof(FieldBlock)));
-  field = ColourField{};
+  const double beside = left - static_cast<double>(field.block.size() * bytes_a_block);
+  LatticeMesh mesh = extract_surface(std::move(field), kernel.iso_value, beside);
   report.extract_s = watch.lap();
 
   Finished finished =

@@ -233,7 +233,7 @@ struct SurfaceSettings {
   double voxel = 0.5;       // voxel edge / spacing
   double support = 2.5;     // kernel support / spacing
   double iso_value = 0.45;  // of the colour field
-  int smoothing = 10;       // passes on the mesh, volume kept
+  int smoothing = 20;       // passes on the mesh, volume kept
   bool obj = false;         // also write fluid.####.obj
   bool level_set = false;   // also write fluid.####.vdb
   double memory_gib = 8;    // refuse grids that would need more

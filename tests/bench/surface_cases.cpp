@@ -164,12 +164,28 @@ void surface_scaling(const Emit& emit) {
   }
 }
 
+/// The highest memory while a splash is meshed, particles and all.
+void surface_memory(const Emit& emit) {
+  for (const auto& [voxel, gate] : {std::pair{0.5, 350.}, {0.25, 900.}}) {
+    const ParticleFrame frame = surfacing_scenes::splash(1000000, spacing, 1);
+    SurfaceSettings settings;
+    settings.voxel = voxel;
+    const Run run = cheapest(frame, settings);
+    Line line = line_of(frame, settings, run);
+    line.error = run.cost.peak_mib, line.gate = gate;
+    line.error_of = "peak memory, MiB";
+    emit(line);
+  }
+}
+
 const Registration sphere{
     "surface_sphere", "surfacing: time and error on a sphere, 65k to 1M particles", surface_sphere};
 const Registration error{"surface_error", "surfacing: errors on five shapes, 8k to 1M particles",
                          surface_error};
 const Registration thin{"surface_thin", "surfacing: single particles and stretched sheets",
                         surface_thin};
+const Registration memory{"surface_memory",
+                          "surfacing: memory on a splash of 1M at h = r and r / 2", surface_memory};
 const Registration scaling{"surface_scaling", "surfacing: cost of a particle from 65k to 8M",
                            surface_scaling};
 

@@ -54,17 +54,17 @@ TEST(ColourField, IsTheSumOverAllParticles) {
     const ColourField field =
         evaluate_field(binned, kernel, interior, Sheets{}, InteriorBlocks::evaluate, 1e9);
     ASSERT_GT(field.block.size(), 8u);
-    for (const FieldBlock& block : field.block)
+    for (size_t b = 0; b < field.block.size(); ++b)
       for (int k = 0; k < block_size; k += 7) {
         const V3d point =
-            (V3d(block.block * block_edge + V3i(k % 8, k / 8 % 8, k / 64)) - V3d(64)) *
+            (V3d(field.block[b].block * block_edge + V3i(k % 8, k / 8 % 8, k / 64)) - V3d(64)) *
             (0.5 * spacing);
         double sum = 0;
         for (size_t j = 0; j < binned.source.size(); ++j)
           sum += binned.weight[j] * 8 / (std::numbers::pi * std::pow(support, 3)) *
                  spline((V3d(frame.position[binned.source[j]]) - point).length() /
                         (support * spacing));
-        EXPECT_NEAR(block.value[k], sum, 1e-5 * (1 + sum));
+        EXPECT_NEAR(field.value[b][k], sum, 1e-5 * (1 + sum));
       }
   }
 }
