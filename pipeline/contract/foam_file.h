@@ -8,7 +8,7 @@
 
 namespace drench {
 
-/// Writes 16-bit positions in voxels of 2 spacings and the other columns as they are, Blosc: what
+/// Writes 16-bit positions in voxels of 4 spacings and the other columns as they are, Blosc: what
 /// is read is the state that the next frame starts from. Columns are P, v, id, age, pscale and kind
 /// (0 spray, 1 foam, 2 bubble). Equal frames give equal bytes, for any thread count.
 /// @throws Error for a particle that is not finite or too far away.

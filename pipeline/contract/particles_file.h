@@ -8,7 +8,7 @@
 
 namespace drench {
 
-/// Writes 16-bit positions in voxels of 2 spacings, half velocities and the columns present, Blosc.
+/// Writes 16-bit positions in voxels of 4 spacings, half velocities and the columns present, Blosc.
 /// Equal frames give equal bytes (the header's random UUID becomes a digest of the content), for
 /// any thread count. Order of particles is kept only up to `id`.
 WrittenFile write_particles(const std::filesystem::path& path, const ParticleFrame& frame);

@@ -21,7 +21,7 @@ using PositionCodec = points::FixedPointCodec</*OneByte=*/false>;
 using FloatArray = points::TypedAttributeArray<float, points::NullCodec>;
 using IdArray = points::TypedAttributeArray<int32_t, points::NullCodec>;  // Houdini's type of id
 
-inline constexpr double voxel_in_spacings = 2;
+inline constexpr double voxel_in_spacings = 4;
 
 /// A column as OpenVDB's functions want it.
 template <class To, class From>

@@ -138,7 +138,7 @@ TEST(ParticlesFile, OpensInOpenVdbByName) {
   const auto grid = file.readGrid("particles");
   EXPECT_EQ(grid->valueType(), "ptdataidx32");
   EXPECT_EQ(grid->metaValue<int64_t>("count"), 2);
-  EXPECT_NEAR(grid->voxelSize().x(), 0.02, 1e-9);
+  EXPECT_NEAR(grid->voxelSize().x(), 0.04, 1e-9);
 }
 
 }  // namespace
