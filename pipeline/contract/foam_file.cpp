@@ -51,28 +51,12 @@ points::PointDataGrid::Ptr grid_of(const FoamFrame& frame) {
   return made.grid;
 }
 
-void append_leaf(const points::PointDataGrid& grid, const points::PointDataTree::LeafNodeType& leaf,
-                 FoamFrame& frame) {
-  const points::AttributeHandle<openvdb::Vec3f> position(leaf.constAttributeArray("P"));
-  const points::AttributeHandle<openvdb::Vec3f> velocity(leaf.constAttributeArray("v"));
-  const points::AttributeHandle<int32_t> id(leaf.constAttributeArray("id"));
-  const points::AttributeHandle<float> age(leaf.constAttributeArray("age"));
-  const points::AttributeHandle<float> radius(leaf.constAttributeArray("pscale"));
-  const points::AttributeHandle<int8_t> kind(leaf.constAttributeArray("kind"));
-  for (auto point = leaf.beginIndexOn(); point; ++point) {
-    const openvdb::Vec3d cell = point.getCoord().asVec3d();
-    const openvdb::Vec3d x = grid.indexToWorld(cell + openvdb::Vec3d(position.get(*point)));
-    const openvdb::Vec3f v = velocity.get(*point);
-    const int8_t of_kind = kind.get(*point);
-    if (of_kind < 0 || of_kind > int8_t(FoamKind::bubble))
-      throw std::runtime_error("a particle is neither spray nor foam nor a bubble");
-    frame.position.emplace_back(float(x.x()), float(x.y()), float(x.z()));
-    frame.velocity.emplace_back(v.x(), v.y(), v.z());
-    frame.id.push_back(uint32_t(id.get(*point)));
-    frame.age.push_back(age.get(*point));
-    frame.radius.push_back(radius.get(*point));
-    frame.kind.push_back(FoamKind(of_kind));
-  }
+void append_leaf(const points::PointDataGrid& grid, const Leaf& leaf, FoamFrame& frame) {
+  append_motion(grid, leaf, frame.position, frame.velocity);
+  append_column<int32_t>(leaf, "id", frame.id);
+  append_column<float>(leaf, "age", frame.age);
+  append_column<float>(leaf, "pscale", frame.radius);
+  append_column<int8_t>(leaf, "kind", frame.kind);
 }
 
 FoamFrame frame_of(const openvdb::GridBase::Ptr& base) {
@@ -83,7 +67,12 @@ FoamFrame frame_of(const openvdb::GridBase::Ptr& base) {
   frame.next_id = uint32_t(meta_value<int64_t>(*grid, "next_id"));
   const size_t count = checked_count(*grid);
   for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) append_leaf(*grid, *leaf, frame);
-  if (frame.position.size() != count) throw std::runtime_error("some particles are missing");
+  for (const size_t rows : {frame.position.size(), frame.id.size(), frame.age.size(),
+                            frame.radius.size(), frame.kind.size()})
+    if (rows != count) throw std::runtime_error("some particles are missing");
+  if (std::any_of(frame.kind.begin(), frame.kind.end(),
+                  [](FoamKind kind) { return kind > FoamKind::bubble; }))
+    throw std::runtime_error("a particle is neither spray nor foam nor a bubble");
   const std::vector<uint32_t> order = order_of_ids(frame.id);
   reorder(frame.position, order);
   reorder(frame.velocity, order);
@@ -103,17 +92,9 @@ WrittenFile write_foam(const fs::path& path, const FoamFrame& frame) {
 }
 
 FoamFrame read_foam(const fs::path& path) {
-  const std::vector<std::byte> bytes = read_file(path);
-  try {
-    return frame_of(vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& problem) {
-    throw Error(
-        fmt::format("{}: cannot be used as a foam cache: {}. Remove it; the run makes it "
-                    "again, and the frames after it if it comes out different",
-                    path.string(), problem.what()));
-  }
+  return read_points(path, "a foam cache",
+                     "the run makes it again, and the frames after it if it comes out different",
+                     frame_of);
 }
 
 }  // namespace drench

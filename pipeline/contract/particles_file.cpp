@@ -89,31 +89,8 @@ points::PointDataGrid::Ptr grid_of(const ParticleFrame& frame) {
   return grid;
 }
 
-using Leaf = points::PointDataTree::LeafNodeType;
-
-bool has(const Leaf& leaf, const char* name) {
-  return leaf.attributeSet().descriptor().find(name) != points::AttributeSet::INVALID_POS;
-}
-
-/// Appends a leaf's values of a column of one number a particle, if there are any.
-template <class Stored, class To>
-void append_column(const Leaf& leaf, const char* name, std::vector<To>& column) {
-  if (!has(leaf, name)) return;
-  const auto values = points::AttributeHandle<Stored>::create(leaf.constAttributeArray(name));
-  for (auto point = leaf.beginIndexOn(); point; ++point)
-    column.push_back(static_cast<To>(values->get(*point)));
-}
-
 void append_leaf(const points::PointDataGrid& grid, const Leaf& leaf, ParticleFrame& frame) {
-  const points::AttributeHandle<openvdb::Vec3f> position(leaf.constAttributeArray("P"));
-  const points::AttributeHandle<openvdb::Vec3f> velocity(leaf.constAttributeArray("v"));
-  for (auto point = leaf.beginIndexOn(); point; ++point) {
-    const openvdb::Vec3d cell = point.getCoord().asVec3d();
-    const openvdb::Vec3d x = grid.indexToWorld(cell + openvdb::Vec3d(position.get(*point)));
-    const openvdb::Vec3f v = velocity.get(*point);
-    frame.position.emplace_back(float(x.x()), float(x.y()), float(x.z()));
-    frame.velocity.emplace_back(v.x(), v.y(), v.z());
-  }
+  append_motion(grid, leaf, frame.position, frame.velocity);
   for (const auto& [name, values] : real_columns) append_column<float>(leaf, name, frame.*values);
   append_column<int32_t>(leaf, "id", frame.id);
   append_column<int32_t>(leaf, "source", frame.source);
@@ -155,17 +132,7 @@ WrittenFile write_particles(const fs::path& path, const ParticleFrame& frame) {
 }
 
 ParticleFrame read_particles(const fs::path& path) {
-  const std::vector<std::byte> bytes = read_file(path);
-  try {
-    return frame_of(vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& problem) {
-    throw Error(
-        fmt::format("{}: cannot be used as a particle cache: {}. Remove it; the simulation "
-                    "will write it again",
-                    path.string(), problem.what()));
-  }
+  return read_points(path, "a particle cache", "the simulation will write it again", frame_of);
 }
 
 }  // namespace drench

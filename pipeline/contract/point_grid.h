@@ -13,6 +13,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/vdb_archive.h"
+
 namespace drench {
 
 namespace points = openvdb::points;
@@ -81,6 +85,48 @@ inline size_t checked_count(const points::PointDataGrid& grid) {
     throw std::runtime_error("it holds another number of particles than it says");
   }
   return size_t(count);
+}
+
+using Leaf = points::PointDataTree::LeafNodeType;
+
+/// Appends places and velocities of a leaf's points, m and m/s.
+inline void append_motion(const points::PointDataGrid& grid, const Leaf& leaf,
+                          std::vector<Imath::V3f>& position, std::vector<Imath::V3f>& velocity) {
+  const points::AttributeHandle<openvdb::Vec3f> own_place(leaf.constAttributeArray("P"));
+  const points::AttributeHandle<openvdb::Vec3f> own_velocity(leaf.constAttributeArray("v"));
+  for (auto point = leaf.beginIndexOn(); point; ++point) {
+    const openvdb::Vec3d cell = point.getCoord().asVec3d();
+    const openvdb::Vec3d x = grid.indexToWorld(cell + openvdb::Vec3d(own_place.get(*point)));
+    const openvdb::Vec3f v = own_velocity.get(*point);
+    position.emplace_back(float(x.x()), float(x.y()), float(x.z()));
+    velocity.emplace_back(v.x(), v.y(), v.z());
+  }
+}
+
+/// Appends a leaf's values of a column of one number a point, if it has that column.
+template <class Stored, class To>
+void append_column(const Leaf& leaf, const char* name, std::vector<To>& column) {
+  if (leaf.attributeSet().find(name) == points::AttributeSet::INVALID_POS) return;
+  const points::AttributeHandle<Stored> values(leaf.constAttributeArray(name));
+  for (auto point = leaf.beginIndexOn(); point; ++point)
+    column.push_back(static_cast<To>(values.get(*point)));
+}
+
+/// What `frame_of` makes of the first grid of a file.
+/// @throws Error naming file and reason if it is damaged or not `what`, with the way to get it
+/// anew.
+template <class FrameOf>
+auto read_points(const std::filesystem::path& path, const char* what, const char* remade,
+                 FrameOf frame_of) {
+  const std::vector<std::byte> bytes = read_file(path);
+  try {
+    return frame_of(vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& problem) {
+    throw Error(fmt::format("{}: cannot be used as {}: {}. Remove it; {}", path.string(), what,
+                            problem.what(), remade));
+  }
 }
 
 /// Indices in the order of rising ids.
