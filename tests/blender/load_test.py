@@ -95,6 +95,16 @@ def test_velocity_is_that_of_a_ball_in_flight():
         numpy.testing.assert_allclose(velocity, expected, atol=0.01 * SPEED)
 
 
+def test_age_and_source_are_there():
+    load_script(OUT)
+    mesh = bpy.data.objects["fluid"].data
+    for frame in (1001, 1003):
+        bpy.context.scene.frame_set(frame)
+        age = column(mesh.attributes["age"].data, "value", 1)
+        numpy.testing.assert_allclose(age, (frame - 1001) / FPS, rtol=1e-3)
+        assert not column(mesh.attributes["source"].data, "value", 1).any(), "there is one source"
+
+
 def test_up_is_up():
     load_script(OUT)
     bpy.context.view_layer.update()
