@@ -20,19 +20,18 @@ void for_each_vertex(size_t n, F f) {
   });
 }
 
-/// Chebyshev coefficients over a in [-1, 1] of the filter 2 p^n - p^2n, p = (1 + a) / 2: n passes
-/// forth and n over the displacement back. With a = cos(t) it falls as a Gaussian in t, so that few
-/// passes make 2 n: 10 for 20, within 1e-3.
-std::vector<float> forth_and_back(int n) {
+/// Chebyshev coefficients over a in [-1, 1] of p^n, p = (1 + a) / 2: n passes. With a = cos(t) it
+/// falls as a Gaussian in t, so that few make n: 10 for 20, within 2e-3.
+std::vector<float> passes_in_few(int n) {
   constexpr int samples = 512;
-  constexpr double least = 1e-3;
+  constexpr double least = 2e-3;
   std::vector<float> coefficient;
   double left = 1;  // that the sum at a = 1, where all polynomials are 1, lacks
   for (int k = 0; std::abs(left) > least || k < 3; ++k) {
     double sum = 0;
     for (int s = 0; s < samples; ++s) {
-      const double t = (s + 0.5) * std::numbers::pi / samples, p = 0.5 + 0.5 * std::cos(t);
-      sum += (2 * std::pow(p, n) - std::pow(p, 2 * n)) * std::cos(k * t);
+      const double t = (s + 0.5) * std::numbers::pi / samples;
+      sum += std::pow(0.5 + 0.5 * std::cos(t), n) * std::cos(k * t);
     }
     coefficient.push_back(static_cast<float>((k == 0 ? 1 : 2) * sum / samples));
     left -= coefficient.back();
@@ -42,11 +41,12 @@ std::vector<float> forth_and_back(int n) {
 }
 
 /// A column with one more row, so that four floats can be read from any.
-std::vector<V3f> padded(const std::vector<V3f>& column) {
-  std::vector<V3f> copy;
+template <class T>
+std::vector<T> padded(const std::vector<T>& column) {
+  std::vector<T> copy;
   copy.reserve(column.size() + 1);
   copy.assign(column.begin(), column.end());
-  copy.emplace_back(0.f);
+  copy.push_back(T(0));
   return copy;
 }
 
@@ -61,22 +61,29 @@ V3f mean_of_neighbours(const std::vector<V3f>& padded, const VertexRings& rings,
   return {mean[0], mean[1], mean[2]};
 }
 
-/// value = sum of coefficient[k] T_k(A) value, A the mean of the neighbours, T_k by their
-/// recurrence.
-void filter(std::vector<V3f>& value, const VertexRings& rings,
+float mean_of_neighbours(const std::vector<float>& value, const VertexRings& rings, uint32_t v) {
+  float sum = 0;
+  const uint32_t begin = rings.first[v], end = rings.first[v + 1];
+  for (uint32_t k = begin; k < end; ++k) sum += value[rings.neighbour[k]];
+  return sum / static_cast<float>(end - begin);
+}
+
+/// value = sum of coefficient[k] T_k(A) value, A the mean of the neighbours, by Clenshaw's
+/// recurrence. T is V3f or float.
+template <class T>
+void filter(std::vector<T>& value, const VertexRings& rings,
             const std::vector<float>& coefficient) {
-  std::vector<V3f> before = padded(value), now(before.size(), V3f(0));
-  for_each_vertex(value.size(), [&](uint32_t v) {
-    now[v] = mean_of_neighbours(before, rings, v);
-    value[v] = before[v] * coefficient[0] + now[v] * coefficient[1];
-  });
-  for (size_t k = 2; k < coefficient.size(); ++k) {
+  std::vector<T> before(value.size() + 1, T(0)), now = padded(value);
+  for_each_vertex(value.size(), [&](uint32_t v) { now[v] *= coefficient.back(); });
+  for (size_t k = coefficient.size() - 2; k > 0; --k) {
     for_each_vertex(value.size(), [&](uint32_t v) {
-      before[v] = 2.f * mean_of_neighbours(now, rings, v) - before[v];
-      value[v] += before[v] * coefficient[k];
+      before[v] = value[v] * coefficient[k] + mean_of_neighbours(now, rings, v) * 2.f - before[v];
     });
     before.swap(now);
   }
+  for_each_vertex(value.size(), [&](uint32_t v) {
+    value[v] = value[v] * coefficient[0] + mean_of_neighbours(now, rings, v) - before[v];
+  });
 }
 
 uint32_t root_of(std::vector<std::atomic<uint32_t>>& parent, uint32_t v) {
@@ -196,6 +203,25 @@ void shift_part(LatticeMesh& mesh, const VertexRings& rings, const Components& p
   for_each_member(parts, part, [&](uint32_t v) { mesh.position[v] += voxels * normal[v]; });
 }
 
+/// Smooths the positions, see smooth_mesh.
+/// @return unit normals of the mesh, to be overwritten.
+std::vector<V3f> remove_bumps(LatticeMesh& mesh, const VertexRings& rings, int passes) {
+  constexpr int first = 5;  // passes: enough for good triangles, too few for threads to thin out
+  constexpr float farthest = 0.35f;  // voxels; beyond it lie necks that would fold over
+  const std::vector<V3f> raw = mesh.position;
+  filter(mesh.position, rings, passes_in_few(std::min(passes, first)));
+  std::vector<V3f> normal = normals_of(mesh, rings), smooth = mesh.position;
+  if (passes > first) filter(smooth, rings, passes_in_few(passes - first));
+  std::vector<float> lost(raw.size());
+  for_each_vertex(raw.size(), [&](uint32_t v) { lost[v] = (raw[v] - smooth[v]).dot(normal[v]); });
+  filter(lost, rings, passes_in_few(passes));
+  for_each_vertex(raw.size(), [&](uint32_t v) {
+    const float way = (smooth[v] - mesh.position[v]).dot(normal[v]) + lost[v];
+    mesh.position[v] += normal[v] * std::clamp(way, -farthest, farthest);
+  });
+  return normal;
+}
+
 /// Of the triangles around v makes the ring of its neighbours.
 void order_ring(const LatticeMesh& mesh, uint32_t v, std::span<uint32_t> ring,
                 std::vector<std::array<uint32_t, 2>>& side) {
@@ -300,17 +326,14 @@ void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int pass
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes) {
   if (passes == 0 || mesh.position.empty()) return;
   const std::vector<double> wanted = volumes_of(mesh, rings, parts);
-  const std::vector<V3f> raw = mesh.position;
-  filter(mesh.position, rings, forth_and_back(passes));
-  std::vector<V3f> normal(mesh.position.size());
+  std::vector<V3f> normal = remove_bumps(mesh, rings, passes);
   tbb::parallel_for(size_t{0}, parts.size(), [&](size_t c) {
     constexpr uint32_t drop = 1000;  // vertices; scaling suits a compact part of any shape
     if (parts.first[c + 1] - parts.first[c] > drop)
       return shift_part(mesh, rings, parts, c, wanted[c], normal);
-    // A cavity has a negative volume; a part that collapsed is not smoothed at all.
+    // A cavity has a negative volume.
     const double kept = volume_of(mesh, rings, parts, c) / wanted[c];
-    if (kept > 0.01) return scale_part(mesh, parts, c, 1 / kept);
-    for_each_member(parts, c, [&](uint32_t v) { mesh.position[v] = raw[v]; });
+    if (kept > 0.01) scale_part(mesh, parts, c, 1 / kept);
   });
 }
 

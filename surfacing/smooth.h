@@ -41,11 +41,14 @@ std::vector<double> volumes_of(const LatticeMesh& mesh, const VertexRings& rings
 /// Unit normals, the area-weighted mean of the triangles around each vertex.
 std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
 
-/// Filters vertices as `passes` Laplacian passes (factor 1/2, uniform weights) forth and as many
-/// over the displacement back would, in fewer (Chebyshev polynomials; Taubin, Zhang, Golub 1996):
-/// what the passes moved smoothly, the shrinkage of round shapes, is returned, and bumps stay
-/// removed. Each part then gets back the volume it had, exactly but for rounding: a small one (a
-/// drop) by scaling, others by an even shift along the normals.
+/// Smooths vertices by `passes` Laplacian passes (factor 1/2, uniform weights), made in fewer by
+/// Chebyshev polynomials (Taubin, Zhang, Golub 1996), along the normals: what the passes took away
+/// smoothly along them, the shrinkage of round shapes and of threads, comes back after as many
+/// passes over it as a number, and bumps stay removed. Across the normals vertices take the first
+/// few passes only, which even out the triangles. (As many passes back over the displacement as a
+/// vector would let threads one particle wide lose nine tenths of their cross-section, since around
+/// a thread it turns once.) Each part then gets back the volume it had, exactly but for rounding: a
+/// small one (a drop) by scaling, others by an even shift along the normals.
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
 
 /// Averages unit normals over the ring, `passes` times.
