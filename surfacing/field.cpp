@@ -10,8 +10,10 @@
 #include <numbers>
 
 #include "pipeline/contract/error.h"
+#include "surfacing/anisotropy.h"
 #include "surfacing/pack.h"
 #include "surfacing/sheets.h"
+#include "surfacing/spline.h"
 
 namespace drench::surfacing {
 namespace {
@@ -38,15 +40,6 @@ void for_each_neighbour(F f) {
     for (step.y = -1; step.y <= 1; ++step.y)
       for (step.x = -1; step.x <= 1; ++step.x)
         if (step != V3i(0)) f(step);
-}
-
-/// 2 (1-q)^3 - 8 (1/2-q)^3, each term where its base is positive: the cubic spline in one line.
-/// Distance in supports; adds weight W to `sum`, given twice and eight times the weight.
-Pack add_spline(Pack sum, Pack distance_squared, Pack weight2, Pack weight8) {
-  const Pack a = larger(1.f - square_root(distance_squared), Pack{});
-  const Pack b = larger(a - 0.5f, Pack{});
-  sum = multiply_add(a * a, a * weight2, sum);
-  return subtract_product(sum, b * b, b * weight8);
 }
 
 /// Adds one particle to every row of the block that it reaches. p in supports from lattice point 0.
@@ -76,8 +69,13 @@ void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel
   const float reach = particles.lattice.reach;
   gather_near(particles, field.block, block_edge - 1, reach, near);
   const float step = 1 / reach, scale = kernel.scale();
-  for (size_t j = 0; j < near.size(); ++j)
-    splat(V3f(near.x[j], near.y[j], near.z[j]) * step, near.weight[j] * scale, step, value);
+  for (size_t j = 0; j < near.size(); ++j) {
+    const V3f p = V3f(near.x[j], near.y[j], near.z[j]) * step;
+    if (const Ellipsoid* shape = particles.ellipsoids.find(near.index[j]))
+      splat_ellipsoid(p, *shape, scale, step, value);
+    else
+      splat(p, near.weight[j] * scale, step, value);
+  }
   if (sheets.near(field.block)) sheets.cut(field.block, value, kernel.iso_value);
   for (int row = 0; row < rows; ++row)
     field.inside[row] = static_cast<uint8_t>(

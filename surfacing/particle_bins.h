@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/contract/frames.h"
+#include "surfacing/ellipsoids.h"
 #include "surfacing/lattice.h"
 #include "surfacing/pack.h"
 
@@ -23,6 +24,7 @@ struct BinnedParticles {
   std::vector<float> x, y, z;       // voxels from the corner of the particle's block, [0, 8]
   std::vector<uint32_t> source;     // index in the frame
   std::vector<float> weight;        // volume of the particle / spacing^3 as the field counts it
+  Ellipsoids ellipsoids;            // the kernels that are not round
 
   const uint32_t* bins_of(uint32_t block_index) const {
     return bin_first.data() + size_t(block_index) * bin_stride();

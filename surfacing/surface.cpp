@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "surfacing/anisotropy.h"
 #include "surfacing/attributes.h"
 #include "surfacing/contact.h"
 #include "surfacing/extract.h"
@@ -161,8 +162,9 @@ struct Finished {
   SheetContact contact;
   std::vector<V3f> normal;
 };
-Finished finish(LatticeMesh extracted, const NearThings& things, const Lattice& lattice, int passes,
-                bool measure_volume, SurfaceStats& report) {
+Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedParticles& binned,
+                int passes, bool measure_volume, SurfaceStats& report) {
+  const Lattice& lattice = binned.lattice;
   constexpr float offset = 0.02f;  // spacings before a sheet
   Finished result{std::move(extracted), {}, {}};
   LatticeMesh& mesh = result.mesh;
@@ -171,6 +173,7 @@ Finished finish(LatticeMesh extracted, const NearThings& things, const Lattice& 
   const float spacing = lattice.voxels_per_spacing;
   result.contact = find_contact(mesh, rings, things.sheets);
   smooth_mesh(mesh, rings, parts, passes);
+  draw_in(mesh, binned);
   result.normal = normals_of(mesh, rings);
   const std::vector<uint8_t> moved =
       overlap_solids(mesh, result.contact, things.obstacles, things.ground, spacing);
@@ -216,7 +219,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.particles = particles.position.size();
   check_settings(particles, settings);
   if (particles.position.empty()) return {};
-  const double left = memory_left(report.particles, settings.memory_gib);
+  double left = memory_left(report.particles, settings.memory_gib);
   Stopwatch watch;
   BinnedParticles binned =
       bin_particles(particles.position, lattice_of(particles, settings, bounds_of(particles)));
@@ -229,6 +232,9 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
                             static_cast<float>(settings.iso_value)};
   const std::vector<uint8_t> interior = count_interior(binned);
   binned.weight = weigh_particles(binned, kernel, interior);
+  if (settings.kernel == SurfaceKernel::anisotropic)
+    binned.ellipsoids = find_ellipsoids(binned, kernel, interior);
+  left -= binned.ellipsoids.bytes();
   report.weight_s = watch.lap();
 
   ColourField field = evaluate_field(binned, kernel, interior, things.sheets, mode, left);
@@ -243,7 +249,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   report.extract_s = watch.lap();
 
   Finished finished =
-      finish(std::move(mesh), things, binned.lattice, settings.smoothing, stats != nullptr, report);
+      finish(std::move(mesh), things, binned, settings.smoothing, stats != nullptr, report);
   report.smooth_s = watch.lap();
 
   const float column_reach =

@@ -229,6 +229,9 @@ struct Probe {
   int vertex = -1;               // tip: of the sheet; -1: the one nearest to position at rest
 };
 
+/// Kernels of the colour field; anisotropic: ellipsoids in sheets and threads.
+enum class SurfaceKernel { isotropic, anisotropic };
+
 struct SurfaceSettings {
   double voxel = 0.5;       // voxel edge / spacing
   double support = 2.5;     // kernel support / spacing
@@ -237,6 +240,7 @@ struct SurfaceSettings {
   bool obj = false;         // also write fluid.####.obj
   bool level_set = false;   // also write fluid.####.vdb
   double memory_gib = 8;    // refuse grids that would need more
+  SurfaceKernel kernel = SurfaceKernel::isotropic;
 };
 
 /// Spray, foam and bubbles (surfacing/foam.h). Without [foam] there are none.

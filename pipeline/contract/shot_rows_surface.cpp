@@ -11,6 +11,11 @@ std::vector<Parameter> surface_rows() {
                                      "support radius of the kernel / spacing"),
       row<&SurfaceSettings::iso_value>("surface", "iso_value", "", {0.01, 0.99}, mesh,
                                        "of the colour field on the surface"),
+      row<&SurfaceSettings::kernel>(
+          "surface", "kernel", "", none, mesh,
+          "anisotropic: kernels are squeezed across thin sheets and threads, which then have their "
+          "volume and fewer holes")
+          .one_of({"isotropic", "anisotropic"}),
       row<&SurfaceSettings::smoothing>("surface", "smoothing", "", {0, 1000}, mesh,
                                        "passes over the mesh; they keep its volume"),
       row<&SurfaceSettings::obj>("surface", "obj", "", none, mesh,

@@ -1,5 +1,7 @@
 #include "tests/surfacing/scenes.h"
 
+#include <Imath/ImathMatrix.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -82,6 +84,13 @@ ParticleFrame sheet(V2i cells, double stretch, double spacing, double shake, uin
     for (int x = 0; x < cells.x; ++x)
       points.push_back(V3d(x * stretch, y * stretch, 0) + even_vector(random, shake));
   return frame_of(points, spacing);
+}
+
+ParticleFrame askew(ParticleFrame frame, double angle) {
+  Imath::M44d turn;
+  turn.setAxisAngle(V3d(0.5, 0.6, -0.7).normalized(), angle);
+  for (V3f& p : frame.position) p = V3f(V3d(p) * turn);
+  return frame;
 }
 
 ParticleFrame splash(size_t n, double spacing, uint32_t seed) {

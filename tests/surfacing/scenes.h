@@ -25,6 +25,9 @@ ParticleFrame lone_particles(size_t count, double spacing, uint32_t seed);
 /// `shake`.
 ParticleFrame sheet(Imath::V2i cells, double stretch, double spacing, double shake, uint32_t seed);
 
+/// The frame turned about an axis askew to the lattice, positions alone; angle in rad.
+ParticleFrame askew(ParticleFrame frame, double angle);
+
 /// About n particles: a pool with waves, a crown one particle thick and drops of 1 to 30 particles.
 /// Velocities differ from particle to particle.
 ParticleFrame splash(size_t n, double spacing, uint32_t seed);
