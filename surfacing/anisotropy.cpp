@@ -165,6 +165,19 @@ struct VertexPack {
   }
 };
 
+/// Whether a particle within a ring of blocks has an ellipsoid.
+bool may_be_near(const BinnedParticles& particles, V3i block) {
+  const int ring = particles.lattice.ring();
+  V3i step;
+  for (step.z = -ring; step.z <= ring; ++step.z)
+    for (step.y = -ring; step.y <= ring; ++step.y)
+      for (step.x = -ring; step.x <= ring; ++step.x) {
+        const uint32_t b = particles.map.find(block + step);
+        if (b != BlockMap::none && particles.ellipsoids.in_block[b]) return true;
+      }
+  return false;
+}
+
 /// Calls f for packs of all vertices that may have an ellipsoid within two spacings.
 template <class F>
 void for_each_thin_pack(const LatticeMesh& mesh, const BinnedParticles& particles, F f) {
@@ -174,6 +187,7 @@ void for_each_thin_pack(const LatticeMesh& mesh, const BinnedParticles& particle
   tbb::enumerable_thread_specific<NearParticles> nears;
   tbb::parallel_for(size_t{0}, mesh.block.size(), [&](size_t b) {
     const BlockVertices& block = mesh.block[b];
+    if (!may_be_near(particles, block.block)) return;
     NearParticles& near = nears.local();
     gather_near(particles, block.block, block_edge, reach, near);
     const auto thin = [&](uint32_t i) { return ellipsoids.find(i) != nullptr; };
@@ -243,11 +257,13 @@ Ellipsoids find_ellipsoids(const BinnedParticles& particles, const ColourKernel&
   });
   Ellipsoids result;
   result.of.assign(particles.x.size(), Ellipsoids::none);
-  for (const std::vector<Found>& part : found)
+  for (const std::vector<Found>& part : found) {
+    result.in_block.push_back(!part.empty());
     for (const Found& one : part) {
       result.of[one.particle] = static_cast<uint32_t>(result.shape.size());
       result.shape.push_back(one.shape);
     }
+  }
   return result;
 }
 
@@ -261,6 +277,7 @@ void splat_ellipsoid(V3f p, const Ellipsoid& shape, float scale, float step, Blo
   for (int z = 0; z < block_edge; ++z)
     for (int y = 0; y < block_edge; ++y, row += block_edge) {
       const float dy = y * step - p.y, dz = z * step - p.z;
+      if (dy * dy + dz * dz >= 1) continue;  // beyond a ball around it
       const float mixed = shape.xy * dy + shape.xz * dz;
       const float rest = shape.yy * dy * dy + 2 * shape.yz * dy * dz + shape.zz * dz * dz;
       if (rest - mixed * mixed / shape.xx >= 1) continue;  // the least of the square on this line

@@ -22,6 +22,7 @@ struct Ellipsoids {
   static constexpr uint32_t none = ~0u;
   std::vector<uint32_t> of;  // of each particle the place in `shape`, or none; empty: all round
   std::vector<Ellipsoid> shape;
+  std::vector<uint8_t> in_block;  // by occupied block: 1 where there are any
 
   const Ellipsoid* find(uint32_t particle) const {
     return of.empty() || of[particle] == none ? nullptr : &shape[of[particle]];

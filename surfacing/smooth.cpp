@@ -21,10 +21,10 @@ void for_each_vertex(size_t n, F f) {
 }
 
 /// Chebyshev coefficients over a in [-1, 1] of p^n, p = (1 + a) / 2: n passes. With a = cos(t) it
-/// falls as a Gaussian in t, so that few make n: 10 for 20, within 2e-3.
+/// falls as a Gaussian in t, so that few make n: 8 for 20, within 1e-2.
 std::vector<float> passes_in_few(int n) {
   constexpr int samples = 512;
-  constexpr double least = 2e-3;
+  constexpr double least = 1e-2;
   std::vector<float> coefficient;
   double left = 1;  // that the sum at a = 1, where all polynomials are 1, lacks
   for (int k = 0; std::abs(left) > least || k < 3; ++k) {
