@@ -40,7 +40,7 @@ V3f pressed(const NearTriangles& solids, V3i block, const V3f& p, float spacing)
 
 float stretched(float y, float ground, float spacing) {
   const float height = y - ground;
-  return height < spacing ? ground + std::max(2 * height, 0.f) - spacing : y;
+  return height < spacing ? y - spacing + std::max(height, -spacing) : y;
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace drench::surfacing {
 /// What lies within 0.6 spacings of a solid, or inside it, goes into it by up to 0.75 spacings, all
 /// the way on its surface and not at all at 0.6 spacings off, and never past the middle of its
 /// wall: a thin wall is not seen through. Below one spacing over the ground the mesh is stretched
-/// to end one spacing under it. Contact with sheets stays.
+/// twofold, so that what touches the ground is a spacing under it. Contact with sheets stays.
 /// @param ground   its height, voxels from the lattice's origin
 /// @param spacing  voxels
 /// @return 1 by vertex that moved; empty where there are no solids.
