@@ -193,13 +193,9 @@ void for_each_thin_pack(const LatticeMesh& mesh, const BinnedParticles& particle
     const auto thin = [&](uint32_t i) { return ellipsoids.find(i) != nullptr; };
     if (std::none_of(near.index.begin(), near.index.end(), thin)) return;
     for (uint32_t v = block.begin; v < block.end; v += pack_width) {
-      VertexPack pack{v, std::min<uint32_t>(pack_width, block.end - v), {}, near, reach};
-      for (uint32_t k = 0; k < pack_width; ++k) {
-        const V3f p =
-            mesh.position[v + std::min(k, pack.count - 1)] - V3f(block.block * block_edge);
-        pack.points.x[k] = p.x, pack.points.y[k] = p.y, pack.points.z[k] = p.z;
-      }
-      f(pack);
+      const uint32_t count = std::min<uint32_t>(pack_width, block.end - v);
+      const V3f corner(block.block * block_edge);
+      f(VertexPack{v, count, points_of(mesh.position, v, count, corner), near, reach});
     }
   });
 }

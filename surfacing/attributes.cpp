@@ -30,11 +30,7 @@ class Columns {
 
   void fill(const std::vector<V3f>& position, uint32_t begin, uint32_t count, V3f corner,
             const NearParticles& near) {
-    PointPack points;
-    for (uint32_t k = 0; k < pack_width; ++k) {
-      const V3f p = position[begin + std::min(k, count - 1)] - corner;
-      points.x[k] = p.x, points.y[k] = p.y, points.z[k] = p.z;
-    }
+    const PointPack points = points_of(position, begin, count, corner);
     const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
     const Pack step = pack(1 / reach_);
     Around around;

@@ -216,6 +216,16 @@ void gather_near(const BinnedParticles& particles, V3i block, float edge, float 
   near.pad();
 }
 
+PointPack points_of(const std::vector<V3f>& position, uint32_t begin, uint32_t count,
+                    const V3f& corner) {
+  PointPack points;
+  for (uint32_t k = 0; k < pack_width; ++k) {
+    const V3f p = position[begin + std::min(k, count - 1)] - corner;
+    points.x[k] = p.x, points.y[k] = p.y, points.z[k] = p.z;
+  }
+  return points;
+}
+
 size_t nearest_of(const NearParticles& near, const V3f& p) {
   size_t best = 0;
   float least = std::numeric_limits<float>::max();

@@ -62,6 +62,11 @@ struct PointPack {
   std::array<float, pack_width> x, y, z;
 };
 
+/// Points [begin, begin + count) of a block whose corner is given, count from 1 to 8; the last one
+/// fills the rest.
+PointPack points_of(const std::vector<V3f>& position, uint32_t begin, uint32_t count,
+                    const V3f& corner);
+
 /// Calls f(j) for every particle of `near` within `reach` of the box around the points, in order.
 template <class F>
 void for_each_close(const NearParticles& near, const PointPack& points, float reach, F f) {

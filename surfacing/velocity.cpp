@@ -86,11 +86,7 @@ struct Moments {
 void pack_velocities(const std::vector<V3f>& position, uint32_t begin, uint32_t count, V3f corner,
                      const NearParticles& near, const std::vector<V3f>& relative, float reach,
                      V3f* result) {
-  PointPack points;
-  for (uint32_t k = 0; k < pack_width; ++k) {
-    const V3f p = position[begin + std::min(k, count - 1)] - corner;
-    points.x[k] = p.x, points.y[k] = p.y, points.z[k] = p.z;
-  }
+  const PointPack points = points_of(position, begin, count, corner);
   const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
   const Pack step = pack(1 / reach);
   Moments moments;

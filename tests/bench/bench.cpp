@@ -127,7 +127,7 @@ int run_bench(int argc, char** argv) {
     if (argument == "--help") {
       std::printf(
           "%s [--list] [CASE...]\nRuns cases (all without a name), a JSON line each to stdout.\n"
-          "Example: %s surface_sphere\n",
+          "Example: %s surface_error\n",
           argv[0], argv[0]);
       return 0;
     }

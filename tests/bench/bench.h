@@ -5,7 +5,7 @@
 //
 // A case lives in a file of its own area:
 //
-//     const Registration surface_sphere{"surface_sphere", "time and error on a sphere", [](const
+//     const Registration error{"surface_error", "errors on five shapes", [](const
 //     Emit& emit) {
 //       const Measured cost = measure([&] { ... });
 //       Line line;

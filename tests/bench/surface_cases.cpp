@@ -1,4 +1,5 @@
-// Surfacing: time against error on the analytic sphere, and time on scenes that are mostly surface.
+// Surfacing: time against error on shapes with a closed form, and time on scenes that are mostly
+// surface.
 
 #include <cmath>
 #include <string>
@@ -58,34 +59,6 @@ size_t defects_of(const TriangleMesh& mesh) {
   const auto defects = surfacing_checks::defects_of(mesh);
   return defects.unmatched_edges + defects.repeated_edges + defects.split_fans +
          defects.bad_triangles;
-}
-
-/// Relaxed balls; the error is the scatter of the vertices about the mean radius, which no choice
-/// of iso value can remove; bias, largest error, volume and normals stand beside it.
-void surface_sphere(const Emit& emit) {
-  for (const size_t n : {65000, 250000, 1000000}) {
-    const ParticleFrame frame = surfacing_scenes::relaxed_ball(n, spacing, 60, 1);
-    for (const auto& [voxel, smoothing] :
-         {std::pair{1.0, 8}, {0.5, 0}, {0.5, 10}, {0.5, 20}, {0.25, 40}}) {
-      if (voxel < 0.5 && n > 250000) continue;  // 9 million triangles say nothing new
-      SurfaceSettings settings;
-      settings.voxel = voxel;
-      settings.smoothing = smoothing;
-      const Run run = cheapest(frame, settings);
-      const auto error = surfacing_checks::sphere_error(
-          run.mesh, surfacing_scenes::ball_radius(n, spacing), spacing);
-      Line line = line_of(frame, settings, run);
-      line.error = error.scatter;
-      line.error_of = "scatter of vertices about the sphere, spacings";
-      if (voxel == 0.5 && smoothing == 20) line.gate = 0.025;
-      line.more["bias"] = error.bias;
-      line.more["max"] = error.max;
-      line.more["volume_error"] = error.volume;
-      line.more["normal_mean_deg"] = error.normal_mean;
-      line.more["normal_max_deg"] = error.normal_max;
-      emit(line);
-    }
-  }
 }
 
 /// The default settings and both kernels on shapes with a closed form, five resolutions: no
@@ -235,8 +208,6 @@ void surface_memory(const Emit& emit) {
   }
 }
 
-const Registration sphere{
-    "surface_sphere", "surfacing: time and error on a sphere, 65k to 1M particles", surface_sphere};
 const Registration error{"surface_error", "surfacing: errors on five shapes, 8k to 1M particles",
                          surface_error};
 const Registration thin{"surface_thin", "surfacing: single particles and stretched sheets",

@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "tests/contract/damage.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/temporary_folder.h"
 
@@ -156,19 +157,8 @@ TEST(ParticlesFile, IsNotWrittenForAParticleThatIsNotFiniteOrTooFar) {
 TEST(ParticlesFile, NoticesEveryFlippedBitAndTruncation) {
   const TemporaryFolder folder;
   write_particles(folder / "p.vdb", cloud(300));
-  const std::string whole = read_text(folder / "p.vdb");
-  std::mt19937 random(3);
-  for (int i = 0; i < 300; ++i) {
-    std::string damaged = whole;
-    if (i % 3 == 0) {
-      damaged.resize(random() % whole.size());
-    } else {
-      damaged[random() % whole.size()] ^= char(1 << random() % 8);
-    }
-    test::write_quickly(folder / "damaged.vdb", damaged);
-    const std::string text = error_of([&] { read_particles(folder / "damaged.vdb"); });
-    EXPECT_NE(text.find("damaged.vdb"), std::string::npos) << text;
-  }
+  test::expect_damage_is_noticed(folder / "p.vdb", 300,
+                                 [](const auto& file) { read_particles(file); });
 }
 
 TEST(ParticlesFile, RefusesAFileThatHoldsNoParticles) {
