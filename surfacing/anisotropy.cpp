@@ -114,35 +114,6 @@ Ellipsoid ellipsoid_of(const Neighbours& near, Thinness thin, float weight, cons
   return shape;
 }
 
-struct Found {
-  uint32_t particle;
-  Ellipsoid shape;
-};
-
-/// Ellipsoids of up to eight particles of one block.
-void add_ellipsoids(const BinnedParticles& particles, const ColourKernel& kernel,
-                    const NearParticles& near, const uint32_t* wanted, uint32_t count,
-                    std::vector<Found>& found) {
-  const float reach = particles.lattice.reach, step = 1 / reach;
-  PointPack points;
-  for (uint32_t k = 0; k < pack_width; ++k) {
-    const uint32_t i = wanted[std::min(k, count - 1)];
-    points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
-  }
-  const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
-  Moments sums;
-  for_each_close(near, points, reach, [&](size_t j) {
-    sums.add((near.x[j] - x) * step, (near.y[j] - y) * step, (near.z[j] - z) * step);
-  });
-  for (uint32_t k = 0; k < count; ++k) {
-    const Neighbours around = neighbours_of(sums, k);
-    const Thinness thin = thinness(around.variance, around.count);
-    if (thin.sheet + thin.thread < 0.01f) continue;
-    const float weight = particles.weight[wanted[k]];
-    found.push_back({wanted[k], ellipsoid_of(around, thin, weight, particles.lattice, kernel)});
-  }
-}
-
 /// Vertices [begin, begin + count) of one block, count <= 8, and what may be near them.
 struct VertexPack {
   uint32_t begin, count;
@@ -191,7 +162,7 @@ void for_each_thin_pack(const LatticeMesh& mesh, const BinnedParticles& particle
     NearParticles& near = nears.local();
     gather_near(particles, block.block, block_edge, reach, near);
     const auto thin = [&](uint32_t i) { return ellipsoids.find(i) != nullptr; };
-    if (std::none_of(near.index.begin(), near.index.end(), thin)) return;
+    if (std::none_of(near.index.begin(), near.index.begin() + ptrdiff_t(near.size()), thin)) return;
     for (uint32_t v = block.begin; v < block.end; v += pack_width) {
       const uint32_t count = std::min<uint32_t>(pack_width, block.end - v);
       const V3f corner(block.block * block_edge);
@@ -229,33 +200,38 @@ Thinness thinness(const V3f& variance, float count) {
   return {extended * wide * flat * ramp(count, 2.2f, 2.7f), extended * (1 - wide)};
 }
 
-Ellipsoids find_ellipsoids(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior) {
-  struct Scratch {
-    NearParticles near;
-    std::vector<uint32_t> wanted;
-  };
-  tbb::enumerable_thread_specific<Scratch> scratches;
-  std::vector<std::vector<Found>> found(particles.block.size());
-  tbb::parallel_for(size_t{0}, particles.block.size(), [&](size_t b) {
-    if (interior[b]) return;
-    auto& [near, wanted] = scratches.local();
-    wanted.clear();
-    for (uint32_t i = particles.first[b]; i < particles.first[b + 1]; ++i)
-      if (particles.weight[i] > kernel.bulk_weight()) wanted.push_back(i);
-    if (wanted.empty()) return;
-    gather_near(particles, block_of(particles.block[b]), block_edge, particles.lattice.reach, near);
-    for (size_t k = 0; k < wanted.size(); k += pack_width) {
-      const size_t count = std::min(pack_width, wanted.size() - k);
-      add_ellipsoids(particles, kernel, near, wanted.data() + k, static_cast<uint32_t>(count),
-                     found[b]);
+void add_ellipsoids(const BinnedParticles& particles, const std::vector<float>& weight,
+                    const ColourKernel& kernel, const NearParticles& near,
+                    const std::vector<uint32_t>& wanted, std::vector<FoundEllipsoid>& found) {
+  const float reach = particles.lattice.reach, step = 1 / reach;
+  for (size_t begin = 0; begin < wanted.size(); begin += pack_width) {
+    const size_t count = std::min(pack_width, wanted.size() - begin);
+    PointPack points;
+    for (size_t k = 0; k < pack_width; ++k) {
+      const uint32_t i = wanted[begin + std::min(k, count - 1)];
+      points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
     }
-  });
+    const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
+    Moments sums;
+    for_each_close(near, points, reach, [&](size_t j) {
+      sums.add((near.x[j] - x) * step, (near.y[j] - y) * step, (near.z[j] - z) * step);
+    });
+    for (uint32_t k = 0; k < count; ++k) {
+      const uint32_t i = wanted[begin + k];
+      const Neighbours around = neighbours_of(sums, k);
+      const Thinness thin = thinness(around.variance, around.count);
+      if (thin.sheet + thin.thread < 0.01f) continue;
+      found.push_back({i, ellipsoid_of(around, thin, weight[i], particles.lattice, kernel)});
+    }
+  }
+}
+
+Ellipsoids collected(const std::vector<std::vector<FoundEllipsoid>>& by_block, size_t particles) {
   Ellipsoids result;
-  result.of.assign(particles.x.size(), Ellipsoids::none);
-  for (const std::vector<Found>& part : found) {
+  result.of.assign(particles, Ellipsoids::none);
+  for (const std::vector<FoundEllipsoid>& part : by_block) {
     result.in_block.push_back(!part.empty());
-    for (const Found& one : part) {
+    for (const FoundEllipsoid& one : part) {
       result.of[one.particle] = static_cast<uint32_t>(result.shape.size());
       result.shape.push_back(one.shape);
     }

@@ -66,10 +66,21 @@ struct Thinness {
 ///                  pair less than 2; it decides when a sheet has torn into drops.
 Thinness thinness(const V3f& variance, float count);
 
-/// Ellipsoids of the particles whose weight says that neighbours are missing, and whose neighbours
-/// form a sheet or a thread. Those halfway have an ellipsoid and a weight between.
-Ellipsoids find_ellipsoids(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior);
+struct FoundEllipsoid {
+  uint32_t particle;
+  Ellipsoid shape;
+};
+
+/// Adds the ellipsoids of those of the `wanted` particles of one block whose neighbours form a
+/// sheet or a thread. Those halfway have an ellipsoid and a weight between.
+/// @param weight  of the particles with round kernels
+/// @param near    what lies in reach of the block
+void add_ellipsoids(const BinnedParticles& particles, const std::vector<float>& weight,
+                    const ColourKernel& kernel, const NearParticles& near,
+                    const std::vector<uint32_t>& wanted, std::vector<FoundEllipsoid>& found);
+
+/// Those of all blocks, by particle.
+Ellipsoids collected(const std::vector<std::vector<FoundEllipsoid>>& by_block, size_t particles);
 
 /// Adds an ellipsoid to every row of the block that it reaches. p, the particle, in supports from
 /// lattice point 0; step, a voxel in supports.

@@ -82,6 +82,38 @@ void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel
         not_less_bits(load(value.data() + row * block_edge), pack(kernel.iso_value)));
 }
 
+struct ColourPack {
+  std::array<float, pack_width> c, offset;  // as ColourKernel::weight takes them
+};
+
+/// The unweighted colour at particles [begin, begin + count) of one block, count <= 8.
+ColourPack colours_of(const BinnedParticles& particles, uint32_t begin, uint32_t count,
+                      const ColourKernel& kernel, const NearParticles& near) {
+  const float reach = particles.lattice.reach, step = 1 / reach;
+  PointPack points;
+  for (uint32_t k = 0; k < pack_width; ++k) {
+    const uint32_t i = begin + std::min(k, count - 1);
+    points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
+  }
+  const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
+  const Pack two = pack(2.f), eight = pack(8.f);
+  Pack sum{}, sum_x{}, sum_y{}, sum_z{};
+  for_each_close(near, points, reach, [&](size_t j) {
+    const Pack dx = (x - near.x[j]) * step, dy = (y - near.y[j]) * step,
+               dz = (z - near.z[j]) * step;
+    const Pack w =
+        add_spline(Pack{}, multiply_add(dx, dx, multiply_add(dy, dy, dz * dz)), two, eight);
+    sum += w;
+    sum_x = multiply_add(w, dx, sum_x);
+    sum_y = multiply_add(w, dy, sum_y);
+    sum_z = multiply_add(w, dz, sum_z);
+  });
+  ColourPack result;
+  store(result.c.data(), sum * kernel.scale());
+  store(result.offset.data(), square_root(sum_x * sum_x + sum_y * sum_y + sum_z * sum_z) / sum);
+  return result;
+}
+
 /// Blocks and what is known of them while the set grows. Occupied blocks come first, in the order
 /// of the particles' blocks; then empty ones in reach of a particle; then those added by the
 /// closure.
@@ -254,42 +286,34 @@ std::vector<uint8_t> count_interior(const BinnedParticles& particles) {
   return interior;
 }
 
-std::vector<float> weigh_particles(const BinnedParticles& particles, const ColourKernel& kernel,
-                                   const std::vector<uint8_t>& interior) {
-  const float reach = particles.lattice.reach, step = 1 / reach;
-  std::vector<float> weight(particles.x.size(), kernel.bulk_weight());
-  tbb::enumerable_thread_specific<NearParticles> nears;
+void weigh_particles(BinnedParticles& particles, const ColourKernel& kernel,
+                     const std::vector<uint8_t>& interior, SurfaceKernel shape) {
+  struct Scratch {
+    NearParticles near;
+    std::vector<uint32_t> thin;
+  };
+  std::vector<float> weight(particles.weight.size(), kernel.bulk_weight());
+  std::vector<std::vector<FoundEllipsoid>> found(particles.block.size());
+  tbb::enumerable_thread_specific<Scratch> scratches;
   tbb::parallel_for(size_t{0}, particles.block.size(), [&](size_t b) {
     if (interior[b]) return;
-    NearParticles& near = nears.local();
-    gather_near(particles, block_of(particles.block[b]), block_edge, reach, near);
-    const Pack two = pack(2.f), eight = pack(8.f);
+    auto& [near, thin] = scratches.local();
+    gather_near(particles, block_of(particles.block[b]), block_edge, particles.lattice.reach, near);
+    thin.clear();
     for (uint32_t begin = particles.first[b]; begin < particles.first[b + 1]; begin += pack_width) {
       const uint32_t count = std::min<uint32_t>(pack_width, particles.first[b + 1] - begin);
-      PointPack points;
-      for (uint32_t k = 0; k < pack_width; ++k) {
-        const uint32_t i = begin + std::min(k, count - 1);
-        points.x[k] = particles.x[i], points.y[k] = particles.y[i], points.z[k] = particles.z[i];
+      const ColourPack colour = colours_of(particles, begin, count, kernel, near);
+      for (uint32_t k = 0; k < count; ++k) {
+        weight[begin + k] = kernel.weight(colour.c[k], colour.offset[k]);
+        if (weight[begin + k] > kernel.bulk_weight()) thin.push_back(begin + k);
       }
-      const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
-      Pack sum{}, sum_x{}, sum_y{}, sum_z{};
-      for_each_close(near, points, reach, [&](size_t j) {
-        const Pack dx = (x - near.x[j]) * step, dy = (y - near.y[j]) * step,
-                   dz = (z - near.z[j]) * step;
-        const Pack w =
-            add_spline(Pack{}, multiply_add(dx, dx, multiply_add(dy, dy, dz * dz)), two, eight);
-        sum += w;
-        sum_x = multiply_add(w, dx, sum_x);
-        sum_y = multiply_add(w, dy, sum_y);
-        sum_z = multiply_add(w, dz, sum_z);
-      });
-      std::array<float, pack_width> colour, offset;
-      store(colour.data(), sum * kernel.scale());
-      store(offset.data(), square_root(sum_x * sum_x + sum_y * sum_y + sum_z * sum_z) / sum);
-      for (uint32_t k = 0; k < count; ++k) weight[begin + k] = kernel.weight(colour[k], offset[k]);
     }
+    if (shape == SurfaceKernel::anisotropic)
+      add_ellipsoids(particles, weight, kernel, near, thin, found[b]);
   });
-  return weight;
+  particles.weight = std::move(weight);
+  if (shape == SurfaceKernel::anisotropic)
+    particles.ellipsoids = collected(found, particles.source.size());
 }
 
 ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,

@@ -68,10 +68,10 @@ class Sheets;
 /// Marks occupied blocks that a count of particles calls full, with all their bins: 1, else 0.
 std::vector<uint8_t> count_interior(const BinnedParticles& particles);
 
-/// Weights of all particles from the unweighted colour field; that of the bulk in `interior`
-/// blocks.
-std::vector<float> weigh_particles(const BinnedParticles& particles, const ColourKernel& kernel,
-                                   const std::vector<uint8_t>& interior);
+/// Weighs all particles from the unweighted colour field, those in `interior` blocks as in the
+/// bulk. With anisotropic kernels it finds the ellipsoids among those that miss neighbours.
+void weigh_particles(BinnedParticles& particles, const ColourKernel& kernel,
+                     const std::vector<uint8_t>& interior, SurfaceKernel shape);
 
 /// Evaluates every block that may hold surface. Interior blocks are left out unless told otherwise,
 /// and taken in again wherever a neighbour's border has a point outside, until nothing changes.

@@ -162,7 +162,7 @@ FluidMoment fluid_at(const FluidMotion& motion, float s, const Domain& domain, f
 
 void NearFluid::gather(const FluidMoment& fluid, V3i block) {
   gather_near(fluid.bins, block, block_edge, foam_reach, near);
-  for (std::vector<float>* column : {&u, &v, &w}) column->assign(near.x.size(), 0.f);
+  for (std::vector<float>* column : {&u, &v, &w}) column->assign(near.size() + pack_width, 0.f);
   if (near.size() == 0) return;
   base = fluid.velocity[fluid.bins.source[near.index[0]]];
   for (size_t j = 0; j < near.size(); ++j) {

@@ -137,59 +137,50 @@ BinnedParticles bin_particles(const std::vector<V3f>& position, const Lattice& l
   for (size_t b = 0; b < sorted.block.size(); ++b)
     sorted.map.insert(sorted.block[b], static_cast<uint32_t>(b));
   sort_by_block(position, sorted);
-  sorted.x.resize(position.size());
-  sorted.y.resize(position.size());
-  sorted.z.resize(position.size());
-  sorted.weight.assign(position.size(), 1.f);
+  for (std::vector<float>* column : {&sorted.x, &sorted.y, &sorted.z})
+    column->resize(position.size() + pack_width);
+  sorted.weight.assign(position.size() + pack_width, 1.f);
   sorted.bin_first.assign(sorted.block.size() * sorted.bin_stride(), 0);
   tbb::parallel_for(size_t{0}, sorted.block.size(),
                     [&](size_t b) { sort_block(position, sorted, b); });
   return sorted;
 }
 
-void NearParticles::clear() {
-  x.clear();
-  y.clear();
-  z.clear();
-  weight.clear();
-  index.clear();
+void NearParticles::make_room(size_t more) {
+  const size_t needed = count_ + more + pack_width;  // the last pack may write more than it has
+  if (needed <= index.size()) return;
+  for (std::vector<float>* column : {&x, &y, &z, &weight}) column->resize(2 * needed);
+  index.resize(2 * needed);
 }
 
 void NearParticles::pad() {
-  const size_t padded = (size() + 7) / 8 * 8;
-  x.resize(padded, 1e9f);
-  y.resize(padded, 1e9f);
-  z.resize(padded, 1e9f);
-  weight.resize(padded, 0.f);
+  make_room(0);
+  const auto end = static_cast<ptrdiff_t>(count_);
+  for (std::vector<float>* column : {&x, &y, &z})
+    std::fill_n(column->begin() + end, pack_width, 1e9f);
+  std::fill_n(weight.begin() + end, pack_width, 0.f);
 }
 
-namespace {
-
-/// Adds the particles of occupied block b, whose corner lies `corner` voxels from the gathering
-/// block's, and of its bins `low` to `high`.
-void gather_bins(const BinnedParticles& particles, uint32_t b, V3f corner, V3i low, V3i high,
-                 float edge, float reach, NearParticles& near) {
-  const int bins = particles.lattice.bins;
-  const uint32_t* bin_first = particles.bins_of(b);
-  const uint32_t first = particles.first[b];
-  const auto outside = [&](float v) { return std::max({-v, v - edge, 0.f}); };
-  for (int z = low.z; z <= high.z; ++z)
-    for (int y = low.y; y <= high.y; ++y) {
-      const int row = (z * bins + y) * bins;
-      const uint32_t end = first + bin_first[row + high.x + 1];
-      for (uint32_t i = first + bin_first[row + low.x]; i < end; ++i) {
-        const V3f p = corner + V3f(particles.x[i], particles.y[i], particles.z[i]);
-        if (V3f(outside(p.x), outside(p.y), outside(p.z)).length2() >= reach * reach) continue;
-        near.x.push_back(p.x);
-        near.y.push_back(p.y);
-        near.z.push_back(p.z);
-        near.weight.push_back(particles.weight[i]);
-        near.index.push_back(i);
-      }
-    }
+void NearParticles::add(const BinnedParticles& particles, uint32_t begin, uint32_t end, V3f corner,
+                        float edge, float reach) {
+  make_room(end - begin);
+  const auto outside = [edge](Pack v) { return larger(larger(-v, v - edge), Pack{}); };
+  for (uint32_t i = begin; i < end; i += pack_width) {
+    const Pack at[3] = {corner.x + load(particles.x.data() + i),
+                        corner.y + load(particles.y.data() + i),
+                        corner.z + load(particles.z.data() + i)};
+    const Pack dx = outside(at[0]), dy = outside(at[1]), dz = outside(at[2]);
+    unsigned chosen = less_bits(dx * dx + dy * dy + dz * dz, pack(reach * reach));
+    if (end - i < pack_width) chosen &= (1u << (end - i)) - 1;
+    const PackPlaces places = set_places(chosen);
+    store(x.data() + count_, picked(at[0], places));
+    store(y.data() + count_, picked(at[1], places));
+    store(z.data() + count_, picked(at[2], places));
+    store(weight.data() + count_, picked(load(particles.weight.data() + i), places));
+    store(index.data() + count_, places, i);
+    count_ += static_cast<size_t>(std::popcount(chosen));
+  }
 }
-
-}  // namespace
 
 void gather_near(const BinnedParticles& particles, V3i block, float edge, float reach,
                  NearParticles& near) {
@@ -200,18 +191,19 @@ void gather_near(const BinnedParticles& particles, V3i block, float edge, float 
       static_cast<int>(std::floor(-reach * bins_per_voxel));  // bins from this block's own
   const int high = static_cast<int>(std::floor((edge + reach) * bins_per_voxel));
   const auto block_of_bin = [&](int bin) { return (bin + 1024 * bins) / bins - 1024; };
+  const auto from = [&](int step) { return std::max(low - step * bins, 0); };
+  const auto to = [&](int step) { return std::min(high - step * bins, bins - 1); };
   V3i step;
   for (step.z = block_of_bin(low); step.z <= block_of_bin(high); ++step.z)
     for (step.y = block_of_bin(low); step.y <= block_of_bin(high); ++step.y)
       for (step.x = block_of_bin(low); step.x <= block_of_bin(high); ++step.x) {
         const uint32_t b = particles.map.find(block + step);
         if (b == BlockMap::none) continue;
-        V3i from, to;
-        for (int axis = 0; axis < 3; ++axis) {
-          from[axis] = std::max(low - step[axis] * bins, 0);
-          to[axis] = std::min(high - step[axis] * bins, bins - 1);
-        }
-        gather_bins(particles, b, V3f(step * block_edge), from, to, edge, reach, near);
+        const uint32_t* bin_first = particles.bins_of(b);
+        for (int z = from(step.z); z <= to(step.z); ++z)  // whole rows lie side by side
+          near.add(particles, particles.first[b] + bin_first[(z * bins + from(step.y)) * bins],
+                   particles.first[b] + bin_first[(z * bins + to(step.y) + 1) * bins],
+                   V3f(step * block_edge), edge, reach);
       }
   near.pad();
 }

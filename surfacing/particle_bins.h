@@ -14,7 +14,8 @@
 
 namespace drench::surfacing {
 
-/// n particles in order of block, bin and index in the frame. A block's bins run z, y, x.
+/// n particles in order of block, bin and index in the frame. A block's bins run z, y, x. The
+/// columns of floats are a pack longer, so that packs can be read from any row.
 struct BinnedParticles {
   Lattice lattice;
   BlockMap map;                     // occupied block -> its index below
@@ -37,15 +38,23 @@ struct BinnedParticles {
 /// above.
 BinnedParticles bin_particles(const std::vector<V3f>& position, const Lattice& lattice);
 
-/// Particles close to one block, positions in voxels from that block's corner. Columns but `index`
-/// are padded to whole packs with particles of weight 0, far away.
+/// Particles close to one block, positions in voxels from that block's corner. Only the first
+/// size() rows count; in the columns of floats a pack with weight 0, far away, follows them.
 struct NearParticles {
   std::vector<float> x, y, z, weight;
   std::vector<uint32_t> index;  // in BinnedParticles
 
-  size_t size() const { return index.size(); }  // without the padding
-  void clear();
+  size_t size() const { return count_; }
+  void clear() { count_ = 0; }
   void pad();
+  /// Adds those of the particles [begin, end), of a block whose corner is given, that lie within
+  /// reach of the box [0, edge]^3.
+  void add(const BinnedParticles& particles, uint32_t begin, uint32_t end, V3f corner, float edge,
+           float reach);
+
+ private:
+  void make_room(size_t more);
+  size_t count_ = 0;
 };
 
 /// Fills `near` with the particles within `reach` voxels of the box [0, edge]^3 of `block`, in

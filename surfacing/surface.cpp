@@ -231,9 +231,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
                             static_cast<float>(settings.voxel),
                             static_cast<float>(settings.iso_value)};
   const std::vector<uint8_t> interior = count_interior(binned);
-  binned.weight = weigh_particles(binned, kernel, interior);
-  if (settings.kernel == SurfaceKernel::anisotropic)
-    binned.ellipsoids = find_ellipsoids(binned, kernel, interior);
+  weigh_particles(binned, kernel, interior, settings.kernel);
   left -= binned.ellipsoids.bytes();
   report.weight_s = watch.lap();
 

@@ -121,7 +121,8 @@ std::vector<V3f> vertex_velocities(const LatticeMesh& mesh, const BinnedParticle
     relative.clear();
     if (near.size() == 0) return;  // cannot be: the field here comes from particles in reach
     const V3f base = velocity[particles.source[near.index[0]]];
-    for (const uint32_t i : near.index) relative.push_back(velocity[particles.source[i]] - base);
+    for (size_t j = 0; j < near.size(); ++j)
+      relative.push_back(velocity[particles.source[near.index[j]]] - base);
     const V3f corner(block.block * block_edge);
     for (uint32_t v = block.begin; v < block.end; v += pack_width) {
       const uint32_t count = std::min<uint32_t>(pack_width, block.end - v);

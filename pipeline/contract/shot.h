@@ -240,7 +240,7 @@ struct SurfaceSettings {
   bool obj = false;         // also write fluid.####.obj
   bool level_set = false;   // also write fluid.####.vdb
   double memory_gib = 8;    // refuse grids that would need more
-  SurfaceKernel kernel = SurfaceKernel::isotropic;
+  SurfaceKernel kernel = SurfaceKernel::anisotropic;
 };
 
 /// Spray, foam and bubbles (surfacing/foam.h). Without [foam] there are none.

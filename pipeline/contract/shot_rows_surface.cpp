@@ -13,8 +13,8 @@ std::vector<Parameter> surface_rows() {
                                        "of the colour field on the surface"),
       row<&SurfaceSettings::kernel>(
           "surface", "kernel", "", none, mesh,
-          "anisotropic: kernels are squeezed across thin sheets and threads, which then have their "
-          "volume and fewer holes")
+          "anisotropic: kernels are squeezed across thin sheets and threads, which so have their "
+          "volume and fewer holes; isotropic: all are round")
           .one_of({"isotropic", "anisotropic"}),
       row<&SurfaceSettings::smoothing>("surface", "smoothing", "", {0, 1000}, mesh,
                                        "passes over the mesh; they keep its volume"),

@@ -50,7 +50,7 @@ TEST(ColourField, IsTheSumOverAllParticles) {
     BinnedParticles binned = bin_particles(frame.position, test_lattice(0.5, support));
     const ColourKernel kernel(static_cast<float>(support), 0.5f, 0.45f);
     const auto interior = count_interior(binned);
-    binned.weight = weigh_particles(binned, kernel, interior);
+    weigh_particles(binned, kernel, interior, SurfaceKernel::isotropic);
     const ColourField field =
         evaluate_field(binned, kernel, interior, Sheets{}, InteriorBlocks::evaluate, 1e9);
     ASSERT_GT(field.block.size(), 8u);
