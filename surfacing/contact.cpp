@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace drench::surfacing {
 namespace {
@@ -37,40 +38,48 @@ bool pierces(const V3d& p, const V3d& q, const std::array<V3d, 3>& t) {
   return true;
 }
 
-bool cross_each_other(const std::array<V3d, 3>& a, const std::array<V3d, 3>& b) {
+using Corners = std::array<V3f, 3>;
+
+bool boxes_meet(const Corners& a, const Corners& b) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto [a0, a1] = std::minmax({a[0][axis], a[1][axis], a[2][axis]});
     const auto [b0, b1] = std::minmax({b[0][axis], b[1][axis], b[2][axis]});
     if (a1 < b0 || b1 < a0) return false;
   }
-  for (int k = 0; k < 3; ++k)
-    if (pierces(a[k], a[(k + 1) % 3], b) || pierces(b[k], b[(k + 1) % 3], a)) return true;
-  return false;
+  return true;
 }
 
-std::array<V3d, 3> corners_of(const std::array<V3f, 3>& t) {
-  return {V3d(t[0]), V3d(t[1]), V3d(t[2])};
+bool cross_each_other(const Corners& a, const Corners& b) {
+  if (!boxes_meet(a, b)) return false;
+  const std::array<V3d, 3> c{V3d(a[0]), V3d(a[1]), V3d(a[2])}, d{V3d(b[0]), V3d(b[1]), V3d(b[2])};
+  for (int k = 0; k < 3; ++k)
+    if (pierces(c[k], c[(k + 1) % 3], d) || pierces(d[k], d[(k + 1) % 3], c)) return true;
+  return false;
 }
 
 bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets) {
   const V3i block = block_of_vertex(mesh, t.x);
   if (!sheets.near(block)) return false;
-  const std::array<V3d, 3> own{V3d(mesh.position[t.x]), V3d(mesh.position[t.y]),
-                               V3d(mesh.position[t.z])};
+  const Corners own{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
   bool crosses = false;
-  sheets.for_each_near(block, [&](uint32_t k) {
-    crosses = crosses || cross_each_other(own, corners_of(sheets.corners(k)));
-  });
+  sheets.for_each_near(
+      block, [&](uint32_t k) { crosses = crosses || cross_each_other(own, sheets.corners(k)); });
   return crosses;
 }
 
-std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& sheets) {
+/// Those with a corner that is marked.
+std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& sheets,
+                                         const std::vector<uint8_t>& marked) {
   return tbb::parallel_deterministic_reduce(
       tbb::blocked_range<uint32_t>(0, static_cast<uint32_t>(mesh.triangle.size()), 4096),
       std::vector<uint32_t>{},
       [&](const auto& range, std::vector<uint32_t> found) {
-        for (uint32_t t = range.begin(); t < range.end(); ++t)
-          if (crosses_a_sheet(mesh, mesh.triangle[t], sheets)) found.push_back(t);
+        for (uint32_t t = range.begin(); t < range.end(); ++t) {
+          const Triangle& triangle = mesh.triangle[t];
+          if ((marked[triangle.x] || marked[triangle.y] || marked[triangle.z]) &&
+              crosses_a_sheet(mesh, triangle, sheets))
+            found.push_back(t);
+        }
         return found;
       },
       [](std::vector<uint32_t> a, const std::vector<uint32_t>& b) {
@@ -96,6 +105,51 @@ V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
   return p + (p - foot.place).normalized() * distance;
 }
 
+bool is_sliver(const std::vector<V3f>& position, const Triangle& t) {
+  constexpr float cos2 = 0.9330f;  // of 15 degrees
+  for (int k = 0; k < 3; ++k) {
+    const V3f u = position[t[(k + 1) % 3]] - position[t[k]],
+              w = position[t[(k + 2) % 3]] - position[t[k]];
+    const float dot = u.dot(w);
+    if (dot > 0 && dot * dot > cos2 * u.length2() * w.length2()) return true;
+  }
+  return false;
+}
+
+bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
+  bool found = false;
+  rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
+    found = found || is_sliver(position, {v, a, b});
+  });
+  return found;
+}
+
+V3f mean_of_ring(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
+  V3f sum(0);
+  for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k)
+    sum += position[rings.neighbour[k]];
+  return sum / static_cast<float>(rings.first[v + 1] - rings.first[v]);
+}
+
+/// Moves the corners of triangles that cross a sheet until none does, at most eight times.
+/// @param stirred  vertices that have moved since nothing crossed
+/// @param moved    the next place of a vertex
+/// @return         how many still cross
+template <class F>
+size_t move_until_free(LatticeMesh& mesh, const Sheets& sheets, std::vector<uint8_t> stirred,
+                       F moved) {
+  std::vector<uint32_t> crossing = crossing_triangles(mesh, sheets, stirred);
+  for (int round = 0; round < 8 && !crossing.empty(); ++round) {
+    stirred.assign(stirred.size(), 0);
+    for (const uint32_t t : crossing)
+      for (int k = 0; k < 3; ++k)
+        if (const uint32_t v = mesh.triangle[t][k]; !std::exchange(stirred[v], 1))
+          mesh.position[v] = moved(v);
+    crossing = crossing_triangles(mesh, sheets, stirred);
+  }
+  return crossing.size();
+}
+
 }  // namespace
 
 SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets) {
@@ -112,34 +166,46 @@ SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, con
   return contact;
 }
 
-size_t lay_on_sheets(LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
-                     float offset) {
+size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetContact& contact,
+                     const Sheets& sheets, const std::vector<V3f>& normal, float offset) {
   if (sheets.empty()) return 0;
   const std::vector<V3f> smooth = mesh.position;
-  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-    if (contact.side[v]) mesh.position[v] = laid(sheets, block, smooth[v], contact.side[v], offset);
-  });
-  const std::vector<V3f> lying = mesh.position;
-  const auto moved_back = [&](uint32_t v, int step) {  // half the way, smooth, extracted, farther
-    if (contact.side[v] && step == 1) return (lying[v] + smooth[v]) * 0.5f;
-    if (contact.side[v] && step == 2) return smooth[v];
-    return pushed(sheets, block_of_vertex(mesh, v), contact.extracted[v], 0.25f * float(step - 3));
+  std::vector<uint8_t> steps(mesh.position.size(), 0);  // back
+  const auto lies = [&](uint32_t v) { return contact.side[v] != 0 && steps[v] == 0; };
+  const auto lay = [&](V3i block, uint32_t v, const V3f& p) {
+    return laid(sheets, block, p, contact.side[v], offset);
   };
-  std::vector<uint8_t> steps(mesh.position.size(), 0);
-  std::vector<uint32_t> crossing = crossing_triangles(mesh, sheets);
-  for (int round = 0; round < 8 && !crossing.empty(); ++round) {
-    std::vector<uint32_t> back;
-    for (const uint32_t t : crossing)
-      for (int k = 0; k < 3; ++k) back.push_back(mesh.triangle[t][k]);
-    std::sort(back.begin(), back.end());
-    back.erase(std::unique(back.begin(), back.end()), back.end());
-    for (const uint32_t v : back) {
-      steps[v] = std::max<uint8_t>(steps[v] + 1, contact.side[v] ? 1 : 3);
-      mesh.position[v] = moved_back(v, steps[v]);
+  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+    if (lies(v)) mesh.position[v] = lay(block, v, smooth[v]);
+  });
+  const auto mend = [&] {  // returns what it moved
+    std::vector<uint8_t> mended(mesh.position.size(), 0);
+    for (int pass = 0; pass < 5; ++pass) {
+      const std::vector<V3f> before = mesh.position;
+      for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+        if (!has_sliver(before, rings, v)) return;
+        const V3f way = mean_of_ring(before, rings, v) - before[v];
+        mesh.position[v] = lies(v) ? lay(block, v, before[v] + way)
+                                   : before[v] + way - normal[v] * normal[v].dot(way);
+        mended[v] = 1;
+      });
     }
-    crossing = crossing_triangles(mesh, sheets);
-  }
-  return crossing.size();
+    return mended;
+  };
+  mend();
+  const std::vector<V3f> lying = mesh.position;
+  const auto moved_back = [&](uint32_t v) {  // half the way, smooth, extracted, farther
+    steps[v] = std::max<uint8_t>(steps[v] + 1, contact.side[v] ? 1 : 3);
+    if (contact.side[v] && steps[v] == 1) return (lying[v] + smooth[v]) * 0.5f;
+    if (contact.side[v] && steps[v] == 2) return smooth[v];
+    return pushed(sheets, block_of_vertex(mesh, v), contact.extracted[v],
+                  0.25f * float(steps[v] - 3));
+  };
+  const size_t crossing =
+      move_until_free(mesh, sheets, std::vector<uint8_t>(steps.size(), 1), moved_back);
+  const std::vector<V3f> free = mesh.position;
+  const std::vector<uint8_t> mended = mend();
+  return crossing + move_until_free(mesh, sheets, mended, [&](uint32_t v) { return free[v]; });
 }
 
 std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,

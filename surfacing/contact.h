@@ -23,12 +23,14 @@ struct SheetContact {
 /// Vertices in the gap around the sheets that face one.
 SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets);
 
-/// Moves vertices in contact to `offset` voxels before the sheets. What would cross a sheet between
-/// its vertices goes back on its way, to where it was extracted and farther: the rim of a sheet may
-/// stand out of the gap around it.
+/// Moves vertices in contact to `offset` voxels before the sheets, and the corners of slivers that
+/// this makes, there and at the rims, along the surface to the mean of their neighbours. What would
+/// cross a sheet between its vertices goes back on its way, to where it was extracted and farther:
+/// the rim of a sheet may stand out of the gap around it.
+/// @param normal  of the mesh before
 /// @return the triangles that cross a sheet all the same.
-size_t lay_on_sheets(LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
-                     float offset);
+size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetContact& contact,
+                     const Sheets& sheets, const std::vector<V3f>& normal, float offset);
 
 /// Unit normals of the free surface, in which triangles in contact have no part; 0 inside the
 /// contact.

@@ -178,7 +178,8 @@ Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedPar
   const std::vector<uint8_t> moved =
       overlap_solids(mesh, result.contact, things.obstacles, things.ground, spacing);
   if (!things.sheets.empty()) {
-    report.crossing = lay_on_sheets(mesh, result.contact, things.sheets, offset * spacing);
+    report.crossing =
+        lay_on_sheets(mesh, rings, result.contact, things.sheets, result.normal, offset * spacing);
     std::vector<V3f> free = free_normals(mesh, rings, result.contact);
     for (size_t v = 0; v < free.size(); ++v)  // what is in a solid keeps what it had outside
       if (moved.empty() || !moved[v]) result.normal[v] = free[v];
