@@ -40,6 +40,12 @@ class ClothBsdf {
     return (side > 0 ? reflectance_ : transmittance_) * (density * terminator(incoming, cos, side));
   }
 
+  /// Radiance that leaves for irradiance of this side and of the other, on the real surface.
+  V3f radiance(const V3f& front, const V3f& back) const {
+    return (reflectance_ * front + transmittance_ * back) * (1 / kPi);
+  }
+  bool faces(const V3f& incoming) const { return dot(incoming, geometric_) > 0; }
+
   ClothScatter sample(float u_side, const V2f& u) const {
     ClothScatter out;
     const float side = u_side < reflect_probability_ ? 1.f : -1.f;

@@ -7,10 +7,24 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <immintrin.h>
+
 #include <memory>
 #include <type_traits>
 
 namespace drench {
+
+/// Denormals to zero while a tile is rendered: Embree asks for it, and it is per thread.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned saved_;
+};
 
 template <class Handle, void (*release)(Handle)>
 struct EmbreeRelease {

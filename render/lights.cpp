@@ -194,8 +194,7 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
   return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
 }
 
-LightSample Lights::sample(const V3f& from, float u_light, const V2f& u) const {
-  const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
+LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const {
   float total = 0;
   for (size_t k = 0; k < count; ++k) total += importance(k, from);
   if (!(total > 0)) return {};

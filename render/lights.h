@@ -60,16 +60,24 @@ class Lights {
   Hit intersect(const V3f& origin, const V3f& direction, float distance) const;
 
   /// Draws a light, then a direction to it.
-  LightSample sample(const V3f& from, float u_light, const V2f& u) const;
+  LightSample sample(const V3f& from, float u_light, const V2f& u) const {
+    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, u_light, u);
+  }
+  /// The same among all but the environment.
+  LightSample sample_lamps(const V3f& from, float u_light, const V2f& u) const {
+    return sample_first(environment_index(), from, u_light, u);
+  }
 
   /// Radiance of a hit shape light, and the density with which `sample` finds it from `from`.
   V3f shape_radiance(int light) const { return shapes_[light].radiance; }
   float shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const;
 
+  enum class Suns { seen, hidden };
+
   /// Radiance from infinity along a direction, each part weighed by `weight(density)`, where the
   /// density is that of `sample` at `from`; 0 if it is not asked for.
   template <class Weight>
-  V3f infinite_radiance(const V3f& from, const V3f& direction, bool weighed,
+  V3f infinite_radiance(const V3f& from, const V3f& direction, bool weighed, Suns suns,
                         const Weight& weight) const {
     V3f sum(0);
     if (environment_) {
@@ -79,7 +87,7 @@ class Lights {
               : 0.f;
       sum += environment_->radiance(direction) * weight(pdf);
     }
-    for (size_t s = 0; s < suns_.size(); ++s) {
+    for (size_t s = 0; s < suns_.size() && suns == Suns::seen; ++s) {
       if (!suns_[s].covers(direction)) continue;
       const float pdf = weighed ? choice_probability(shapes_.size() + s, from) /
                                       (2 * kPi * suns_[s].one_minus_cos)
@@ -89,6 +97,7 @@ class Lights {
     return sum;
   }
 
+  bool has_lamps() const { return environment_index() > 0; }
   bool has_environment() const { return environment_.has_value(); }
   bool can_sample() const { return !shapes_.empty() || !suns_.empty() || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
@@ -97,6 +106,7 @@ class Lights {
   float environment_importance() const { return environment_importance_; }
 
  private:
+  LightSample sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const;
   size_t environment_index() const { return shapes_.size() + suns_.size(); }
   float importance(size_t index, const V3f& from) const;
   float choice_probability(size_t index, const V3f& from) const;

@@ -12,7 +12,6 @@
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_dielectric.h"
-#include "render/color.h"
 #include "render/guide.h"
 
 namespace drench {
@@ -48,6 +47,7 @@ struct PathState {
   bool inside = false;  // in the fluid
   bool specular_only = true;
   int vertices = 0, diffuse = 0;
+  int interfaces = 0;  // since the last diffuse surface
   uint32_t branch = 0;
 };
 
@@ -144,11 +144,17 @@ class PathTracer {
     return 1;
   }
 
+  /// Whether photons bring what lamps send along this path.
+  bool left_to_photons(const PathState& state) const {
+    return kWater && settings_.photons && state.diffuse > 0 && state.interfaces > 0;
+  }
+
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
     V3f found = state.throughput;
     if (hit.kind == Hit::Kind::light) {
+      if (left_to_photons(state)) return;
       const float pdf =
           kLights && state.bsdf_pdf > 0
               ? lights.shape_pdf(int(hit.index), state.vertex, direction, hit.distance)
@@ -156,19 +162,12 @@ class PathTracer {
       found *= lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf);
     } else {
       if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
-      found *= lights.infinite_radiance(state.vertex, direction, state.bsdf_pdf > 0,
-                                        [&](float pdf) { return emission_weight(state, pdf); });
+      found *= lights.infinite_radiance(
+          state.vertex, direction, state.bsdf_pdf > 0,
+          left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
+          [&](float pdf) { return emission_weight(state, pdf); });
     }
-    if constexpr (kWater) found = limit_caustic(state, found);
     radiance_ += found;
-  }
-
-  /// What a surface got through or off the water, held below the shot's limit if it sets one.
-  V3f limit_caustic(const PathState& state, const V3f& found) const {
-    if (settings_.caustic_limit == 0 || state.diffuse == 0 || state.bsdf_pdf > 0) return found;
-    const float brightness = luminance(found);
-    return brightness > settings_.caustic_limit ? found * (settings_.caustic_limit / brightness)
-                                                : found;
   }
 
   /// Continues the path along `direction` from the surface.
@@ -187,6 +186,7 @@ class PathTracer {
     if (split.reflectance < 1 && !(dot(split.refracted, flat) < 0))
       split = split_at_interface(d, flat, eta);
     state.bsdf_pdf = 0;
+    ++state.interfaces;
     bool reflect = split.reflectance >= 1;
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
       pending_ = state;
@@ -212,6 +212,9 @@ class PathTracer {
     const ClothBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
                          material.reflectance_at(surface.uv), material.transmittance);
     if (bsdf.black()) return false;
+    state.interfaces = 0;
+    if constexpr (kWater)
+      if (settings_.photons) add_caustics(state, surface, bsdf);
     // Light from outside reaches a point in water only by refraction, which surface samples find.
     const bool sample_lights = kLights && !(kWater && state.inside && !scene_.lights_in_fluid());
     if (sample_lights && settings_.estimator != Estimator::bsdf_only)
@@ -238,7 +241,8 @@ class PathTracer {
     float u = number(state, kScatterSide);
     const V2f uv = point(state, kScatterDirection);
     if constexpr (!kWater) return bsdf.sample(u, uv);
-    if (!state.inside || settings_.water_guide == WaterGuide::off) return bsdf.sample(u, uv);
+    if (!state.inside || settings_.photons || settings_.water_guide == WaterGuide::off)
+      return bsdf.sample(u, uv);
     const RefractedLightGuide guide(scene_.lights(), scene_.fluid_ior());
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(u, uv);
@@ -259,6 +263,15 @@ class PathTracer {
     out.pdf = share * guide_pdf + (1 - share) * out.pdf;
     out.weight = value * (1 / out.pdf);
     return out;
+  }
+
+  void add_caustics(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
+    V3f front(0), back(0);
+    settings_.photons->for_each_near(
+        surface.position, surface.geometric_normal, [&](const Photon& photon, float share) {
+          (bsdf.faces(-photon.direction) ? front : back) += photon.power * share;
+        });
+    radiance_ += state.throughput * bsdf.radiance(front, back);
   }
 
   void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "render/scene.h"
+#include "render/photons.h"
 
 namespace drench {
 
@@ -26,11 +26,11 @@ struct PathSample {
 
 struct PathSettings {
   int depth = 8;
-  float caustic_limit = 0;  // W/(sr m^2); 0: none
   Estimator estimator = Estimator::mis;
   FirstInterface first_interface = FirstInterface::one;
   WaterGuide water_guide = WaterGuide::on;
   bool camera_in_fluid = false;
+  const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
 };
 
 /// One camera sample. `film` in pixels; `rays` counts rays traced.

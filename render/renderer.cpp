@@ -1,7 +1,6 @@
 #include "render/renderer.h"
 
 #include <fmt/format.h>
-#include <immintrin.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -14,6 +13,7 @@
 #include "render/filter.h"
 #include "render/options.h"
 #include "render/path.h"
+#include "render/photons.h"
 
 namespace drench {
 
@@ -27,18 +27,6 @@ double process_cpu_seconds() {
   return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-/// Denormals to zero while a tile is rendered: Embree asks for it, and it is per thread.
-class FlushDenormals {
- public:
-  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040); }
-  ~FlushDenormals() { _mm_setcsr(saved_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned saved_;
-};
-
 void check_settings(const RenderSettings& r) {
   constexpr int kLargest = 32768, kMostSamples = 1 << 20;
   if (r.width < 1 || r.height < 1 || r.width > kLargest || r.height > kLargest)
@@ -47,6 +35,11 @@ void check_settings(const RenderSettings& r) {
   if (r.samples < 1 || r.samples > kMostSamples)
     throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, kMostSamples));
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
+}
+
+uint32_t photon_count(const RenderSettings& r) {
+  constexpr double kMost = 2e7;  // 1 GB of them
+  return uint32_t(std::min(r.photons * r.samples * r.width * r.height, kMost));
 }
 
 /// What every tile reads.
@@ -139,18 +132,24 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   const Scene scene(shot, frame, geometry, options);
   PathSettings path;
   path.depth = shot.render.depth;
-  path.caustic_limit = float(shot.render.caustic_limit);
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;
   path.camera_in_fluid = scene.inside_fluid(scene.camera().open().position, 0);
   const uint32_t samples = uint32_t(shot.render.samples);
+  const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
+  uint64_t photon_rays = 0;
+  PhotonMap photons;
+  if (shot.render.photons > 0 && can_trace_photons(scene)) {
+    photons = trace_photons(scene, seed, photon_count(shot.render), photon_rays);
+    path.photons = &photons;
+  }
   const Job job{scene,
                 path,
                 path_function(scene.features() | options.force_features),
                 PixelFilter(),
                 options.pixel_order,
-                hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame))),
+                seed,
                 uint32_t(std::bit_width(samples - 1)),
                 int(samples)};
   Film film{shot.render.width, shot.render.height, {}};
@@ -160,7 +159,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   const uint64_t rays = render_tiles(job, film, report, columns, rows);
   if (stats) {
     stats->camera_samples = uint64_t(film.width) * film.height * samples;
-    stats->rays = rays;
+    stats->rays = rays + photon_rays;
     stats->cpu_s = process_cpu_seconds() - cpu_start;
   }
   return film;

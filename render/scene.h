@@ -67,6 +67,8 @@ class Scene {
 
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
+  int fluid() const { return fluid_; }  // index of the dielectric object, or -1
+  const SceneObject& object(int index) const { return objects_[size_t(index)]; }
   V3f fluid_absorption() const { return fluid_absorption_; }  // 1/m
   float fluid_ior() const { return fluid_ior_; }
   bool lights_in_fluid() const { return lights_in_fluid_; }
@@ -97,7 +99,7 @@ class Scene {
   V3f ground_center_;
   float ground_half_size_ = 0;
   uint32_t ground_material_ = 0;
-  int fluid_ = -1;  // index of the dielectric object
+  int fluid_ = -1;
   V3f fluid_absorption_{0, 0, 0};
   float fluid_ior_ = 1;
   bool lights_in_fluid_ = false;

@@ -310,8 +310,7 @@ struct RenderSettings {
   int samples = 64;               // camera samples a pixel
   int depth = 8;                  // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
-  double caustic_limit =
-      0;  // W/(sr m^2), most that one path through water to a lamp adds; 0: no limit
+  double photons = 0.1;  // of caustics, for each camera sample; 0: caustics by paths alone
   uint32_t seed = 1;
 };
 

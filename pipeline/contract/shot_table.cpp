@@ -409,10 +409,9 @@ std::vector<Parameter> picture_rows() {
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,
                                         "from the stored velocities, over the shutter"),
-      row<&RenderSettings::caustic_limit>(
-          "render", "caustic_limit", "W/(sr m^2)", {0, 1e9}, render,
-          "most that one path from a surface through water to a light adds to its sample: fewer "
-          "white dots at few samples, darker caustics; 0 keeps all light"),
+      row<&RenderSettings::photons>(
+          "render", "photons", "", {0, 1000}, render,
+          "started for each camera sample, for light of lamps through water; 0: by paths alone"),
       row<&RenderSettings::seed>("render", "seed", "", seeds, render, "of the samples"),
   };
 }

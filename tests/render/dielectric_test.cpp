@@ -173,24 +173,6 @@ TEST(WaterGuide, LeavesTheMeanAsItIs) {
   }
 }
 
-TEST(CausticLimit, TakesLightOnlyFromPathsThroughWater) {
-  Shot shot = plain_shot(256, 8);
-  add_ground(shot, 0.5f, 6);
-  shot.material.push_back(dielectric("water", kIndex));
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
-  shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40)};
-  const FrameGeometry pool{box_mesh({-5, -0.1f, -5}, {5, 0.4f, 5}), {}};
-  const Film free = render_frame(shot, 1001, pool), dry = render_frame(shot, 1001, {});
-  shot.render.caustic_limit = 0.01;
-  const Film limited = render_frame(shot, 1001, pool);
-  EXPECT_LT(channel_mean(limited, 0).value, 0.5 * channel_mean(free, 0).value);
-  for (size_t k = 0; k < limited.rgba.size(); k += 4)
-    EXPECT_LE(limited.rgba[k], std::max(free.rgba[k], 0.f) + 1e-6f);
-  EXPECT_EQ(render_frame(shot, 1001, {}).rgba, dry.rgba);
-}
-
 TEST(WaterGuide, HasTheDensityItClaims) {
   // The density integrates to 1 over the directions that reach the surface below the critical
   // angle, less what the cones hold beyond the horizon: none here.

@@ -14,12 +14,14 @@ namespace drench::test {
 
 inline constexpr double kPi64 = std::numbers::pi;
 
-/// A shot that renders nothing yet: 16 x 16 pixels, no ground, no light, no blur.
+/// A shot that renders nothing yet: 16 x 16 pixels, no ground, no light, no blur, no photons, which
+/// err in all pixels together.
 inline Shot plain_shot(int samples, int size = 16) {
   Shot shot;
   shot.render.width = shot.render.height = size;
   shot.render.samples = samples;
   shot.render.motion_blur = false;
+  shot.render.photons = 0;
   return shot;
 }
 

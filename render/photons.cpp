@@ -1,0 +1,267 @@
+#include "render/photons.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <atomic>
+
+#include "render/bsdf_dielectric.h"
+#include "render/embree.h"
+#include "render/sampler.h"
+
+namespace drench {
+
+namespace {
+
+/// Sampling dimensions of a photon; each interface takes two.
+enum PhotonDimension : uint32_t { kStart, kStartPoint, kLamp, kLampPoint, kTime, kInterfaces };
+constexpr int kMostInterfaces = 64, kLongFlight = 8;
+constexpr float kLongSurvival = 0.8f;
+constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
+
+/// The fluid's triangles by area; those on sheets let light pass and start none.
+class InterfacePoints {
+ public:
+  explicit InterfacePoints(const SceneObject& fluid) : fluid_(fluid) {
+    double sum = 0;
+    for (size_t t = 0; t < fluid.triangle.size(); ++t) {
+      if (fluid.contact.empty() || !fluid.contact[t]) sum += double(corners(t, 0).area());
+      upto_.push_back(sum);
+    }
+  }
+
+  /// m^2, at shutter open
+  float area() const { return upto_.empty() ? 0.f : float(upto_.back()); }
+
+  struct Start {
+    Hit hit;
+    float area_ratio;  // of the triangle at this time over shutter open
+  };
+  Start sample(float u, const V2f& uv, uint32_t object, float time) const {
+    const size_t t =
+        size_t(std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back()) - upto_.begin());
+    const size_t triangle = std::min(t, upto_.size() - 1);
+    const float root = std::sqrt(uv.x);  // uniform on the triangle
+    const float at_open = corners(triangle, 0).area();
+    return {{Hit::Kind::object, 0, object, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
+            at_open > 0 ? corners(triangle, time).area() / at_open : 0.f};
+  }
+
+ private:
+  struct Corners {
+    V3f a, b, c;
+    float area() const {
+      const V3f n = cross(b - a, c - a);
+      return 0.5f * std::sqrt(dot(n, n));
+    }
+  };
+  Corners corners(size_t triangle, float time) const {
+    const auto& t = fluid_.triangle[triangle];
+    const auto at = [&](uint32_t v) {
+      const V3f p = fluid_.position[v];
+      return fluid_.moves() ? p + (fluid_.position_close[v] - p) * time : p;
+    };
+    return {at(t.x), at(t.y), at(t.z)};
+  }
+
+  const SceneObject& fluid_;
+  std::vector<double> upto_;
+};
+
+struct Flight {
+  Ray ray;
+  V3f power;
+  bool inside = false;
+  int interfaces = 0;
+};
+
+class PhotonTracer {
+ public:
+  PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count)
+      : scene_(scene), starts_(starts), count_(count) {}
+
+  /// The photon, if it starts and comes to lie on something.
+  bool trace(const Sampler& sampler, Photon& photon, uint64_t& rays) const {
+    Flight flight;
+    Surface surface;
+    if (!start(sampler, flight, surface, rays)) return false;
+    while (cross_interface(sampler, flight, surface)) {
+      const Hit hit = next(flight, surface, rays);
+      if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
+      if (surface.material->type == MaterialType::dielectric) continue;
+      const float n = flight.inside ? scene_.fluid_ior() : 1.f;
+      photon = {surface.position, flight.ray.direction, surface.geometric_normal,
+                flight.power * (1 / (n * n))};
+      return finite(photon.power);
+    }
+    return false;
+  }
+
+ private:
+  /// From a lamp to a point of the fluid that it reaches.
+  bool start(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
+    flight.ray.time = sampler.one(kTime);
+    const auto [hit, area_ratio] = starts_.sample(sampler.one(kStart), sampler.two(kStartPoint),
+                                                  uint32_t(scene_.fluid()), flight.ray.time);
+    surface = scene_.surface<true>(flight.ray, hit);
+    const LightSample light =
+        scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
+    const float facing = dot(light.direction, surface.geometric_normal);
+    if (!(light.pdf > 0) || !(facing > 0)) return false;
+    ++rays;
+    if (scene_.occluded({surface.leave(light.direction), light.direction, flight.ray.time},
+                        light.distance))
+      return false;
+    flight.ray.direction = -light.direction;
+    flight.power =
+        light.radiance * (facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
+    return true;
+  }
+
+  /// Reflects or refracts at the fluid's surface. Smooth normals bend the flux as they do radiance
+  /// the other way: Veach 1997, section 5.3.
+  bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
+    if (++flight.interfaces > kMostInterfaces) return false;
+    const uint32_t dimension = kInterfaces + 2 * uint32_t(flight.interfaces);
+    const V3f d = flight.ray.direction;
+    const float eta = flight.inside ? 1 / surface.material->ior : surface.material->ior;
+    const V3f flat = flight.inside ? -surface.geometric_normal : surface.geometric_normal;
+    V3f normal = interface_normal(d, surface.geometric_normal, surface.shading_normal);
+    InterfaceSplit split = split_at_interface(d, normal, eta);
+    if (split.reflectance < 1 && !(dot(split.refracted, flat) < 0)) {
+      normal = flat;
+      split = split_at_interface(d, normal, eta);
+    }
+    const bool reflect = split.reflectance >= 1 || sampler.one(dimension) < split.reflectance;
+    const V3f out = reflect ? split.reflected : split.refracted;
+    flight.power *= std::abs(dot(out, flat) * dot(d, normal) / (dot(d, flat) * dot(out, normal)));
+    if (flight.interfaces > kLongFlight) {
+      if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
+      flight.power *= 1 / kLongSurvival;
+    }
+    if (!reflect) flight.inside = !flight.inside;
+    flight.ray.origin = surface.leave(out);
+    flight.ray.direction = out;
+    return finite(out) && finite(flight.power);
+  }
+
+  /// The next surface but for contact of water with sheets, which light passes.
+  Hit next(Flight& flight, Surface& surface, uint64_t& rays) const {
+    while (true) {
+      const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
+      ++rays;
+      if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
+      surface = scene_.surface<true>(flight.ray, hit);
+      const bool outwards = dot(flight.ray.direction, surface.geometric_normal) > 0;
+      if (surface.material->type == MaterialType::dielectric) flight.inside = outwards;
+      if (flight.inside) absorb(flight, hit.distance);
+      if (!surface.contact) return hit;
+      flight.inside = true;
+      flight.ray.origin = surface.leave(flight.ray.direction);
+    }
+  }
+
+  void absorb(Flight& flight, float distance) const {
+    const V3f a = scene_.fluid_absorption();
+    for (int c = 0; c < 3; ++c) flight.power[c] *= std::exp(-a[c] * distance);
+  }
+
+  const Scene& scene_;
+  const InterfacePoints& starts_;
+  uint32_t count_;
+};
+
+uint64_t key_of(const Imath::V3i& cell) {
+  const auto bits = [](int v) { return uint64_t(uint32_t(v)) & 0x1fffff; };
+  return bits(cell.z) << 42 | bits(cell.y) << 21 | bits(cell.x);
+}
+
+/// Photons in the cell of the median photon, cells of the given edge.
+double typical_count(const std::vector<Photon>& photons, float edge) {
+  std::vector<uint64_t> key(photons.size());
+  for (size_t k = 0; k < key.size(); ++k) {
+    const V3f p = photons[k].position * (1 / edge);
+    key[k] = key_of({int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))});
+  }
+  tbb::parallel_sort(key.begin(), key.end());
+  std::vector<uint32_t> run;
+  for (size_t k = 0; k < key.size(); ++k)
+    if (k > 0 && key[k] == key[k - 1])
+      ++run.back();
+    else
+      run.push_back(1);
+  std::sort(run.begin(), run.end());
+  size_t seen = 0;
+  for (const uint32_t count : run)
+    if ((seen += count) * 2 >= key.size()) return count;
+  return 1;
+}
+
+/// The radius within which the median photon has 20 of 1e5 photons, and more of more.
+float choose_radius(const std::vector<Photon>& photons) {
+  const double wanted = 20 * std::sqrt(double(photons.size()) / 1e5);
+  Imath::Box3f bounds;
+  for (const Photon& p : photons) bounds.extendBy(p.position);
+  const float diagonal = std::max((bounds.max - bounds.min).length(), 1e-6f);
+  float radius = diagonal / 50;
+  for (int round = 0; round < 4; ++round) {
+    const float edge = 2 * radius;
+    const double density = typical_count(photons, edge) / (double(edge) * edge);
+    radius = float(std::sqrt(wanted / (double(kPi) * density)));
+    radius = std::clamp(radius, diagonal * 1e-5f, diagonal / 10);
+  }
+  return radius;
+}
+
+}  // namespace
+
+uint32_t PhotonMap::bucket_of(const Imath::V3i& cell) const {
+  uint64_t key = key_of(cell) * 0x9e3779b97f4a7c15ull;
+  return uint32_t(key ^ key >> 32) & mask_;
+}
+
+PhotonMap::PhotonMap(std::vector<Photon> photons) {
+  if (photons.empty()) return;
+  radius_ = choose_radius(photons);
+  inverse_edge_ = 1 / (2 * radius_);
+  while (size_t{mask_} + 1 < photons.size()) mask_ = 2 * mask_ + 1;
+  first_.assign(size_t{mask_} + 2, 0);
+  for (const Photon& p : photons) ++first_[bucket_of(cell_of(p.position)) + 1];
+  for (size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
+  std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+  photon_.resize(photons.size());
+  for (const Photon& p : photons) photon_[next[bucket_of(cell_of(p.position))]++] = p;
+  for (int axis = 0; axis < 3; ++axis) {
+    place_[axis].resize(photons.size() + 8);
+    for (size_t k = 0; k < photons.size(); ++k) place_[axis][k] = photon_[k].position[axis];
+  }
+}
+
+bool can_trace_photons(const Scene& scene) {
+  return scene.fluid() >= 0 && scene.lights().has_lamps() && !scene.lights_in_fluid();
+}
+
+PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint64_t& rays) {
+  constexpr uint32_t chunk = 4096;
+  const InterfacePoints starts(scene.object(scene.fluid()));
+  if (!(starts.area() > 0)) return {};
+  const PhotonTracer tracer(scene, starts, count);
+  std::vector<std::vector<Photon>> found((count + chunk - 1) / chunk);
+  std::atomic<uint64_t> traced{0};
+  tbb::parallel_for(size_t{0}, found.size(), [&](size_t c) {
+    const FlushDenormals flush;
+    uint64_t chunk_rays = 0;
+    for (uint32_t k = uint32_t(c) * chunk; k < std::min(count, (uint32_t(c) + 1) * chunk); ++k) {
+      const Sampler sampler(PixelOrder::separate, seed ^ kSeed, 0, 0, 0, k);
+      Photon photon;
+      if (tracer.trace(sampler, photon, chunk_rays)) found[c].push_back(photon);
+    }
+    traced += chunk_rays;
+  });
+  rays += traced;
+  std::vector<Photon> all;
+  for (const std::vector<Photon>& part : found) all.insert(all.end(), part.begin(), part.end());
+  return PhotonMap(std::move(all));
+}
+
+}  // namespace drench

@@ -1,0 +1,162 @@
+// Photons against closed forms and against paths, which share nothing with them beyond Fresnel.
+
+#include "render/photons.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/render/support.h"
+
+namespace drench::test {
+namespace {
+
+constexpr double kIndex = 1.333;
+
+Light sun(const V3d& direction, double angle_deg) {
+  Light light;
+  light.type = LightType::sun;
+  light.name = "sun";
+  light.direction = direction;
+  light.angle_deg = angle_deg;
+  light.radiance = V3f(2);  // W/m^2 on a surface that faces it
+  return light;
+}
+
+/// Of the photons that lie in the square of half size s around the origin, W/m^2.
+double irradiance(const PhotonMap& map, double s, int n = 40) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      map.for_each_near(
+          V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
+          V3f(0, 1, 0), [&](const Photon& p, float share) { sum += double(p.power.x) * share; });
+  return sum / n / n;
+}
+
+PhotonMap photons_of(const Shot& shot, const TriangleMesh& fluid, uint32_t count,
+                     uint32_t seed = 1) {
+  const Scene scene(shot, 1001, {fluid, {}}, {});
+  uint64_t rays = 0;
+  PhotonMap map = trace_photons(scene, seed, count, rays);
+  EXPECT_GT(rays, count / 8);
+  return map;
+}
+
+Shot pool_shot(double index, float absorption) {
+  Shot shot = plain_shot(64, 8);
+  add_ground(shot, 0.5f, 6);
+  shot.material.push_back(dielectric("water", index, V3f(absorption)));
+  return shot;
+}
+
+/// A puddle of 4 m with waves.
+TriangleMesh waves() {
+  TriangleMesh mesh = sphere_mesh(6);
+  for (V3f& p : mesh.position)
+    p = {2 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 2 * p.z};
+  mesh.normal.clear();
+  return mesh;
+}
+
+// Under level water, E cos(a) (1 - F(a)) e^(-s d / cos(b)) / n^2. A million photons, of which some
+// 20,000 lie in the square: 4 of their standard errors.
+TEST(Photons, LieUnderLevelWaterAsSnellAndFresnelSay) {
+  Shot shot = pool_shot(kIndex, 0.7f);
+  const double a = 0.6, depth = 0.4, cos_b = std::sqrt(1 - std::pow(std::sin(a) / kIndex, 2));
+  shot.light = {sun({std::sin(a), -std::cos(a), 0}, 0.5)};
+  const double parallel = (kIndex * std::cos(a) - cos_b) / (kIndex * std::cos(a) + cos_b);
+  const double perpendicular = (std::cos(a) - kIndex * cos_b) / (std::cos(a) + kIndex * cos_b);
+  const double fresnel = (parallel * parallel + perpendicular * perpendicular) / 2;
+  const PhotonMap map = photons_of(shot, box_mesh({-5, -0.1f, -5}, {5, float(depth), 5}), 1000000);
+  const double expected =
+      2 * std::cos(a) * (1 - fresnel) * std::exp(-0.7 * depth / cos_b) / (kIndex * kIndex);
+  EXPECT_NEAR(irradiance(map, 1.5), expected, 0.02 * expected);
+}
+
+// A lamp's light falls as the form factor of its square says, whatever the share of the surface.
+TEST(Photons, OfALampCarryItsFormFactor) {
+  Shot shot = pool_shot(1, 0);  // water that bends nothing
+  shot.light = {panel({0, 2, 0}, 0.1, 0.1, 50)};
+  const PhotonMap map = photons_of(shot, box_mesh({-2, -0.1f, -2}, {2, 0.4f, 2}), 1000000);
+  // E = L A / h^2, cos^4 over both squares: within 1 % for lamp and patch of 0.1 and 0.2 at 2 m.
+  EXPECT_NEAR(irradiance(map, 0.1), 50 * 0.04 / 4, 0.03 * 0.5);
+}
+
+// Water that rises through the shutter absorbs as the mean of e^(-s d(t)).
+TEST(Photons, AreSpreadOverTheShutter) {
+  Shot shot = pool_shot(1, 2);
+  shot.render.motion_blur = true;
+  shot.camera.position = V3d(0, 3, 0.5);
+  shot.camera.shutter_open = -0.25, shot.camera.shutter_close = 0.25;
+  shot.light = {sun({0, -1, 0}, 0.5)};
+  TriangleMesh water = box_mesh({-3, -0.1f, -3}, {3, 0.5f, 3});
+  for (size_t v = 0; v < water.position.size(); ++v)
+    if (water.position[v].y > 0) water.velocity[v] = V3f(0, float(0.8 * 2 * shot.timeline.fps), 0);
+  const PhotonMap map = photons_of(shot, water, 1000000);
+  // From 0.1 to 0.9 m: (e^-0.2 - e^-1.8) / 1.6 of 2 W/m^2.
+  const double expected = 2 * (std::exp(-0.2) - std::exp(-1.8)) / 1.6;
+  EXPECT_NEAR(irradiance(map, 1), expected, 0.02 * expected);
+}
+
+// The same picture from photons and from paths, of a wavy pool with a lamp and a sun.
+TEST(Photons, GiveThePictureThatPathsGive) {
+  Shot shot = pool_shot(kIndex, 0.3f);
+  shot.render.samples = 512;
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun({1, -2, 0}, 5), sky(0.2f)};
+  const Mean paths = mean_over_seeds(shot, {waves(), {}}, {}, 16);
+  shot.render.photons = 6;
+  const Mean photons = mean_over_seeds(shot, {waves(), {}}, {}, 16);
+  EXPECT_LT(paths.error, 0.01 * paths.value);
+  EXPECT_NEAR(photons.value, paths.value,
+              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+}
+
+// Blur and noise vanish together: on lines across the waves' caustics noise falls with the number
+// of photons to the power -1/4, 1.78 a decade, blur to twice that. The reference has its own tenth.
+TEST(Photons, ConvergeAsTheirNumberGrows) {
+  Shot shot = pool_shot(kIndex, 0);
+  shot.light = {sun({0.2, -1, 0.1}, 0.5)};
+  const auto lines = [&](uint32_t count, uint32_t seed) {
+    const PhotonMap map = photons_of(shot, waves(), count, seed);
+    std::vector<double> values;
+    for (int k = 0; k < 2200; ++k) {
+      double sum = 0;
+      map.for_each_near(V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)),
+                        V3f(0, 1, 0),
+                        [&](const Photon& p, float share) { sum += double(p.power.x) * share; });
+      values.push_back(sum);
+    }
+    return values;
+  };
+  const std::vector<double> best = lines(8000000, 9);
+  double before = 1e9;
+  for (const uint32_t count : {4000u, 40000u, 400000u}) {
+    double sum = 0, of = 0;
+    const std::vector<double> values = lines(count, 1);
+    for (size_t k = 0; k < best.size(); ++k)
+      sum += std::pow(values[k] - best[k], 2), of += best[k] * best[k];
+    const double error = std::sqrt(sum / of);
+    RecordProperty("error_" + std::to_string(count), std::to_string(error));
+    EXPECT_LT(error, before / 1.4) << count;
+    before = error;
+  }
+  EXPECT_LT(before, 0.2);
+}
+
+// What has no lamps or no fluid does without, and its picture keeps its bits.
+TEST(Photons, AreNotTracedWithoutLampsOrFluid) {
+  Shot shot = pool_shot(kIndex, 0.3f);
+  shot.camera.position = V3d(0, 3, 1);
+  shot.light = {sky(0.2f)};
+  Shot with = shot;
+  with.render.photons = 1;
+  EXPECT_EQ(render_frame(shot, 1001, {waves(), {}}).rgba,
+            render_frame(with, 1001, {waves(), {}}).rgba);
+  shot.light = with.light = {sun({1, -2, 0}, 5)};
+  EXPECT_EQ(render_frame(shot, 1001, {}).rgba, render_frame(with, 1001, {}).rgba);
+}
+
+}  // namespace
+}  // namespace drench::test
