@@ -118,8 +118,9 @@ class PhotonTracer {
     return true;
   }
 
-  /// Reflects or refracts at the fluid's surface. Smooth normals bend the flux as they do radiance
-  /// the other way: Veach 1997, section 5.3.
+  /// Reflects or refracts at the fluid's surface. Snell's law keeps n^2 cos dw about the normal
+  /// that bends the light; flux through the real surface has the cosine with that one's, so where
+  /// the two differ it takes the ratio, and photons carry what paths find the other way.
   bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
     if (++flight.interfaces > kMostInterfaces) return false;
     const uint32_t dimension = kInterfaces + 2 * uint32_t(flight.interfaces);

@@ -310,7 +310,7 @@ struct RenderSettings {
   int samples = 64;               // camera samples a pixel
   int depth = 8;                  // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
-  double photons = 0.1;  // of caustics, for each camera sample; 0: caustics by paths alone
+  double photons = 0.05;  // of caustics, for each camera sample; 0: caustics by paths alone
   uint32_t seed = 1;
 };
 

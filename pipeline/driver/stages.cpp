@@ -188,6 +188,7 @@ class ShotStages final : public Stages {
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
     all.emplace_back("samples", std::to_string(shot_.render.samples));
+    all.emplace_back("photons", fmt::format("{}", shot_.render.photons));
     StageReport report;
     report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, all));
     report.json =

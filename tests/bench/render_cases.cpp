@@ -1,5 +1,6 @@
 // Rendering a sheet of cloth over the ground: camera samples per CPU second, and error against
-// samples measured on one picture, so that both belong to one configuration.
+// samples measured on one picture, so that both belong to one configuration. Rendering a pool with
+// a small lamp: what photons gain over paths.
 
 #include <algorithm>
 #include <cmath>
@@ -157,6 +158,79 @@ void render_cloth(const Emit& emit) {
 const Registration render_cloth_case{
     "render_cloth", "cloth over ground at depth 8: samples per CPU s, error at 1 to 256 samples",
     render_cloth};
+
+/// A closed slab of water of 4 m whose top waves, its floor below the ground.
+TriangleMesh wavy_pool() {
+  constexpr uint32_t n = 128, row = n + 1;
+  TriangleMesh mesh;
+  for (const bool top : {true, false})
+    for (uint32_t j = 0; j <= n; ++j)
+      for (uint32_t i = 0; i <= n; ++i) {
+        const float x = -2 + 4 * float(i) / n, z = -2 + 4 * float(j) / n;
+        const float wave = 0.03f * (std::sin(7 * x + 2 * z) + std::sin(5 * z - 3 * x));
+        mesh.position.push_back({x, top ? 0.35f + wave : -0.1f, z});
+        mesh.velocity.push_back({0, 0, 0});
+      }
+  const auto quad = [&](uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+    mesh.triangle.push_back({a, b, c});
+    mesh.triangle.push_back({a, c, d});
+  };
+  constexpr uint32_t below = row * row;
+  for (uint32_t j = 0; j < n; ++j)
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t a = j * row + i;
+      quad(a, a + row, a + row + 1, a + 1);
+      quad(below + a, below + a + 1, below + a + row + 1, below + a + row);
+    }
+  const auto wall = [&](uint32_t a, uint32_t b) { quad(a, b, below + b, below + a); };
+  for (uint32_t k = 0; k < n; ++k) {
+    wall(k, k + 1);
+    wall(n * row + k + 1, n * row + k);
+    wall((k + 1) * row, k * row);
+    wall(k * row + n, (k + 1) * row + n);
+  }
+  return mesh;
+}
+
+Shot pool_shot() {
+  Shot shot = cloth_shot();
+  shot.camera.position = V3d(0.4, 1.9, 2.3);
+  shot.camera.target = V3d(0, 0.1, 0);
+  shot.light[0].radiance = {900, 900, 900};
+  shot.light[0].u = {0.05, 0, 0};
+  shot.light[0].v = {0, 0, 0.05};
+  return shot;
+}
+
+/// The reference is of paths alone. Gain: of 1 / (error x CPU s), at as many samples.
+void render_caustics(const Emit& emit) {
+  Shot photons = pool_shot(), paths = photons;
+  paths.render.photons = 0;
+  const FrameGeometry geometry{wavy_pool(), {}};
+  const Film reference = render(paths, geometry, kReferenceSamples, 1000).film;
+  for (const int samples : {4, 16, 64, 256}) {
+    double efficiency = 0;
+    for (const Shot* shot : {&paths, &photons}) {
+      const Sampled sampled = sample(*shot, geometry, samples, reference);
+      Line line = line_of(sampled);
+      line.method = shot == &paths ? "pool, small lamp, paths" : "pool, small lamp, photons";
+      const double here = 1 / (sampled.error * sampled.median.cost.cpu_s);
+      line.more["rel_mse"] = sampled.error;
+      if (shot == &paths) {
+        efficiency = here;
+      } else {
+        line.more["gain"] = here / efficiency;
+        line.error = efficiency / here, line.gate = 1;
+        line.error_of = "efficiency of paths over that of photons";
+      }
+      emit(line);
+    }
+  }
+}
+
+const Registration render_caustics_case{
+    "render_caustics", "a pool with a small lamp: error and time with photons and without",
+    render_caustics};
 
 }  // namespace
 

@@ -330,7 +330,7 @@ TEST(Program, WritesItsProvenanceIntoEveryImage) {
   const TinyShot shot;
   ASSERT_EQ(shot.run("run").code, done);
   const std::string header = text_of(shot.out() / layout::image("tiny", 1003)).substr(0, 4096);
-  for (const char* name : {"shot", "frame", "seed", "samples", "version", "key.render",
+  for (const char* name : {"shot", "frame", "seed", "samples", "photons", "version", "key.render",
                            "key.mesh/fluid.1003.ply", "key.sim/cloth.flag.1003.ply"}) {
     EXPECT_TRUE(has(header, std::string(name) + '\0' + "string")) << name;
   }
