@@ -47,7 +47,8 @@ struct PathState {
   bool inside = false;  // in the fluid
   bool specular_only = true;
   int vertices = 0, diffuse = 0;
-  int interfaces = 0;  // since the last diffuse surface
+  int interfaces = 0;        // since the last diffuse surface
+  bool has_photons = false;  // that surface
   uint32_t branch = 0;
 };
 
@@ -146,7 +147,7 @@ class PathTracer {
 
   /// Whether photons bring what lamps send along this path.
   bool left_to_photons(const PathState& state) const {
-    return kWater && settings_.photons && state.diffuse > 0 && state.interfaces > 0;
+    return kWater && state.has_photons && state.interfaces > 0;
   }
 
   void add_emission(const PathState& state, const Hit& hit) {
@@ -213,8 +214,8 @@ class PathTracer {
                          material.reflectance_at(surface.uv), material.transmittance);
     if (bsdf.black()) return false;
     state.interfaces = 0;
-    if constexpr (kWater)
-      if (settings_.photons) add_caustics(state, surface, bsdf);
+    state.has_photons = kWater && settings_.photons && !surface.small;
+    if (state.has_photons) add_caustics(state, surface, bsdf);
     // Light from outside reaches a point in water only by refraction, which surface samples find.
     const bool sample_lights = kLights && !(kWater && state.inside && !scene_.lights_in_fluid());
     if (sample_lights && settings_.estimator != Estimator::bsdf_only)
@@ -241,7 +242,7 @@ class PathTracer {
     float u = number(state, kScatterSide);
     const V2f uv = point(state, kScatterDirection);
     if constexpr (!kWater) return bsdf.sample(u, uv);
-    if (!state.inside || settings_.photons || settings_.water_guide == WaterGuide::off)
+    if (!state.inside || state.has_photons || settings_.water_guide == WaterGuide::off)
       return bsdf.sample(u, uv);
     const RefractedLightGuide guide(scene_.lights(), scene_.fluid_ior());
     const float share = guide.share(surface.position);

@@ -89,6 +89,7 @@ class PhotonTracer {
       const Hit hit = next(flight, surface, rays);
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
       if (surface.material->type == MaterialType::dielectric) continue;
+      if (surface.small) return false;  // paths bring it what it gets
       const float n = flight.inside ? scene_.fluid_ior() : 1.f;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
                 flight.power * (1 / (n * n))};

@@ -4,9 +4,9 @@
 // find it in a map of photons (Jensen 1996, "Global Illumination using Photon Maps").
 //
 // A photon starts at a point of the fluid's surface that a lamp reaches unhindered, so that none
-// misses the fluid, goes on through it and lies where it first meets a diffuse surface. Of N photons
-// the map's radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that both its
-// blur, as N^(-1/2), and its noise, as N^(-1/4), vanish.
+// misses the fluid, goes on through it and lies where it first meets a diffuse surface. Of N
+// photons the map's radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that
+// both its blur, as N^(-1/2), and its noise, as N^(-1/4), vanish.
 
 #include <immintrin.h>
 

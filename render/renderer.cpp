@@ -38,7 +38,7 @@ void check_settings(const RenderSettings& r) {
 }
 
 uint32_t photon_count(const RenderSettings& r) {
-  constexpr double kMost = 2e7;  // 1 GB of them
+  constexpr double kMost = 1e7;  // 1.5 GB while they are sorted
   return uint32_t(std::min(r.photons * r.samples * r.width * r.height, kMost));
 }
 

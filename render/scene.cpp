@@ -391,6 +391,7 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
       normalized(ray.origin + ray.direction * hit.distance - center);
   s.position = center + s.geometric_normal * sphere.w;
   s.uv = V2f(0);
+  s.small = true;
   const V3f size = absolute(center) + V3f(sphere.w);
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
 }

@@ -47,6 +47,7 @@ struct Surface {
   V2f uv;
   const ShadingMaterial* material = nullptr;
   bool contact = false;  // of the fluid with a sheet: no air meets water here
+  bool small = false;    // a sphere of foam: too small for a density of photons
 
   /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error.
   V3f leave(const V3f& direction) const;

@@ -113,6 +113,28 @@ TEST(Photons, GiveThePictureThatPathsGive) {
               4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
 }
 
+// Foam is too small for a density of photons: paths bring its light, and the picture is theirs.
+TEST(Photons, LeaveFoamToPaths) {
+  Shot shot = pool_shot(kIndex, 0.3f);
+  shot.render.samples = 1024;
+  shot.camera.position = V3d(0, 2, 0.1);
+  shot.camera.target = V3d(0, 0.2, 0);
+  shot.camera.fov_deg = 4.0;
+  shot.light = {panel({0.8, 2, 0.3}, 0.3, 0.3, 40)};
+  FrameGeometry pool{box_mesh({-2, -0.1f, -2}, {2, 0.4f, 2}), {}};
+  for (int k = 0; k < 900; ++k) {
+    pool.foam.position.push_back({0.01f * float(k % 30 - 15), 0.2f, 0.01f * float(k / 30 - 15)});
+    pool.foam.velocity.push_back(V3f(0));
+    pool.foam.radius.push_back(0.004f);
+  }
+  const Mean paths = mean_over_seeds(shot, pool, {}, 16);
+  shot.render.photons = 6;
+  const Mean photons = mean_over_seeds(shot, pool, {}, 16);
+  EXPECT_LT(paths.error, 0.01 * paths.value);
+  EXPECT_NEAR(photons.value, paths.value,
+              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+}
+
 // Blur and noise vanish together: on lines across the waves' caustics noise falls with the number
 // of photons to the power -1/4, 1.78 a decade, blur to twice that. The reference has its own tenth.
 TEST(Photons, ConvergeAsTheirNumberGrows) {
