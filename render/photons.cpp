@@ -200,17 +200,18 @@ double typical_count(const std::vector<Photon>& photons, float edge) {
 }
 
 /// The radius within which the median photon has 20 of 1e5 photons, and more of more.
-float choose_radius(const std::vector<Photon>& photons) {
+float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& bounds) {
   const double wanted = 20 * std::sqrt(double(photons.size()) / 1e5);
-  Imath::Box3f bounds;
-  for (const Photon& p : photons) bounds.extendBy(p.position);
   const float diagonal = std::max((bounds.max - bounds.min).length(), 1e-6f);
-  float radius = diagonal / 50;
+  // Cells stay countable, however far from the origin the photons lie.
+  const float far = std::max(largest(absolute(bounds.min)), largest(absolute(bounds.max)));
+  const float least = std::max(diagonal * 1e-5f, far * 1e-6f);
+  float radius = std::max(diagonal / 50, least);
   for (int round = 0; round < 4; ++round) {
     const float edge = 2 * radius;
     const double density = typical_count(photons, edge) / (double(edge) * edge);
     radius = float(std::sqrt(wanted / (double(kPi) * density)));
-    radius = std::clamp(radius, diagonal * 1e-5f, diagonal / 10);
+    radius = std::clamp(radius, least, std::max(least, diagonal / 10));
   }
   return radius;
 }
@@ -224,7 +225,9 @@ uint32_t PhotonMap::bucket_of(const Imath::V3i& cell) const {
 
 PhotonMap::PhotonMap(std::vector<Photon> photons) {
   if (photons.empty()) return;
-  radius_ = choose_radius(photons);
+  for (const Photon& p : photons) reach_.extendBy(p.position);
+  radius_ = choose_radius(photons, reach_);
+  reach_.min -= V3f(radius_), reach_.max += V3f(radius_);
   inverse_edge_ = 1 / (2 * radius_);
   while (size_t{mask_} + 1 < photons.size()) mask_ = 2 * mask_ + 1;
   first_.assign(size_t{mask_} + 2, 0);

@@ -40,7 +40,7 @@ class PhotonMap {
   /// irradiance, W/m^2. Weighed by Epanechnikov's kernel over a disc.
   template <class F>
   void for_each_near(const V3f& point, const V3f& normal, F f) const {
-    if (photon_.empty()) return;
+    if (!reach_.intersects(point)) return;
     const float r2 = radius_ * radius_, scale = 2 / (kPi * r2);
     const Imath::V3i low = cell_of(point - V3f(radius_)), high = cell_of(point + V3f(radius_));
     std::array<uint32_t, 8> seen;  // cells may share a bucket
@@ -97,6 +97,7 @@ class PhotonMap {
     }
   }
 
+  Imath::Box3f reach_;  // of the photons and a radius around them; empty without any
   float radius_ = 0, inverse_edge_ = 0;  // cells are two radii wide
   uint32_t mask_ = 0;
   std::vector<uint32_t> first_;              // of each bucket, and the number of photons
