@@ -17,6 +17,7 @@ namespace {
 enum PhotonDimension : uint32_t { kStart, kStartPoint, kLamp, kLampPoint, kTime, kInterfaces };
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
+constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// The fluid's triangles by area; those on sheets let light pass and start none.
@@ -134,9 +135,19 @@ class PhotonTracer {
       normal = flat;
       split = split_at_interface(d, normal, eta);
     }
-    const bool reflect = split.reflectance >= 1 || sampler.one(dimension) < split.reflectance;
-    const V3f out = reflect ? split.reflected : split.refracted;
-    flight.power *= std::abs(dot(out, flat) * dot(d, normal) / (dot(d, flat) * dot(out, normal)));
+    const auto reflects = [&] {
+      return split.reflectance >= 1 || sampler.one(dimension) < split.reflectance;
+    };
+    bool reflect = reflects();
+    V3f out = reflect ? split.reflected : split.refracted;
+    float gain = std::abs(dot(out, flat) * dot(d, normal) / (dot(d, flat) * dot(out, normal)));
+    if (!(gain < kMostGain)) {  // along the real surface: one photon would be a white dot
+      split = split_at_interface(d, flat, eta);
+      reflect = reflects();
+      out = reflect ? split.reflected : split.refracted;
+      gain = 1;
+    }
+    flight.power *= gain;
     if (flight.interfaces > kLongFlight) {
       if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
       flight.power *= 1 / kLongSurvival;
