@@ -57,6 +57,16 @@ TriangleMesh waves() {
   return mesh;
 }
 
+/// Half a percent is for the blur at the rims.
+void expect_the_mean_of_paths(Shot shot, const FrameGeometry& geometry) {
+  const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
+  shot.render.photons = 6;
+  const Mean photons = mean_over_seeds(shot, geometry, {}, 16);
+  EXPECT_LT(paths.error, 0.01 * paths.value);
+  EXPECT_NEAR(photons.value, paths.value,
+              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+}
+
 // Under level water, E cos(a) (1 - F(a)) e^(-s d / cos(b)) / n^2. A million photons, of which some
 // 20,000 lie in the square: 4 of their standard errors.
 TEST(Photons, LieUnderLevelWaterAsSnellAndFresnelSay) {
@@ -105,12 +115,7 @@ TEST(Photons, GiveThePictureThatPathsGive) {
   shot.camera.target = V3d(0, 0, 0);
   shot.camera.fov_deg = 20.0;
   shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun({1, -2, 0}, 5), sky(0.2f)};
-  const Mean paths = mean_over_seeds(shot, {waves(), {}}, {}, 16);
-  shot.render.photons = 6;
-  const Mean photons = mean_over_seeds(shot, {waves(), {}}, {}, 16);
-  EXPECT_LT(paths.error, 0.01 * paths.value);
-  EXPECT_NEAR(photons.value, paths.value,
-              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+  expect_the_mean_of_paths(shot, {waves(), {}});
 }
 
 // Foam is too small for a density of photons: paths bring its light, and the picture is theirs.
@@ -127,12 +132,28 @@ TEST(Photons, LeaveFoamToPaths) {
     pool.foam.velocity.push_back(V3f(0));
     pool.foam.radius.push_back(0.004f);
   }
-  const Mean paths = mean_over_seeds(shot, pool, {}, 16);
-  shot.render.photons = 6;
-  const Mean photons = mean_over_seeds(shot, pool, {}, 16);
-  EXPECT_LT(paths.error, 0.01 * paths.value);
-  EXPECT_NEAR(photons.value, paths.value,
-              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+  expect_the_mean_of_paths(shot, pool);
+}
+
+// Smooth normals on coarse triangles: no photon far brighter than the others, which would be a
+// disc.
+TEST(Photons, AreNoneFarBrighterThanOthers) {
+  Shot shot = pool_shot(kIndex, 0);
+  shot.light = {sun({0.6, -1, 0.2}, 0.5)};
+  TriangleMesh drop = sphere_mesh(3);
+  for (V3f& p : drop.position)
+    p = 0.3f * p * (1 + 0.4f * std::sin(7 * p.x) * std::sin(6 * p.y + 5 * p.z)) + V3f(0, 0.5f, 0);
+  drop.normal.clear();
+  const PhotonMap map = photons_of(shot, drop, 200000);
+  double most = 0, sum = 0, count = 0;
+  for (int k = 0; k < 10000; ++k)
+    map.for_each_near(V3f(0.02f * float(k % 100 - 50), 0, 0.02f * float(k / 100 - 50)),
+                      V3f(0, 1, 0), [&](const Photon& p, float) {
+                        most = std::max(most, double(p.power.x));
+                        sum += double(p.power.x), ++count;
+                      });
+  ASSERT_GT(count, 1000);
+  EXPECT_LT(most, 20 * sum / count);
 }
 
 // Blur and noise vanish together: on lines across the waves' caustics noise falls with the number
