@@ -7,6 +7,8 @@
 #include <array>
 #include <utility>
 
+#include "surfacing/slivers.h"
+
 namespace drench::surfacing {
 namespace {
 
@@ -57,16 +59,6 @@ bool cross_each_other(const Corners& a, const Corners& b) {
   return false;
 }
 
-bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets) {
-  const V3i block = block_of_vertex(mesh, t.x);
-  if (!sheets.near(block)) return false;
-  const Corners own{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
-  bool crosses = false;
-  sheets.for_each_near(
-      block, [&](uint32_t k) { crosses = crosses || cross_each_other(own, sheets.corners(k)); });
-  return crosses;
-}
-
 /// Those with a corner that is marked.
 std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& sheets,
                                          const std::vector<uint8_t>& marked) {
@@ -105,21 +97,11 @@ V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
   return p + (p - foot.place).normalized() * distance;
 }
 
-bool is_sliver(const std::vector<V3f>& position, const Triangle& t) {
-  constexpr float cos2 = 0.9330f;  // of 15 degrees
-  for (int k = 0; k < 3; ++k) {
-    const V3f u = position[t[(k + 1) % 3]] - position[t[k]],
-              w = position[t[(k + 2) % 3]] - position[t[k]];
-    const float dot = u.dot(w);
-    if (dot > 0 && dot * dot > cos2 * u.length2() * w.length2()) return true;
-  }
-  return false;
-}
-
 bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
+  constexpr float cos2_15 = 0.9330f;  // of 15 degrees
   bool found = false;
   rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
-    found = found || is_sliver(position, {v, a, b});
+    found = found || has_angle_below(cos2_15, position[v], position[a], position[b]);
   });
   return found;
 }
@@ -132,12 +114,12 @@ V3f mean_of_ring(const std::vector<V3f>& position, const VertexRings& rings, uin
 }
 
 /// Moves the corners of triangles that cross a sheet until none does, at most eight times.
-/// @param stirred  vertices that have moved since nothing crossed
-/// @param moved    the next place of a vertex
-/// @return         how many still cross
+/// @param moved  the next place of a vertex
+/// @return       how many still cross
 template <class F>
-size_t move_until_free(LatticeMesh& mesh, const Sheets& sheets, std::vector<uint8_t> stirred,
-                       F moved) {
+size_t move_until_free(LatticeMesh& mesh, const Sheets& sheets, F moved) {
+  std::vector<uint8_t> stirred(mesh.position.size(), 0);  // vertices that may be across
+  for_each_near_vertex(mesh, sheets, [&](V3i, uint32_t v) { stirred[v] = 1; });
   std::vector<uint32_t> crossing = crossing_triangles(mesh, sheets, stirred);
   for (int round = 0; round < 8 && !crossing.empty(); ++round) {
     stirred.assign(stirred.size(), 0);
@@ -151,6 +133,19 @@ size_t move_until_free(LatticeMesh& mesh, const Sheets& sheets, std::vector<uint
 }
 
 }  // namespace
+
+bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets) {
+  const Corners own{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
+  bool crosses = false;
+  V3i last(0);
+  for (int k = 0; k < 3 && !crosses; ++k) {
+    const V3i block = block_of_vertex(mesh, t[k]);
+    if (block == std::exchange(last, block) && k > 0) continue;
+    sheets.for_each_near(
+        block, [&](uint32_t s) { crosses = crosses || cross_each_other(own, sheets.corners(s)); });
+  }
+  return crosses;
+}
 
 SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets) {
   if (sheets.empty()) return {};
@@ -170,42 +165,31 @@ size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetCon
                      const Sheets& sheets, const std::vector<V3f>& normal, float offset) {
   if (sheets.empty()) return 0;
   const std::vector<V3f> smooth = mesh.position;
-  std::vector<uint8_t> steps(mesh.position.size(), 0);  // back
-  const auto lies = [&](uint32_t v) { return contact.side[v] != 0 && steps[v] == 0; };
   const auto lay = [&](V3i block, uint32_t v, const V3f& p) {
     return laid(sheets, block, p, contact.side[v], offset);
   };
   for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-    if (lies(v)) mesh.position[v] = lay(block, v, smooth[v]);
+    if (contact.side[v]) mesh.position[v] = lay(block, v, smooth[v]);
   });
-  const auto mend = [&] {  // returns what it moved
-    std::vector<uint8_t> mended(mesh.position.size(), 0);
-    for (int pass = 0; pass < 5; ++pass) {
-      const std::vector<V3f> before = mesh.position;
-      for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-        if (!has_sliver(before, rings, v)) return;
-        const V3f way = mean_of_ring(before, rings, v) - before[v];
-        mesh.position[v] = lies(v) ? lay(block, v, before[v] + way)
-                                   : before[v] + way - normal[v] * normal[v].dot(way);
-        mended[v] = 1;
-      });
-    }
-    return mended;
-  };
-  mend();
+  for (int pass = 0; pass < 3; ++pass) {
+    const std::vector<V3f> before = mesh.position;
+    for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+      if (!has_sliver(before, rings, v)) return;
+      const V3f way = mean_of_ring(before, rings, v) - before[v];
+      mesh.position[v] = contact.side[v] ? lay(block, v, before[v] + way)
+                                         : before[v] + way - normal[v] * normal[v].dot(way);
+    });
+  }
   const std::vector<V3f> lying = mesh.position;
-  const auto moved_back = [&](uint32_t v) {  // half the way, smooth, extracted, farther
+  std::vector<uint8_t> steps(mesh.position.size(), 0);  // back
+  const auto moved_back = [&](uint32_t v) {             // half the way, smooth, extracted, farther
     steps[v] = std::max<uint8_t>(steps[v] + 1, contact.side[v] ? 1 : 3);
     if (contact.side[v] && steps[v] == 1) return (lying[v] + smooth[v]) * 0.5f;
     if (contact.side[v] && steps[v] == 2) return smooth[v];
     return pushed(sheets, block_of_vertex(mesh, v), contact.extracted[v],
                   0.25f * float(steps[v] - 3));
   };
-  const size_t crossing =
-      move_until_free(mesh, sheets, std::vector<uint8_t>(steps.size(), 1), moved_back);
-  const std::vector<V3f> free = mesh.position;
-  const std::vector<uint8_t> mended = mend();
-  return crossing + move_until_free(mesh, sheets, mended, [&](uint32_t v) { return free[v]; });
+  return move_until_free(mesh, sheets, moved_back);
 }
 
 std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,

@@ -23,6 +23,8 @@ struct SheetContact {
 /// Vertices in the gap around the sheets that face one.
 SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets);
 
+bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets);
+
 /// Moves vertices in contact to `offset` voxels before the sheets, and the corners of slivers that
 /// this makes, there and at the rims, along the surface to the mean of their neighbours. What would
 /// cross a sheet between its vertices goes back on its way, to where it was extracted and farther:

@@ -16,6 +16,7 @@
 #include "surfacing/extract.h"
 #include "surfacing/field.h"
 #include "surfacing/overlap.h"
+#include "surfacing/slivers.h"
 #include "surfacing/smooth.h"
 #include "surfacing/velocity.h"
 
@@ -168,7 +169,7 @@ Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedPar
   constexpr float offset = 0.02f;  // spacings before a sheet
   Finished result{std::move(extracted), {}, {}};
   LatticeMesh& mesh = result.mesh;
-  const VertexRings rings = rings_of(mesh);
+  VertexRings rings = rings_of(mesh);
   const Components parts = components_of(mesh);
   const float spacing = lattice.voxels_per_spacing;
   result.contact = find_contact(mesh, rings, things.sheets);
@@ -185,12 +186,13 @@ Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedPar
       if (moved.empty() || !moved[v]) result.normal[v] = free[v];
   }
   smooth_normals(result.normal, rings, passes > 0 ? 1 : 0);
-  report.components = parts.size();
-  report.vertices = mesh.position.size();
-  report.triangles = mesh.triangle.size();
   if (measure_volume)
     for (const double volume : volumes_of(mesh, rings, parts))
       report.volume += volume * std::pow(lattice.voxel, 3);
+  remove_slivers(mesh, std::move(rings), result.contact, things.sheets, result.normal);
+  report.components = parts.size();
+  report.vertices = mesh.position.size();
+  report.triangles = mesh.triangle.size();
   return result;
 }
 

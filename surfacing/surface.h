@@ -21,7 +21,7 @@ struct SurfaceStats {
   int closure_rounds = 0;
   size_t components = 0, vertices = 0, triangles = 0;
   size_t contact = 0, crossing = 0;             // triangles on sheets, and through one all the same
-  double volume = 0;                            // m^3, enclosed
+  double volume = 0;                            // m^3, enclosed, before slivers are removed
   double bin_s = 0, weight_s = 0, field_s = 0;  // wall seconds of the steps
   double extract_s = 0, smooth_s = 0, velocity_s = 0;
 };

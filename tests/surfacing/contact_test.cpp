@@ -64,19 +64,16 @@ TriangleMesh turned(TriangleMesh mesh, double angle) {
 
 struct Scene {
   const char* name;
-  double slivers;  // share of triangles with an angle below 10 degrees
   Place place;
 };
 const std::vector<Scene>& scenes() {
   static const std::vector<Scene> all{
-      {"flat, through all of it", 0.001,
-       [](float u, float v) { return V3f(12 * u, 0.3f, 12 * v); }},
-      {"ends within", 0.001, [](float u, float v) { return V3f(4 * u, 0.3f, 5 * v); }},
-      {"strip", 0.001, [](float u, float v) { return V3f(1.5f * u, 0, 7 * v); }},
-      {"waves", 0.001,
-       [](float u, float v) { return V3f(12 * u, 2 * std::sin(6 * u + v), 12 * v); }},
-      {"sharp fold", 0.001, [](float u, float v) { return V3f(6 * u, 9 * std::abs(u), 12 * v); }},
-      {"crumpled", 0.002, [](float u, float v) {
+      {"flat, through all of it", [](float u, float v) { return V3f(12 * u, 0.3f, 12 * v); }},
+      {"ends within", [](float u, float v) { return V3f(4 * u, 0.3f, 5 * v); }},
+      {"strip", [](float u, float v) { return V3f(1.5f * u, 0, 7 * v); }},
+      {"waves", [](float u, float v) { return V3f(12 * u, 2 * std::sin(6 * u + v), 12 * v); }},
+      {"sharp fold", [](float u, float v) { return V3f(6 * u, 9 * std::abs(u), 12 * v); }},
+      {"crumpled", [](float u, float v) {
          return V3f(7 * u, 1.5f * std::sin(11 * u + 3 * v) + 1.2f * std::cos(9 * v - 4 * u), 7 * v);
        }}};
   return all;
@@ -99,7 +96,7 @@ TEST_P(Contact, NothingCrossesASheet) {
     EXPECT_EQ(crossings_of(mesh, sheet[0]), 0u);
     EXPECT_EQ(stats.crossing, 0u);
     EXPECT_GT(stats.contact, 100u);
-    EXPECT_LT(sliver_share(mesh, 10), scene.slivers);
+    EXPECT_LT(sliver_share(mesh, 10), 5e-4);
     // without sheets the same water goes through this one
     EXPECT_GT(crossings_of(surface_frame(around(sheet[0], seed), {}), sheet[0]), 0u);
   }

@@ -1,13 +1,18 @@
-// Smoothing part by part: drops, cavities and specks.
+// Smoothing part by part: drops, cavities and specks; slivers.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <random>
 #include <utility>
 
+#include "surfacing/sheets.h"
+#include "surfacing/slivers.h"
 #include "surfacing/smooth.h"
+#include "tests/surfacing/mesh_checks.h"
 
 namespace drench::surfacing {
 namespace {
@@ -88,6 +93,92 @@ TEST(Smoothing, TreatsACavityAsItsDrop) {
     }
     EXPECT_GT(moved, 0.1f);
   }
+}
+
+/// Of one block, which a sheet comes near without touching the mesh.
+Sheets sheet_beside(LatticeMesh& mesh) {
+  Lattice lattice;
+  lattice.voxel = 1;
+  const V3f middle = mesh.position[0];
+  const V3i block(int(middle.x) / block_edge, int(middle.y) / block_edge,
+                  int(middle.z) / block_edge);
+  mesh.block = {{block, 0, uint32_t(mesh.position.size())}};
+  TriangleMesh sheet;
+  for (const V3f& corner : {V3f(0, 0, 0), V3f(0, 1, 0), V3f(0, 0, 1)})
+    sheet.position.push_back(V3f(block * block_edge) + corner - V3f(0.5f, 0, 0));
+  sheet.velocity.assign(3, V3f(0));
+  sheet.triangle.emplace_back(0, 1, 2);
+  return {std::vector{sheet}, bin_particles({middle}, lattice)};
+}
+
+TriangleMesh as_triangle_mesh(const LatticeMesh& mesh) {
+  TriangleMesh result;
+  result.position = mesh.position;
+  result.triangle = mesh.triangle;
+  return result;
+}
+
+/// The least cosine between a triangle's normal and the way to it from the middle.
+float least_facing(const LatticeMesh& mesh, const V3f& middle) {
+  float least = 1;
+  for (const Triangle& t : mesh.triangle) {
+    const V3f &a = mesh.position[t.x], &b = mesh.position[t.y], &c = mesh.position[t.z];
+    least = std::min(least, (b - a).cross(c - a).normalized().dot((a - middle).normalized()));
+  }
+  return least;
+}
+
+// A ball with some vertices drawn close to a neighbour, where no triangle turns over: needles all
+// around. The mesh stays a closed ball that faces outward, of vertices that were there, in their
+// order.
+TEST(Slivers, GoWithoutHolesOrFolds) {
+  const V3f middle(1000.3f, 700.6f, 1200.9f);
+  for (uint32_t seed = 1; seed <= 3; ++seed) {
+    LatticeMesh mesh = ball(3, 0, 4, false);
+    VertexRings rings = rings_of(mesh);
+    std::mt19937 random(seed);
+    for (uint32_t v = 0; v < mesh.position.size(); v += 4) {
+      const uint32_t size = rings.first[v + 1] - rings.first[v];
+      const V3f to = mesh.position[rings.neighbour[rings.first[v] + random() % size]],
+                from = std::exchange(mesh.position[v], to + 0.08f * (mesh.position[v] - to));
+      if (least_facing(mesh, middle) < 0.5f) mesh.position[v] = from;
+    }
+    const LatticeMesh before = mesh;
+    const Sheets sheets = sheet_beside(mesh);
+    SheetContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
+    std::vector<V3f> normal = normals_of(mesh, rings);
+    const double slivers = surfacing_checks::sliver_share(as_triangle_mesh(mesh), 10);
+    EXPECT_GT(slivers, 0.1);
+    const size_t removed = remove_slivers(mesh, rings, contact, sheets, normal);
+    EXPECT_EQ(surfacing_checks::defects_of(as_triangle_mesh(mesh)), surfacing_checks::Defects{});
+    EXPECT_LT(surfacing_checks::sliver_share(as_triangle_mesh(mesh), 10), 0.2 * slivers);
+    EXPECT_GT(least_facing(mesh, middle), 0);
+    EXPECT_EQ(mesh.position.size() + removed, before.position.size());
+    EXPECT_EQ(mesh.block[0].end, mesh.position.size());
+    EXPECT_EQ(contact.side.size(), mesh.position.size());
+    EXPECT_EQ(contact.extracted, mesh.position);
+    EXPECT_EQ(normal.size(), mesh.position.size());
+    EXPECT_TRUE(std::includes(
+        before.position.begin(), before.position.end(), mesh.position.begin(), mesh.position.end(),
+        [at = before.position](const V3f& a, const V3f& b) {
+          return std::find(at.begin(), at.end(), a) < std::find(at.begin(), at.end(), b);
+        }));
+  }
+}
+
+// Of four corners none can go.
+TEST(Slivers, LeaveTheSmallestPartWhole) {
+  LatticeMesh mesh;
+  mesh.position = {V3f(100, 100, 100), V3f(101, 100, 100), V3f(101, 100.1f, 100),
+                   V3f(101, 100, 100.1f)};
+  mesh.triangle = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  const Sheets sheets = sheet_beside(mesh);
+  VertexRings rings = rings_of(mesh);
+  SheetContact contact;
+  std::vector<V3f> normal = normals_of(mesh, rings);
+  EXPECT_GT(surfacing_checks::sliver_share(as_triangle_mesh(mesh), 10), 0.5);
+  EXPECT_EQ(remove_slivers(mesh, rings, contact, sheets, normal), 0u);
+  EXPECT_EQ(mesh.triangle.size(), 4u);
 }
 
 }  // namespace

@@ -1,0 +1,20 @@
+#pragma once
+// Slivers, triangles with a small angle, are taken out of the mesh beside sheets, where vertices
+// were moved together.
+
+#include "surfacing/contact.h"
+
+namespace drench::surfacing {
+
+/// Has the triangle an angle whose cosine squared is above cos2, or two corners in one place?
+bool has_angle_below(float cos2, const V3f& a, const V3f& b, const V3f& c);
+
+/// Merges vertices of triangles near a sheet that have an angle below 10 degrees into a neighbour,
+/// where that leaves fewer of them, the mesh a closed manifold, no triangle turned over and none
+/// through a sheet. Vertices that stay keep their place.
+/// @param normal of the vertices; loses those that go
+/// @return how many went.
+size_t remove_slivers(LatticeMesh& mesh, VertexRings rings, SheetContact& contact,
+                      const Sheets& sheets, std::vector<V3f>& normal);
+
+}  // namespace drench::surfacing
