@@ -314,12 +314,7 @@ std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings) {
 }
 
 void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int passes) {
-  for (int pass = 0; pass < passes; ++pass) {
-    const std::vector<V3f> before = padded(normal);
-    for_each_vertex(normal.size(), [&](uint32_t v) {
-      normal[v] = 0.5f * (before[v] + mean_of_neighbours(before, rings, v));
-    });
-  }
+  if (passes > 0 && !normal.empty()) filter(normal, rings, passes_in_few(passes));
   for_each_vertex(normal.size(), [&](uint32_t v) { normal[v] = unit_or_up(normal[v]); });
 }
 

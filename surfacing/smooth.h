@@ -51,7 +51,7 @@ std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
 /// small one (a drop) by scaling, others by an even shift along the normals.
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
 
-/// Averages unit normals over the ring, `passes` times.
+/// Averages unit normals over the ring, `passes` times (factor 1/2).
 void smooth_normals(std::vector<V3f>& normal, const VertexRings& rings, int passes);
 
 }  // namespace drench::surfacing

@@ -185,7 +185,7 @@ Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedPar
     for (size_t v = 0; v < free.size(); ++v)  // what is in a solid keeps what it had outside
       if (moved.empty() || !moved[v]) result.normal[v] = free[v];
   }
-  smooth_normals(result.normal, rings, passes > 0 ? 1 : 0);
+  smooth_normals(result.normal, rings, passes > 0 ? 4 : 0);
   if (measure_volume)
     for (const double volume : volumes_of(mesh, rings, parts))
       report.volume += volume * std::pow(lattice.voxel, 3);
