@@ -201,7 +201,7 @@ std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
       if (!contact.touches({static_cast<uint32_t>(v), a, b}))
         free += (mesh.position[a] - mesh.position[v]).cross(mesh.position[b] - mesh.position[v]);
     });
-    normal[v] = free.normalized();
+    normal[v] = unit_or(free, V3f(0));
   });
   return normal;
 }

@@ -86,6 +86,27 @@ void filter(std::vector<T>& value, const VertexRings& rings,
   });
 }
 
+/// Filters value by `few` and, from the same T_k(A) value, into `smooth` by the longer `many`.
+void filter_both(std::vector<V3f>& value, std::vector<V3f>& smooth, const VertexRings& rings,
+                 const std::vector<float>& few, const std::vector<float>& many) {
+  std::vector<V3f> before(value.size() + 1, V3f(0)), now = padded(value);
+  smooth.resize(value.size());
+  for_each_vertex(value.size(), [&](uint32_t v) {
+    smooth[v] = value[v] * many[0];
+    value[v] *= few[0];
+  });
+  for (size_t k = 1; k < many.size(); ++k) {
+    const float turn = k == 1 ? 1.f : 2.f;  // T_1 = A, T_k+1 = 2 A T_k - T_k-1
+    const float share = k < few.size() ? few[k] : 0.f;
+    for_each_vertex(value.size(), [&](uint32_t v) {
+      before[v] = mean_of_neighbours(now, rings, v) * turn - before[v];
+      smooth[v] += before[v] * many[k];
+      if (share != 0) value[v] += before[v] * share;
+    });
+    before.swap(now);
+  }
+}
+
 uint32_t root_of(std::vector<std::atomic<uint32_t>>& parent, uint32_t v) {
   while (true) {
     const uint32_t up = parent[v].load(std::memory_order_relaxed);
@@ -132,10 +153,7 @@ V3f normal_times_area(const LatticeMesh& mesh, const VertexRings& rings, uint32_
   return sum;
 }
 
-V3f unit_or_up(V3f v) {
-  const float length = v.length();
-  return length > 0 ? v / length : V3f(0, 1, 0);
-}
+V3f unit_or_up(const V3f& v) { return unit_or(v, V3f(0, 1, 0)); }
 
 /// Signed volume of a part, about one of its own vertices so that far parts keep their digits.
 double volume_of(const LatticeMesh& mesh, const VertexRings& rings, const Components& parts,
@@ -209,9 +227,10 @@ std::vector<V3f> remove_bumps(LatticeMesh& mesh, const VertexRings& rings, int p
   constexpr int first = 5;  // passes: enough for good triangles, too few for threads to thin out
   constexpr float farthest = 0.35f;  // voxels; beyond it lie necks that would fold over
   const std::vector<V3f> raw = mesh.position;
-  filter(mesh.position, rings, passes_in_few(std::min(passes, first)));
-  std::vector<V3f> normal = normals_of(mesh, rings), smooth = mesh.position;
-  if (passes > first) filter(smooth, rings, passes_in_few(passes - first));
+  std::vector<V3f> smooth;
+  filter_both(mesh.position, smooth, rings, passes_in_few(std::min(passes, first)),
+              passes_in_few(passes));
+  std::vector<V3f> normal = normals_of(mesh, rings);
   std::vector<float> lost(raw.size());
   for_each_vertex(raw.size(), [&](uint32_t v) { lost[v] = (raw[v] - smooth[v]).dot(normal[v]); });
   filter(lost, rings, passes_in_few(passes));

@@ -2,6 +2,7 @@
 // Bumps of the size of a particle are smoothed away on the mesh; shape and volume stay.
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "surfacing/extract.h"
@@ -37,6 +38,12 @@ Components components_of(const LatticeMesh& mesh);
 /// Volume of each part, voxel^3.
 std::vector<double> volumes_of(const LatticeMesh& mesh, const VertexRings& rings,
                                const Components& parts);
+
+/// v / |v|, or `none` if v is 0. V3f::normalized is no inline function.
+inline V3f unit_or(const V3f& v, const V3f& none) {
+  const float square = v.dot(v);
+  return square > 0 ? v * (1 / std::sqrt(square)) : none;
+}
 
 /// Unit normals, the area-weighted mean of the triangles around each vertex.
 std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
