@@ -67,6 +67,7 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
   else
     out.transmittance = V3f(0);
   out.ior = float(found->ior);
+  out.priority = found->priority;
   out.absorption = found->absorption;
   if (!found->texture.empty())
     out.texture = std::make_shared<const Texture>(read_texture(found->texture));

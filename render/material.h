@@ -12,6 +12,7 @@ struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
   V3f reflectance, transmittance;
   float ior = 1;
+  int priority = 0;
   V3f absorption;  // 1/m
   std::shared_ptr<const Texture> texture;
   bool checker = false;

@@ -42,9 +42,9 @@ struct PathState {
   // What surfaces and water left of the light, whatever the densities of the directions: roulette
   // plays for it. A ray aimed at a lamp has a small throughput because it will find much light.
   V3f survival{1, 1, 1};
-  V3f vertex;           // where the ray comes from, before its offset
-  float bsdf_pdf = 0;   // density of its direction; 0: lights ahead have not been sampled from here
-  bool inside = false;  // in the fluid
+  V3f vertex;          // where the ray comes from, before its offset
+  float bsdf_pdf = 0;  // density of its direction; 0: lights ahead have not been sampled from here
+  Bodies in = 0;
   bool specular_only = true;
   int vertices = 0, diffuse = 0;
   int interfaces = 0;        // since the last diffuse surface
@@ -70,7 +70,7 @@ class PathTracer {
     state.ray =
         scene_.camera().template ray<kMoving, (features & kThinLens) != 0>(film, lens, time);
     state.vertex = state.ray.origin;
-    state.inside = kWater && settings_.camera_in_fluid;
+    if (kWater) state.in = settings_.camera_in;
     walk(state);
     while (kWater && has_pending_) {
       has_pending_ = false;
@@ -89,7 +89,7 @@ class PathTracer {
       ++rays_;
       if (hit.kind == Hit::Kind::nothing || hit.kind == Hit::Kind::light) {
         if constexpr (kWater)
-          if (state.inside && hit.kind == Hit::Kind::light) absorb(state, hit.distance);
+          if (hit.kind == Hit::Kind::light) absorb(state, hit.distance);
         add_emission(state, hit);
         return;
       }
@@ -104,27 +104,32 @@ class PathTracer {
 
   bool scatter(PathState& state, const Surface& surface, float distance) {
     if constexpr (kWater) {
-      const bool interface = surface.material->type == MaterialType::dielectric;
-      // The side that was hit says for certain whether the way led through water.
-      if (interface) state.inside = dot(state.ray.direction, surface.geometric_normal) > 0;
-      if (state.inside) absorb(state, distance);
-      if (interface) return scatter_interface(state, surface);
+      // The side that was hit says for certain whether the way led through the body.
+      const bool outwards = dot(state.ray.direction, surface.geometric_normal) > 0;
+      state.in = outwards ? state.in | surface.body : state.in & ~surface.body;
+      absorb(state, distance);
+      if (surface.body) return scatter_interface(state, surface);
     }
     return scatter_cloth(state, surface);
   }
 
-  /// Straight on between water and the sheet it lies on; what little is between counts as water.
-  /// Light samples do not come through, so that whatever light is found beyond counts whole.
+  /// Between water and the sheet it lies on; what little is between counts as water.
   void pass_contact(PathState& state, const Surface& surface, float distance) {
+    state.in |= surface.body;
     if (dot(state.ray.direction, surface.geometric_normal) > 0) absorb(state, distance);
-    state.inside = true;
+    pass(state, surface);
+  }
+
+  /// Straight on through a surface that is no vertex of the path. Light samples do not come through
+  /// there, so that whatever light is found beyond counts whole.
+  void pass(PathState& state, const Surface& surface) {
     state.bsdf_pdf = 0;
     state.ray.origin = surface.leave(state.ray.direction);
-    --state.vertices;  // no vertex of the path
+    --state.vertices;
   }
 
   void absorb(PathState& state, float distance) {
-    const V3f a = scene_.fluid_absorption();
+    const V3f& a = scene_.medium(state.in).absorption;
     if (is_black(a)) return;
     const V3f kept(std::exp(-a.x * distance), std::exp(-a.y * distance), std::exp(-a.z * distance));
     state.throughput *= kept;
@@ -180,8 +185,14 @@ class PathTracer {
 
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
-    const float eta = state.inside ? 1 / surface.material->ior : surface.material->ior;
-    const V3f flat = state.inside ? -surface.geometric_normal : surface.geometric_normal;
+    const Medium &before = scene_.medium(state.in), &after = scene_.medium(state.in ^ surface.body);
+    if (&before == &after) {  // inside a body of higher priority
+      state.in ^= surface.body;
+      pass(state, surface);
+      return true;
+    }
+    const float eta = after.ior / before.ior;
+    const V3f flat = state.in & surface.body ? -surface.geometric_normal : surface.geometric_normal;
     InterfaceSplit split = split_at_interface(
         d, interface_normal(d, surface.geometric_normal, surface.shading_normal), eta);
     if (split.reflectance < 1 && !(dot(split.refracted, flat) < 0))
@@ -203,7 +214,7 @@ class PathTracer {
       reflect = number(state, kScatterSide) < split.reflectance;
     }
     depart(state, surface, reflect ? split.reflected : split.refracted);
-    if (!reflect) state.inside = !state.inside;
+    if (!reflect) state.in ^= surface.body;
     return true;
   }
 
@@ -216,8 +227,8 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = kWater && settings_.photons && !surface.small;
     if (state.has_photons) add_caustics(state, surface, bsdf);
-    // Light from outside reaches a point in water only by refraction, which surface samples find.
-    const bool sample_lights = kLights && !(kWater && state.inside && !scene_.lights_in_fluid());
+    // Light from outside reaches a point in a body only by refraction, which surface samples find.
+    const bool sample_lights = kLights && !(kWater && state.in && !scene_.lights_in_bodies());
     if (sample_lights && settings_.estimator != Estimator::bsdf_only)
       add_direct(state, surface, bsdf);
     const ClothScatter next = sample_scatter(state, surface, bsdf);
@@ -228,7 +239,7 @@ class PathTracer {
       if (dot(next.direction, surface.geometric_normal) *
               dot(state.ray.direction, surface.geometric_normal) >
           0)
-        state.inside = false;
+        state.in &= ~scene_.fluid();
     depart(state, surface, next.direction);
     state.throughput *= next.weight;
     state.survival *= bsdf.albedo();
@@ -242,9 +253,10 @@ class PathTracer {
     float u = number(state, kScatterSide);
     const V2f uv = point(state, kScatterDirection);
     if constexpr (!kWater) return bsdf.sample(u, uv);
-    if (!state.inside || state.has_photons || settings_.water_guide == WaterGuide::off)
+    if (state.in != scene_.fluid() || state.in == 0 || state.has_photons ||
+        settings_.water_guide == WaterGuide::off)
       return bsdf.sample(u, uv);
-    const RefractedLightGuide guide(scene_.lights(), scene_.fluid_ior());
+    const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior);
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(u, uv);
     ClothScatter out;
@@ -289,8 +301,8 @@ class PathTracer {
         settings_.estimator == Estimator::light_only ? 1.f : power_heuristic(light.pdf, bsdf_pdf);
     V3f found = state.throughput * value * light.radiance * (weight / light.pdf);
     if constexpr (kWater)
-      if (state.inside && light.distance < kInfinity) {
-        const V3f a = scene_.fluid_absorption();
+      if (state.in && light.distance < kInfinity) {
+        const V3f& a = scene_.medium(state.in).absorption;
         for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
       }
     if (finite(found)) radiance_ += found;

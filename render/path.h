@@ -29,7 +29,7 @@ struct PathSettings {
   Estimator estimator = Estimator::mis;
   FirstInterface first_interface = FirstInterface::one;
   WaterGuide water_guide = WaterGuide::on;
-  bool camera_in_fluid = false;
+  Bodies camera_in = 0;
   const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
 };
 

@@ -20,14 +20,18 @@ constexpr float kLongSurvival = 0.8f;
 constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
-/// The fluid's triangles by area; those on sheets let light pass and start none.
+/// The bodies' triangles by area; those on sheets let light pass and start none.
 class InterfacePoints {
  public:
-  explicit InterfacePoints(const SceneObject& fluid) : fluid_(fluid) {
+  explicit InterfacePoints(const Scene& scene) : scene_(scene) {
     double sum = 0;
-    for (size_t t = 0; t < fluid.triangle.size(); ++t) {
-      if (fluid.contact.empty() || !fluid.contact[t]) sum += double(corners(t, 0).area());
-      upto_.push_back(sum);
+    for (const uint32_t index : scene.bodies()) {
+      const SceneObject& body = scene.object(index);
+      first_.push_back(upto_.size());
+      for (size_t t = 0; t < body.triangle.size(); ++t) {
+        if (body.contact.empty() || !body.contact[t]) sum += double(corners(body, t, 0).area());
+        upto_.push_back(sum);
+      }
     }
   }
 
@@ -38,14 +42,18 @@ class InterfacePoints {
     Hit hit;
     float area_ratio;  // of the triangle at this time over shutter open
   };
-  Start sample(float u, const V2f& uv, uint32_t object, float time) const {
+  Start sample(float u, const V2f& uv, float time) const {
     const size_t t =
         size_t(std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back()) - upto_.begin());
-    const size_t triangle = std::min(t, upto_.size() - 1);
+    const size_t drawn = std::min(t, upto_.size() - 1);
+    const auto after = std::upper_bound(first_.begin(), first_.end(), drawn);
+    const size_t bit = size_t(after - first_.begin()) - 1, triangle = drawn - first_[bit];
+    const uint32_t index = scene_.bodies()[bit];
+    const SceneObject& body = scene_.object(index);
     const float root = std::sqrt(uv.x);  // uniform on the triangle
-    const float at_open = corners(triangle, 0).area();
-    return {{Hit::Kind::object, 0, object, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
-            at_open > 0 ? corners(triangle, time).area() / at_open : 0.f};
+    const float at_open = corners(body, triangle, 0).area();
+    return {{Hit::Kind::object, 0, index, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
+            at_open > 0 ? corners(body, triangle, time).area() / at_open : 0.f};
   }
 
  private:
@@ -56,23 +64,24 @@ class InterfacePoints {
       return 0.5f * std::sqrt(dot(n, n));
     }
   };
-  Corners corners(size_t triangle, float time) const {
-    const auto& t = fluid_.triangle[triangle];
+  static Corners corners(const SceneObject& body, size_t triangle, float time) {
+    const auto& t = body.triangle[triangle];
     const auto at = [&](uint32_t v) {
-      const V3f p = fluid_.position[v];
-      return fluid_.moves() ? p + (fluid_.position_close[v] - p) * time : p;
+      const V3f p = body.position[v];
+      return body.moves() ? p + (body.position_close[v] - p) * time : p;
     };
     return {at(t.x), at(t.y), at(t.z)};
   }
 
-  const SceneObject& fluid_;
-  std::vector<double> upto_;
+  const Scene& scene_;
+  std::vector<size_t> first_;  // of each body
+  std::vector<double> upto_;   // area to the end of each triangle, body after body
 };
 
 struct Flight {
   Ray ray;
   V3f power;
-  bool inside = false;
+  Bodies in = 0;
   int interfaces = 0;
 };
 
@@ -89,9 +98,9 @@ class PhotonTracer {
     while (cross_interface(sampler, flight, surface)) {
       const Hit hit = next(flight, surface, rays);
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
-      if (surface.material->type == MaterialType::dielectric) continue;
+      if (surface.body) continue;
       if (surface.small) return false;  // paths bring it what it gets
-      const float n = flight.inside ? scene_.fluid_ior() : 1.f;
+      const float n = scene_.medium(flight.in).ior;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
                 flight.power * (1 / (n * n))};
       return finite(photon.power);
@@ -100,11 +109,11 @@ class PhotonTracer {
   }
 
  private:
-  /// From a lamp to a point of the fluid that it reaches.
+  /// From a lamp to a point of a body that it reaches.
   bool start(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
     flight.ray.time = sampler.one(kTime);
-    const auto [hit, area_ratio] = starts_.sample(sampler.one(kStart), sampler.two(kStartPoint),
-                                                  uint32_t(scene_.fluid()), flight.ray.time);
+    const auto [hit, area_ratio] =
+        starts_.sample(sampler.one(kStart), sampler.two(kStartPoint), flight.ray.time);
     surface = scene_.surface<true>(flight.ray, hit);
     const LightSample light =
         scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
@@ -120,15 +129,23 @@ class PhotonTracer {
     return true;
   }
 
-  /// Reflects or refracts at the fluid's surface. Snell's law keeps n^2 cos dw about the normal
+  /// Reflects or refracts at a body's surface. Snell's law keeps n^2 cos dw about the normal
   /// that bends the light; flux through the real surface has the cosine with that one's, so where
   /// the two differ it takes the ratio, and photons carry what paths find the other way.
   bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
     if (++flight.interfaces > kMostInterfaces) return false;
     const uint32_t dimension = kInterfaces + 2 * uint32_t(flight.interfaces);
     const V3f d = flight.ray.direction;
-    const float eta = flight.inside ? 1 / surface.material->ior : surface.material->ior;
-    const V3f flat = flight.inside ? -surface.geometric_normal : surface.geometric_normal;
+    const Medium &before = scene_.medium(flight.in),
+                 &after = scene_.medium(flight.in ^ surface.body);
+    if (&before == &after) {  // inside a body of higher priority
+      flight.in ^= surface.body;
+      flight.ray.origin = surface.leave(d);
+      return true;
+    }
+    const float eta = after.ior / before.ior;
+    const V3f flat =
+        flight.in & surface.body ? -surface.geometric_normal : surface.geometric_normal;
     V3f normal = interface_normal(d, surface.geometric_normal, surface.shading_normal);
     InterfaceSplit split = split_at_interface(d, normal, eta);
     if (split.reflectance < 1 && !(dot(split.refracted, flat) < 0)) {
@@ -152,7 +169,7 @@ class PhotonTracer {
       if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
       flight.power *= 1 / kLongSurvival;
     }
-    if (!reflect) flight.inside = !flight.inside;
+    if (!reflect) flight.in ^= surface.body;
     flight.ray.origin = surface.leave(out);
     flight.ray.direction = out;
     return finite(out) && finite(flight.power);
@@ -166,16 +183,17 @@ class PhotonTracer {
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
       surface = scene_.surface<true>(flight.ray, hit);
       const bool outwards = dot(flight.ray.direction, surface.geometric_normal) > 0;
-      if (surface.material->type == MaterialType::dielectric) flight.inside = outwards;
-      if (flight.inside) absorb(flight, hit.distance);
+      flight.in = outwards ? flight.in | surface.body : flight.in & ~surface.body;
+      absorb(flight, hit.distance);
       if (!surface.contact) return hit;
-      flight.inside = true;
+      flight.in |= surface.body;
       flight.ray.origin = surface.leave(flight.ray.direction);
     }
   }
 
   void absorb(Flight& flight, float distance) const {
-    const V3f a = scene_.fluid_absorption();
+    const V3f& a = scene_.medium(flight.in).absorption;
+    if (is_black(a)) return;
     for (int c = 0; c < 3; ++c) flight.power[c] *= std::exp(-a[c] * distance);
   }
 
@@ -254,12 +272,12 @@ PhotonMap::PhotonMap(std::vector<Photon> photons) {
 }
 
 bool can_trace_photons(const Scene& scene) {
-  return scene.fluid() >= 0 && scene.lights().has_lamps() && !scene.lights_in_fluid();
+  return !scene.bodies().empty() && scene.lights().has_lamps() && !scene.lights_in_bodies();
 }
 
 PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint64_t& rays) {
   constexpr uint32_t chunk = 4096;
-  const InterfacePoints starts(scene.object(scene.fluid()));
+  const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
   const PhotonTracer tracer(scene, starts, count);
   std::vector<std::vector<Photon>> found((count + chunk - 1) / chunk);

@@ -1,10 +1,10 @@
 #pragma once
-// Caustics of lamps: light that reaches a diffuse surface through or off the fluid. Paths from the
-// camera hit a small lamp behind water by luck alone, so they leave that light out, exactly, and
-// find it in a map of photons (Jensen 1996, "Global Illumination using Photon Maps").
+// Caustics of lamps: light that reaches a diffuse surface through or off a dielectric body. Paths
+// from the camera hit a small lamp behind water by luck alone, so they leave that light out,
+// exactly, and find it in a map of photons (Jensen 1996, "Global Illumination using Photon Maps").
 //
-// A photon starts at a point of the fluid's surface that a lamp reaches unhindered, so that none
-// misses the fluid, goes on through it and lies where it first meets a diffuse surface. Of N
+// A photon starts at a point of a body's surface that a lamp reaches unhindered, so that none
+// misses the body, goes on through it and lies where it first meets a diffuse surface. Of N
 // photons the map's radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that
 // both its blur, as N^(-1/2), and its noise, as N^(-1/4), vanish.
 
@@ -105,8 +105,8 @@ class PhotonMap {
   std::array<std::vector<float>, 3> place_;  // of each, and room for a pack to be read
 };
 
-/// Whether photons find the light that lamps send through the fluid: there are lamps, none of them
-/// in the fluid.
+/// Whether photons find the light that lamps send through dielectric bodies: there are lamps, none
+/// of them in a body.
 bool can_trace_photons(const Scene& scene);
 
 /// The same bits for any thread count.

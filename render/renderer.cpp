@@ -135,7 +135,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;
-  path.camera_in_fluid = scene.inside_fluid(scene.camera().open().position, 0);
+  path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
   const uint32_t samples = uint32_t(shot.render.samples);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
   uint64_t photon_rays = 0;

@@ -3,6 +3,7 @@
 #include <Imath/ImathBox.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "pipeline/contract/error.h"
@@ -151,7 +152,9 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                       "use a diffuse one",
                       shot.ground.material));
   }
-  if (!geometry.fluid.triangle.empty()) add_fluid(shot, geometry.fluid);
+  const bool has_fluid = !geometry.fluid.triangle.empty();
+  if (has_fluid)
+    add_object(geometry.fluid, "fluid surface", add_material(shot, shot.fluid.material));
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
@@ -168,6 +171,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     add_object(cloth.mesh, fmt::format("cloth '{}'", cloth.name), index);
   }
   for (SceneObject& object : objects_) build(object);
+  find_bodies(has_fluid);
   find_features();
 }
 
@@ -176,33 +180,40 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
   return uint32_t(materials_.size() - 1);
 }
 
-void Scene::add_fluid(const Shot& shot, const TriangleMesh& mesh) {
-  const uint32_t material = add_material(shot, shot.fluid.material);
-  add_object(mesh, "fluid surface", material);
-  if (materials_[material].type != MaterialType::dielectric) return;
-  fluid_ = int(objects_.size()) - 1;
-  fluid_absorption_ = materials_[material].absorption;
-  fluid_ior_ = materials_[material].ior;
-  const SceneObject& fluid = objects_.back();
-  for (const ShapeLight& light : lights_.shapes()) {
-    V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
-    if (light.type == LightType::sphere) reach = V3f(light.radius);
-    lights_in_fluid_ |=
-        bounds_of(fluid).intersects(Imath::Box3f(light.center - reach, light.center + reach));
-  }
-}
-
 void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) material = o.material;
-  const uint32_t index = add_material(shot, material);
-  if (materials_[index].type == MaterialType::dielectric)
+  add_object(obstacle.mesh, fmt::format("obstacle '{}'", obstacle.name),
+             add_material(shot, material));
+}
+
+/// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
+/// first, is the lowest.
+void Scene::find_bodies(bool has_fluid) {
+  for (uint32_t k = 0; k < objects_.size(); ++k)
+    if (materials_[objects_[k].material].type == MaterialType::dielectric) bodies_.push_back(k);
+  constexpr size_t most = std::numeric_limits<Bodies>::digits;
+  if (bodies_.size() > most)
     throw Error(
-        fmt::format("obstacle '{}': material '{}' is a dielectric, which only the fluid may have; "
-                    "use a diffuse one",
-                    obstacle.name, material));
-  add_object(obstacle.mesh, fmt::format("obstacle '{}'", obstacle.name), index);
+        fmt::format("there are {} obstacles and fluids of dielectric materials, at most {} "
+                    "can be rendered; make one mesh of some",
+                    bodies_.size(), most));
+  std::stable_sort(bodies_.begin(), bodies_.end(), [&](uint32_t a, uint32_t b) {
+    return materials_[objects_[a].material].priority < materials_[objects_[b].material].priority;
+  });
+  for (size_t bit = 0; bit < bodies_.size(); ++bit) {
+    SceneObject& object = objects_[bodies_[bit]];
+    object.body = Bodies{1} << bit;
+    medium_.push_back({materials_[object.material].absorption, materials_[object.material].ior});
+    if (has_fluid && bodies_[bit] == 0) fluid_ = object.body;
+    for (const ShapeLight& light : lights_.shapes()) {
+      V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
+      if (light.type == LightType::sphere) reach = V3f(light.radius);
+      lights_in_bodies_ |=
+          object.bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
+    }
+  }
 }
 
 bool Scene::moves_visibly(const TriangleMesh& mesh) const {
@@ -329,7 +340,7 @@ void Scene::build(SceneObject& object) {
 void Scene::find_features() {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
-  features_ = (moving ? kMotionBlur : 0u) | (fluid_ >= 0 ? kDielectric : 0u) |
+  features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
               (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u);
 }
 
@@ -412,6 +423,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   }
   const SceneObject& object = objects_[hit.index];
   s.material = &materials_[object.material];
+  s.body = object.body;
   if (!object.sphere.empty()) {
     meet_sphere<moving>(object, ray, hit, s);
     return s;
@@ -441,17 +453,19 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
 template Surface Scene::surface<false>(const Ray&, const Hit&) const;
 template Surface Scene::surface<true>(const Ray&, const Hit&) const;
 
-bool Scene::inside_fluid(const V3f& point, float time) const {
-  if (fluid_ < 0) return false;
-  // The mesh is closed and outward: a point is inside if the first side met is an inner one.
+Bodies Scene::bodies_at(const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};
-  RTCRayHit query{embree_ray(up, kInfinity), {}};
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  embree_intersect(objects_[fluid_].scene.get(), query, Coherence::incoherent);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-  Hit hit{Hit::Kind::object, query.ray.tfar, uint32_t(fluid_),
-          query.hit.primID,  query.hit.u,    query.hit.v};
-  return surface<true>(up, hit).geometric_normal.y > 0;
+  Bodies in = 0;
+  for (const uint32_t k : bodies_) {
+    // The mesh is closed and outward: a point is inside if the first side met is an inner one.
+    RTCRayHit query{embree_ray(up, kInfinity), {}};
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    embree_intersect(objects_[k].scene.get(), query, Coherence::incoherent);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    const Hit hit{Hit::Kind::object, query.ray.tfar, k, query.hit.primID, query.hit.u, query.hit.v};
+    if (surface<true>(up, hit).geometric_normal.y > 0) in |= objects_[k].body;
+  }
+  return in;
 }
 
 }  // namespace drench

@@ -5,6 +5,8 @@
 #include <Imath/ImathBox.h>
 #include <Imath/ImathVec.h>
 
+#include <bit>
+
 #include "pipeline/contract/frames.h"
 #include "render/camera.h"
 #include "render/embree.h"
@@ -13,6 +15,15 @@
 #include "render/options.h"
 
 namespace drench {
+
+/// The dielectric bodies that a point is in, one bit each; of several the highest fills the place.
+using Bodies = uint32_t;
+
+/// What fills a place.
+struct Medium {
+  V3f absorption{0, 0, 0};  // 1/m
+  float ior = 1;
+};
 
 /// One mesh, or many spheres, at shutter open and, if it moves, at shutter close.
 struct SceneObject {
@@ -23,6 +34,7 @@ struct SceneObject {
   std::vector<V2f> uv;                           // may be empty
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
+  Bodies body = 0;      // its bit, if it is a dielectric
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
@@ -46,6 +58,7 @@ struct Surface {
   V3f shading_normal;    // unit, in the hemisphere of geometric_normal
   V2f uv;
   const ShadingMaterial* material = nullptr;
+  Bodies body = 0;       // whose surface it is; 0: of no dielectric
   bool contact = false;  // of the fluid with a sheet: no air meets water here
   bool small = false;    // a sphere of foam: too small for a density of photons
 
@@ -63,24 +76,24 @@ class Scene {
   bool occluded(const Ray& ray, float distance) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
-  /// Whether a point lies inside the fluid.
-  bool inside_fluid(const V3f& point, float time) const;
+  /// The bodies that a point lies in.
+  Bodies bodies_at(const V3f& point, float time) const;
+  const Medium& medium(Bodies in) const { return medium_[size_t(std::bit_width(in))]; }
 
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
-  int fluid() const { return fluid_; }  // index of the dielectric object, or -1
-  const SceneObject& object(int index) const { return objects_[size_t(index)]; }
-  V3f fluid_absorption() const { return fluid_absorption_; }  // 1/m
-  float fluid_ior() const { return fluid_ior_; }
-  bool lights_in_fluid() const { return lights_in_fluid_; }
+  const SceneObject& object(uint32_t index) const { return objects_[index]; }
+  const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
+  Bodies fluid() const { return fluid_; }                          // 0: no dielectric
+  bool lights_in_bodies() const { return lights_in_bodies_; }
   unsigned features() const { return features_; }
 
  private:
-  void add_fluid(const Shot& shot, const TriangleMesh& mesh);
   void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
+  void find_bodies(bool has_fluid);
   void build(SceneObject& object);
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
@@ -100,10 +113,10 @@ class Scene {
   V3f ground_center_;
   float ground_half_size_ = 0;
   uint32_t ground_material_ = 0;
-  int fluid_ = -1;
-  V3f fluid_absorption_{0, 0, 0};
-  float fluid_ior_ = 1;
-  bool lights_in_fluid_ = false;
+  std::vector<uint32_t> bodies_;
+  std::vector<Medium> medium_{{}};  // air, and each body's
+  Bodies fluid_ = 0;
+  bool lights_in_bodies_ = false;
   unsigned features_ = 0;
 };
 

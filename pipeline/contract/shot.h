@@ -290,6 +290,7 @@ struct Material {
   V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth
   V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
   double ior = 1.333;                 // dielectric
+  int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
   std::filesystem::path texture;      // diffuse, cloth: PNG, JPEG or EXR, multiplies reflectance
   bool checker = false;               // diffuse: built-in checker of checker_size

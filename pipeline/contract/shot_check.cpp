@@ -551,8 +551,10 @@ class Checker {
                 MaterialType::dielectric, "an open sheet", "Use type cloth or diffuse");
     }
     for (size_t i = 0; i < shot_.obstacle.size(); ++i) {
+      if (shot_.obstacle[i].type != ObstacleType::plane) continue;
       check_use(fmt::format("obstacle[{}].material", i), shot_.obstacle[i].material,
-                MaterialType::dielectric, "an obstacle", "Use type diffuse");
+                MaterialType::dielectric, "a plane",
+                "Use type diffuse, or an obstacle of type box");
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse");

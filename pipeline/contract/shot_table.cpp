@@ -378,6 +378,9 @@ std::vector<Parameter> material_rows() {
           .only(cloth_type),
       row<&Material::ior>("material", "ior", "", {1, 4}, render, "index of refraction")
           .only(dielectric),
+      row<&Material::priority>("material", "priority", "", {-100, 100}, render,
+                               "where bodies overlap the highest is; of equals, an obstacle")
+          .only(dielectric),
       row<&Material::absorption>("material", "absorption", "1/m", {0, 1e6}, render, "in the volume")
           .as(Kind::spectrum)
           .only(dielectric),

@@ -57,7 +57,8 @@ TEST(ObstacleShot, SaysWhatCannotBe) {
   EXPECT_NE(error_of("[[obstacle]]\ntype = \"mesh\"\n").find("mesh is missing"), std::string::npos);
   EXPECT_NE(error_of(box + "interp = \"step\"\n").find("one of \"linear\", \"smooth\""),
             std::string::npos);
-  EXPECT_NE(error_of(box + "material = \"water\"\n").find("an obstacle cannot have"),
+  EXPECT_NE(error_of("[[obstacle]]\ntype = \"plane\"\nmaterial = \"water\"\n")
+                .find("a plane cannot have"),
             std::string::npos);
   EXPECT_NE(error_of("[[obstacle]]\ntype = \"mesh\"\nmesh = \"no.%04d.ply\"\n").find("no.1001.ply"),
             std::string::npos);

@@ -245,10 +245,10 @@ TEST(WaterMesh, KnowsWhatLiesInside) {
   Shot shot = plain_shot(1);
   shot.material = {dielectric("water", kIndex)};
   const Scene scene(shot, 1001, {sphere_mesh(4), {}}, {});
-  EXPECT_TRUE(scene.inside_fluid({0.1f, 0.2f, -0.3f}, 0));
-  EXPECT_TRUE(scene.inside_fluid({0, -0.98f, 0}, 0));
-  EXPECT_FALSE(scene.inside_fluid({0, -1.02f, 0}, 0));
-  EXPECT_FALSE(scene.inside_fluid({1.5f, 0, 0}, 0));
+  EXPECT_TRUE(scene.bodies_at({0.1f, 0.2f, -0.3f}, 0) != 0);
+  EXPECT_TRUE(scene.bodies_at({0, -0.98f, 0}, 0) != 0);
+  EXPECT_FALSE(scene.bodies_at({0, -1.02f, 0}, 0) != 0);
+  EXPECT_FALSE(scene.bodies_at({1.5f, 0, 0}, 0) != 0);
 }
 
 }  // namespace
