@@ -26,6 +26,14 @@ drench_packages=(
   "ffmpeg:/usr/bin/ffmpeg"
 )
 
+# What few need: ./test --blender and ./bench render_vs_cycles.
+drench_use_blender() {
+  drench_packages+=(
+    "blender:/usr/bin/blender"
+    "python3-numpy:/usr/lib/python3/dist-packages/numpy/__init__.py"
+  )
+}
+
 drench_missing_packages() {
   local entry package files file found
   for entry in "${drench_packages[@]}"; do

@@ -1,0 +1,112 @@
+#include "tests/bench/render_scenes.h"
+
+#include <cmath>
+
+namespace drench::bench {
+
+TriangleMesh pleated_sheet() {
+  constexpr int kCells = 64;
+  TriangleMesh mesh;
+  for (int j = 0; j <= kCells; ++j)
+    for (int i = 0; i <= kCells; ++i) {
+      const float x = -0.5f + float(i) / kCells, y = 1.05f - float(j) / kCells;
+      mesh.position.push_back({x, y, 0.05f * std::sin(30 * x + 3 * y) * (1.2f - y)});
+      mesh.velocity.push_back({0, 0, 0});
+      mesh.uv.push_back({float(i) / kCells, float(j) / kCells});
+    }
+  for (uint32_t j = 0; j < kCells; ++j)
+    for (uint32_t i = 0; i < kCells; ++i) {
+      const uint32_t a = j * (kCells + 1) + i, c = a + kCells + 1;
+      mesh.triangle.push_back({a, c, a + 1});
+      mesh.triangle.push_back({a + 1, c, c + 1});
+    }
+  return mesh;
+}
+
+Shot cloth_shot() {
+  Shot shot;
+  shot.render.width = kSmallWidth;
+  shot.render.height = kSmallHeight;
+  shot.render.depth = 8;
+  shot.camera.position = V3d(0.7, 0.9, 2.2);
+  shot.camera.target = V3d(0, 0.5, 0);
+  shot.ground.present = true;
+  Light lamp, sky;
+  lamp.radiance = {8, 8, 8};
+  lamp.center = {1.2, 2.2, 1};
+  sky.type = LightType::environment;
+  sky.name = "sky";
+  sky.radiance = {0.5f, 0.6f, 0.8f};
+  shot.light = {lamp, sky};
+  return shot;
+}
+
+TriangleMesh wavy_pool() {
+  constexpr uint32_t n = 128, row = n + 1;
+  TriangleMesh mesh;
+  for (const bool top : {true, false})
+    for (uint32_t j = 0; j <= n; ++j)
+      for (uint32_t i = 0; i <= n; ++i) {
+        const float x = -2 + 4 * float(i) / n, z = -2 + 4 * float(j) / n;
+        const float wave = 0.03f * (std::sin(7 * x + 2 * z) + std::sin(5 * z - 3 * x));
+        mesh.position.push_back({x, top ? 0.35f + wave : -0.1f, z});
+        mesh.velocity.push_back({0, 0, 0});
+      }
+  const auto quad = [&](uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+    mesh.triangle.push_back({a, b, c});
+    mesh.triangle.push_back({a, c, d});
+  };
+  constexpr uint32_t below = row * row;
+  for (uint32_t j = 0; j < n; ++j)
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t a = j * row + i;
+      quad(a, a + row, a + row + 1, a + 1);
+      quad(below + a, below + a + 1, below + a + row + 1, below + a + row);
+    }
+  const auto wall = [&](uint32_t a, uint32_t b) {  // of its own vertices, which keeps it flat
+    const uint32_t first = uint32_t(mesh.position.size());
+    for (const uint32_t v : {a, b, below + b, below + a}) {
+      mesh.position.push_back(V3f(mesh.position[v]));
+      mesh.velocity.push_back({0, 0, 0});
+    }
+    quad(first, first + 1, first + 2, first + 3);
+  };
+  for (uint32_t k = 0; k < n; ++k) {
+    wall(k, k + 1);
+    wall(n * row + k + 1, n * row + k);
+    wall((k + 1) * row, k * row);
+    wall(k * row + n, (k + 1) * row + n);
+  }
+  return mesh;
+}
+
+Shot pool_shot() {
+  Shot shot = cloth_shot();
+  shot.camera.position = V3d(0.4, 1.9, 2.3);
+  shot.camera.target = V3d(0, 0.1, 0);
+  shot.light[0].radiance = {900, 900, 900};
+  shot.light[0].u = {0.05, 0, 0};
+  shot.light[0].v = {0, 0, 0.05};
+  return shot;
+}
+
+Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed) {
+  shot.render.samples = samples;
+  shot.render.seed = seed;
+  Render out;
+  out.cost =
+      measure([&] { out.film = render_frame(shot, shot.timeline.first, geometry, &out.stats); });
+  return out;
+}
+
+double relative_mse(const Film& film, const Film& reference) {
+  double sum = 0;
+  for (size_t k = 0; k < film.rgba.size(); ++k) {
+    if (k % 4 == 3) continue;
+    const double r = reference.rgba[k], d = film.rgba[k] - r;
+    sum += d * d / (r * r + 0.01);
+  }
+  return sum / (0.75 * double(film.rgba.size()));
+}
+
+}  // namespace drench::bench

@@ -1,0 +1,30 @@
+#pragma once
+// Pictures that the renderer's cases are measured on.
+
+#include "render/renderer.h"
+#include "tests/bench/bench.h"
+
+namespace drench::bench {
+
+inline constexpr int kSmallWidth = 96, kSmallHeight = 54;  // pixels
+
+/// A pleated sheet of 2 x 64 x 64 triangles.
+TriangleMesh pleated_sheet();
+/// A sheet over the ground under a lamp of 1 m and a sky, depth 8.
+Shot cloth_shot();
+/// A closed slab of water of 4 m whose top waves, its floor below the ground.
+TriangleMesh wavy_pool();
+/// The slab under a lamp of 0.1 m.
+Shot pool_shot();
+
+struct Render {
+  Film film;
+  RenderStats stats;
+  Measured cost;
+};
+Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed);
+
+/// mean((x - r)^2 / (r^2 + 0.01)) over pixels and channels.
+double relative_mse(const Film& film, const Film& reference);
+
+}  // namespace drench::bench
