@@ -46,10 +46,14 @@ class ClothBsdf {
   }
   bool faces(const V3f& incoming) const { return dot(incoming, geometric_) > 0; }
 
-  ClothScatter sample(float u_side, const V2f& u) const {
+  /// One number says both the side and a direction on it: a number of its own for the side would
+  /// leave either side a random part of a pixel's even set of directions.
+  ClothScatter sample(const V2f& u) const {
     ClothScatter out;
-    const float side = u_side < reflect_probability_ ? 1.f : -1.f;
-    out.direction = Basis(shading_ * side).world(sample_cosine(u));
+    const float p = reflect_probability_, side = u.x < p ? 1.f : -1.f;
+    const float x = side > 0 ? u.x / p : (u.x - p) / (1 - p);
+    out.direction =
+        Basis(shading_ * side).world(sample_cosine({std::min(x, kOneMinusEpsilon), u.y}));
     const float cos = dot(out.direction, shading_) * side;
     // The smooth hemisphere reaches a little through the real surface: nothing comes from there.
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;

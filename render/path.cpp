@@ -250,15 +250,15 @@ class PathTracer {
   /// The next direction: drawn from the surface, or in water from a mixture with the guide.
   ClothScatter sample_scatter(const PathState& state, const Surface& surface,
                               const ClothBsdf& bsdf) const {
-    float u = number(state, kScatterSide);
     const V2f uv = point(state, kScatterDirection);
-    if constexpr (!kWater) return bsdf.sample(u, uv);
+    if constexpr (!kWater) return bsdf.sample(uv);
     if (state.in != scene_.fluid() || state.in == 0 || state.has_photons ||
         settings_.water_guide == WaterGuide::off)
-      return bsdf.sample(u, uv);
+      return bsdf.sample(uv);
     const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior);
     const float share = guide.share(surface.position);
-    if (share == 0) return bsdf.sample(u, uv);
+    if (share == 0) return bsdf.sample(uv);
+    const float u = number(state, kScatterSide);
     ClothScatter out;
     float guide_pdf = 0;
     if (u < share) {
@@ -267,7 +267,7 @@ class PathTracer {
       out.direction = aimed.direction;
       guide_pdf = aimed.pdf;
     } else {
-      out = bsdf.sample(std::min((u - share) / (1 - share), kOneMinusEpsilon), uv);
+      out = bsdf.sample(uv);
       if (!(out.pdf > 0)) return {};
       guide_pdf = guide.pdf(surface.position, out.direction);
     }

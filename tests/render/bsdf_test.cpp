@@ -7,6 +7,7 @@
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_dielectric.h"
 #include "render/material.h"
+#include "render/sampler.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
@@ -67,7 +68,7 @@ TEST(Cloth, SamplesWithTheDensityAndValueItStates) {
   int kept = 0;
   for (int k = 0; k < 20000; ++k) {
     const ClothBsdf bsdf = cloth.bsdf(0.5f);
-    const ClothScatter s = bsdf.sample(cloth.uniform(), {cloth.uniform(), cloth.uniform()});
+    const ClothScatter s = bsdf.sample({cloth.uniform(), cloth.uniform()});
     if (!(s.pdf > 0)) continue;
     ++kept;
     float pdf = 0;
@@ -77,6 +78,31 @@ TEST(Cloth, SamplesWithTheDensityAndValueItStates) {
       ASSERT_NEAR(value[c], s.weight[c] * s.pdf, 1e-5f * value[c] + 1e-7f);
   }
   EXPECT_GT(kept, 15000);
+}
+
+// The 64 samples of a pixel say how much of either side's hemisphere lies beyond a plane twice as
+// well as random ones would. (Were the side a number of its own, as badly: a side's directions
+// would be a random part of the even set.)
+TEST(Cloth, SpreadsThePixelsSamplesEvenlyOnBothSides) {
+  const ClothBsdf bsdf({0, 1, 0}, {0, 1, 0}, {0, 1, 0}, V3f(0.5f), V3f(0.2f));
+  constexpr int kPixels = 400, kSamples = 64;
+  for (const float side : {1.f, -1.f}) {
+    const auto beyond = [&](const V2f& u) {
+      const V3f d = bsdf.sample(u).direction;
+      return d.y * side > 0 && d.x + 0.5f * d.z > 0.3f ? 1. : 0.;
+    };
+    double share = 0, squares = 0;
+    for (int i = 0; i < 512; ++i)
+      for (int j = 0; j < 512; ++j)
+        share += beyond({(float(i) + 0.5f) / 512, (float(j) + 0.5f) / 512}) / (512. * 512);
+    for (uint32_t pixel = 0; pixel < kPixels; ++pixel) {
+      double mean = 0;
+      for (uint32_t s = 0; s < kSamples; ++s)
+        mean += beyond(Sampler(PixelOrder::separate, 1, pixel, 0, 6, s).two(11)) / kSamples;
+      squares += std::pow(mean - share, 2) / kPixels;
+    }
+    EXPECT_LT(std::sqrt(squares), 0.5 * std::sqrt(share * (1 - share) / kSamples)) << side;
+  }
 }
 
 TEST(Cloth, ReturnsReflectanceAndTransmittanceWhenFlatAndNeverMore) {
