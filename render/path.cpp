@@ -21,9 +21,10 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// Vertices before roulette may end a path: few are worth ending that may still leave the water for
 /// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
-/// survives it at most on long specular paths: total reflection alone would go on for ever.
-constexpr int kRouletteStart = 10, kLongPath = 24;
-constexpr float kLongSurvival = 0.95f;
+/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
+/// high because the few that last would otherwise come out of a glass as bright dots.
+constexpr int kRouletteStart = 10, kLongPath = 64;
+constexpr float kLongSurvival = 0.99f;
 
 /// Sampling dimensions after those of the camera: a block for every vertex of a branch.
 enum VertexDimension : uint32_t {
