@@ -97,15 +97,6 @@ V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
   return p + (p - foot.place).normalized() * distance;
 }
 
-bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
-  constexpr float cos2_15 = 0.9330f;  // of 15 degrees
-  bool found = false;
-  rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
-    found = found || has_angle_below(cos2_15, position[v], position[a], position[b]);
-  });
-  return found;
-}
-
 V3f mean_of_ring(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
   V3f sum(0);
   for (uint32_t k = rings.first[v]; k < rings.first[v + 1]; ++k)
@@ -171,10 +162,11 @@ size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetCon
   for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
     if (contact.side[v]) mesh.position[v] = lay(block, v, smooth[v]);
   });
+  constexpr float cos2_15 = 0.9330f;  // of 15 degrees
   for (int pass = 0; pass < 3; ++pass) {
     const std::vector<V3f> before = mesh.position;
     for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-      if (!has_sliver(before, rings, v)) return;
+      if (!has_sliver(before, rings, v, cos2_15)) return;
       const V3f way = mean_of_ring(before, rings, v) - before[v];
       mesh.position[v] = contact.side[v] ? lay(block, v, before[v] + way)
                                          : before[v] + way - normal[v] * normal[v].dot(way);

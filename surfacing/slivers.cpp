@@ -10,9 +10,19 @@
 namespace drench::surfacing {
 namespace {
 
-bool is_sliver(const V3f& a, const V3f& b, const V3f& c) {
-  return has_angle_below(0.9690f, a, b, c);  // 10.1 degrees
+constexpr float thin = 0.9690f;  // squared cosine of 10.1 degrees
+
+bool has_angle_below(float cos2, const V3f& a, const V3f& b, const V3f& c) {
+  const std::array corner{&a, &b, &c};
+  for (size_t k = 0; k < 3; ++k) {
+    const V3f u = *corner[(k + 1) % 3] - *corner[k], w = *corner[(k + 2) % 3] - *corner[k];
+    const float dot = u.dot(w);
+    if (dot >= 0 && dot * dot >= cos2 * u.length2() * w.length2()) return true;
+  }
+  return false;
 }
+
+bool is_sliver(const V3f& a, const V3f& b, const V3f& c) { return has_angle_below(thin, a, b, c); }
 
 /// One pass of merges, each away from the others, so that the rings stay true for all.
 class Merges {
@@ -117,13 +127,8 @@ std::vector<uint32_t> corners_of_slivers(const LatticeMesh& mesh, const VertexRi
   std::vector<std::vector<uint32_t>> found(mesh.block.size());
   tbb::parallel_for(size_t{0}, mesh.block.size(), [&](size_t b) {
     if (!sheets.near(mesh.block[b].block)) return;
-    for (uint32_t v = mesh.block[b].begin; v < mesh.block[b].end; ++v) {
-      bool sliver = false;
-      rings.for_each_triangle(v, [&](uint32_t p, uint32_t q) {
-        sliver = sliver || is_sliver(mesh.position[v], mesh.position[p], mesh.position[q]);
-      });
-      if (sliver) found[b].push_back(v);
-    }
+    for (uint32_t v = mesh.block[b].begin; v < mesh.block[b].end; ++v)
+      if (has_sliver(mesh.position, rings, v, thin)) found[b].push_back(v);
   });
   std::vector<uint32_t> all;
   for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
@@ -159,14 +164,13 @@ void compact(LatticeMesh& mesh, SheetContact& contact, std::vector<V3f>& normal,
 
 }  // namespace
 
-bool has_angle_below(float cos2, const V3f& a, const V3f& b, const V3f& c) {
-  const std::array corner{&a, &b, &c};
-  for (size_t k = 0; k < 3; ++k) {
-    const V3f u = *corner[(k + 1) % 3] - *corner[k], w = *corner[(k + 2) % 3] - *corner[k];
-    const float dot = u.dot(w);
-    if (dot >= 0 && dot * dot >= cos2 * u.length2() * w.length2()) return true;
-  }
-  return false;
+bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v,
+                float cos2) {
+  bool found = false;
+  rings.for_each_triangle(v, [&](uint32_t a, uint32_t b) {
+    found = found || has_angle_below(cos2, position[v], position[a], position[b]);
+  });
+  return found;
 }
 
 size_t remove_slivers(LatticeMesh& mesh, VertexRings rings, SheetContact& contact,

@@ -6,8 +6,9 @@
 
 namespace drench::surfacing {
 
-/// Has the triangle an angle whose cosine squared is above cos2, or two corners in one place?
-bool has_angle_below(float cos2, const V3f& a, const V3f& b, const V3f& c);
+/// Has a triangle around v an angle whose cosine squared is above cos2, or two corners in one
+/// place?
+bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v, float cos2);
 
 /// Merges vertices of triangles near a sheet that have an angle below 10 degrees into a neighbour,
 /// where that leaves fewer of them, the mesh a closed manifold, no triangle turned over and none
