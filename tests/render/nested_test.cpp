@@ -72,7 +72,7 @@ struct Sunk {
     shot.obstacle.back().name = shot.obstacle.back().material = "glass";
     geometry.fluid = box_mesh({-3, -0.1f, -3}, {3, 0.8f, 3});
     TriangleMesh ball = sphere_mesh(4);
-    for (V3f& p : ball.position) p = p * 0.5f + V3f(0, 0.9f, 0);
+    for (V3f& p : ball.position) p = p * 0.35f + V3f(0, 0.9f, 0);
     geometry.obstacle = {glass(ball)};
     shot.camera.fov_deg = 30.0;
   }
@@ -98,8 +98,9 @@ TEST(NestedBodies, HaveTheCausticsThatPathsGive) {
   Sunk scene;
   add_ground(scene.shot, 0.5f, 6);
   scene.shot.render.samples = 512;
-  scene.shot.camera.position = V3d(0, 4, 2);
-  scene.shot.camera.target = V3d(0.2, 0, 0);
+  scene.shot.camera.position = V3d(2.5, 2.5, 0);  // past the ball to the ground behind it
+  scene.shot.camera.target = V3d(-0.69, 0, -0.13);
+  scene.shot.camera.fov_deg = 8.0;
   scene.shot.light = {panel({0.4, 3, 0.3}, 0.3, 0.3, 40), sky(0.2f)};
   const Mean paths = mean_over_seeds(scene.shot, scene.geometry, {}, 16);
   scene.shot.render.photons = 6;
