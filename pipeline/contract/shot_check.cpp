@@ -1,13 +1,11 @@
 #include "pipeline/contract/shot_check.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <set>
 
-#include "pipeline/contract/error.h"
+#include "pipeline/contract/check_base.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/picture_check.h"
 #include "pipeline/contract/probe_check.h"
 #include "pipeline/contract/seam_check.h"
 #include "pipeline/contract/source_check.h"
@@ -23,11 +21,9 @@ constexpr double shortest_step = 1e-9;  // s; a day of them is a few ms
 constexpr double most_cells = 1e6;      // grid cells along one axis
 constexpr double most_vertices = 4e6;   // of one sheet
 
-std::string text_of(const V3d& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
-
-class Checker {
+class Checker : CheckBase {
  public:
-  Checker(const Shot& shot, const ShotSources& sources) : shot_(shot), sources_(sources) {}
+  using CheckBase::CheckBase;
 
   void check() const {
     check_time();
@@ -46,17 +42,10 @@ class Checker {
            "[[fluid.box]] or a [[cloth]]");
     }
     check_particles();
-    check_camera();
-    for (size_t i = 0; i < shot_.light.size(); ++i) check_light(i);
-    for (size_t i = 0; i < shot_.material.size(); ++i) check_material(i);
-    check_material_uses();
+    check_picture(shot_, sources_);
   }
 
  private:
-  [[noreturn]] void fail(const std::string& key, const std::string& text) const {
-    throw Error(fmt::format("{}: {}", sources_.at(key), text));
-  }
-
   void check_time() const {
     const Timeline& time = shot_.timeline;
     if (time.first > time.last) {
@@ -210,20 +199,6 @@ class Checker {
                                "and {} m. Move it, or widen [domain]",
                                path, min[i], max[i], "xyz"[i], domain.min[i], domain.max[i]));
       }
-    }
-  }
-
-  void check_not_zero(const std::string& key, const V3d& v) const {
-    if (!(v.length() > 1e-9)) {
-      fail(key, fmt::format("{} is {}, which has no direction; give it a length other than 0", key,
-                            text_of(v)));
-    }
-  }
-
-  void check_positive(const std::string& key, double value, std::string_view unit,
-                      std::string_view why) const {
-    if (!(value > 0)) {
-      fail(key, fmt::format("{} is {}{}; {}. Use a value above 0", key, value, unit, why));
     }
   }
 
@@ -467,101 +442,6 @@ class Checker {
     check_distinct(shot_.light, "light");
     check_distinct(shot_.material, "material");
   }
-
-  void check_camera() const {
-    const Camera& camera = shot_.camera;
-    if (camera.shutter_open > camera.shutter_close) {
-      fail(
-          "camera.shutter_open",
-          fmt::format("camera.shutter_open is {} and camera.shutter_close is {}; the shutter would "
-                      "close before it opens. Exchange them",
-                      camera.shutter_open, camera.shutter_close));
-    }
-    check_not_zero("camera.up", camera.up);
-    std::set<double> frames;
-    for (const auto& [frame, value] : camera.position.keys) frames.insert(frame);
-    for (const auto& [frame, value] : camera.target.keys) frames.insert(frame);
-    for (const double frame : frames) {
-      const V3d view = camera.target.at(frame) - camera.position.at(frame);
-      if (!(view.length() > 1e-6)) {
-        fail("camera.target", fmt::format("camera.position and camera.target are both {} at frame "
-                                          "{}; the camera looks nowhere. Move one of them",
-                                          text_of(camera.target.at(frame)), frame));
-      }
-      if (view.normalized().cross(camera.up.normalized()).length() < 1e-6) {
-        fail("camera.up", fmt::format("camera.up is {}, along the view at frame {}, so the picture "
-                                      "has no upright. Use another up, for example [0, 0, -1]",
-                                      text_of(camera.up), frame));
-      }
-    }
-  }
-
-  void check_light(size_t i) const {
-    const Light& light = shot_.light[i];
-    const std::string path = fmt::format("light[{}]", i);
-    if (light.type == LightType::rectangle && !(light.u.cross(light.v).length() > 1e-12)) {
-      fail(path, fmt::format("{0}.u is {1} and {0}.v is {2}; the light has no area. Give two half "
-                             "edges that are not parallel",
-                             path, text_of(light.u), text_of(light.v)));
-    }
-    if (light.type == LightType::sphere) {
-      check_positive(path + ".radius", light.radius, " m", "the light has no area");
-    }
-    if (light.type == LightType::sun) check_not_zero(path + ".direction", light.direction);
-  }
-
-  void check_material(size_t i) const {
-    const Material& material = shot_.material[i];
-    for (int c = 0; c < 3; ++c) {
-      const double sum = double(material.reflectance[c]) + material.transmittance[c];
-      if (sum > 1 + 1e-5) {  // float rounding of two shares
-        fail(fmt::format("material[{}].reflectance", i),
-             fmt::format("material \"{}\" reflects {:.4g} and transmits {:.4g} of the {}; together "
-                         "more light than arrives. Keep the sum at most 1",
-                         material.name, material.reflectance[c], material.transmittance[c],
-                         c == 0   ? "red"
-                         : c == 1 ? "green"
-                                  : "blue"));
-      }
-    }
-  }
-
-  void check_use(const std::string& key, const std::string& name, MaterialType refused,
-                 std::string_view user, std::string_view advice) const {
-    const auto found = std::find_if(shot_.material.begin(), shot_.material.end(),
-                                    [&](const Material& m) { return m.name == name; });
-    if (found == shot_.material.end()) {
-      std::vector<std::string> names;
-      for (const Material& material : shot_.material) names.push_back(material.name);
-      fail(key, fmt::format("{} is \"{}\", which no [[material]] defines; there are {}. Add one or "
-                            "use one of these",
-                            key, name, fmt::join(names, ", ")));
-    }
-    if (found->type == refused) {
-      fail(key, fmt::format("{} is \"{}\", a material that {} cannot have. {}", key, name, user,
-                            advice));
-    }
-  }
-
-  void check_material_uses() const {
-    check_use("fluid.material", shot_.fluid.material, MaterialType::cloth, "a closed volume",
-              "Use type dielectric or diffuse");
-    for (size_t i = 0; i < shot_.cloth.size(); ++i) {
-      check_use(fmt::format("cloth[{}].material", i), shot_.cloth[i].material,
-                MaterialType::dielectric, "an open sheet", "Use type cloth or diffuse");
-    }
-    for (size_t i = 0; i < shot_.obstacle.size(); ++i) {
-      if (shot_.obstacle[i].type != ObstacleType::plane) continue;
-      check_use(fmt::format("obstacle[{}].material", i), shot_.obstacle[i].material,
-                MaterialType::dielectric, "a plane",
-                "Use type diffuse, or an obstacle of type box");
-    }
-    check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
-              "Use type diffuse");
-  }
-
-  const Shot& shot_;
-  const ShotSources& sources_;
 };
 
 }  // namespace

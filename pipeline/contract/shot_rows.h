@@ -94,6 +94,7 @@ Row row(std::string_view section, std::string_view key, std::string_view unit, L
 }
 
 inline constexpr Limits none{};
+inline constexpr Limits share{0, 1};
 inline constexpr Limits place{-1e5, 1e5};      // m: beyond, float steps are wider than a millimetre
 inline constexpr Limits speed{-1000, 1000};    // m/s
 inline constexpr Limits seeds{0, 4294967295};  // uint32_t
@@ -106,5 +107,7 @@ std::vector<Parameter> source_rows();
 std::vector<Parameter> surface_rows();
 /// Rows of foam.
 std::vector<Parameter> foam_rows();
+/// Rows of the camera, lights, materials, the ground and the film.
+std::vector<Parameter> picture_rows();
 
 }  // namespace drench::shot_table

@@ -1,19 +1,15 @@
 #include "pipeline/contract/source_check.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <numbers>
 #include <set>
 
-#include "pipeline/contract/error.h"
+#include "pipeline/contract/check_base.h"
 #include "pipeline/contract/obstacle.h"
 
 namespace drench {
 
 namespace {
-
-std::string text_of(const V3d& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
 
 class SourceChecker {
  public:

@@ -1,0 +1,152 @@
+// Rows of all that only the picture is made of: camera, lights, materials, ground, film.
+#include "pipeline/contract/shot_rows.h"
+
+namespace drench::shot_table {
+
+namespace {
+
+constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
+constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
+
+std::vector<Parameter> camera_rows() {
+  return {
+      row<&Camera::position>("camera", "position", "m", place, render, "may be animated"),
+      row<&Camera::target>("camera", "target", "m", place, render, "looked at; may be animated"),
+      row<&Camera::fov_deg>("camera", "fov_deg", "deg", {0.1, 170}, render,
+                            "horizontal field of view; may be animated"),
+      row<&Camera::focus_distance>("camera", "focus_distance", "m", {0, 1e6}, render,
+                                   "0: the distance to the target; may be animated"),
+      row<&Camera::lens_radius>("camera", "lens_radius", "m", {0, 10}, render,
+                                "0: a pinhole; may be animated"),
+      row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
+      row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
+                                 "relative to the frame"),
+      row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
+                                  "relative to the frame"),
+      row<&Camera::position>("camera", "interp", "", none, render,
+                             "between the keys of every animated value of the camera")
+          .as(Kind::track_mode)
+          .one_of({"linear", "smooth", "step"}),
+  };
+}
+
+std::vector<Parameter> light_rows() {
+  return {
+      row<&Light::type>("light", "type", "", none, render, "kind of light")
+          .one_of({"rectangle", "sphere", "sun", "environment"})
+          .needed()
+          .identity(),
+      row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
+          .identity(),
+      row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
+                            "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
+                            "environment with a map, its factor"),
+      row<&Light::center>("light", "center", "m", place, render, "centre").only(rectangle | sphere),
+      row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
+          .only(rectangle),
+      row<&Light::v>("light", "v", "m", place, render, "half edge").only(rectangle),
+      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere),
+      row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
+          .only(sun),
+      row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
+          .only(sun),
+      row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")
+          .only(environment),
+      row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
+          .only(environment),
+      row<&Light::horizon>("light", "horizon", "", {0, 1000}, render,
+                           "sky without a map: radiance at the horizon over that at the zenith")
+          .as(Kind::spectrum)
+          .only(environment),
+      row<&Light::below>("light", "below", "", {0, 1000}, render,
+                         "sky without a map: radiance below the horizon over that at the zenith")
+          .as(Kind::spectrum)
+          .only(environment),
+  };
+}
+
+std::vector<Parameter> material_rows() {
+  return {
+      row<&Material::name>("material", "name", "", none, render, "built-in ones may be redefined")
+          .needed()
+          .identity(),
+      row<&Material::type>("material", "type", "", none, render, "how light meets it")
+          .one_of({"dielectric", "cloth", "diffuse"})
+          .identity(),
+      row<&Material::reflectance>("material", "reflectance", "", share, render,
+                                  "diffuse reflection")
+          .only(cloth_type | diffuse),
+      row<&Material::transmittance>("material", "transmittance", "", share, render,
+                                    "diffuse transmission; with reflectance at most 1")
+          .only(cloth_type),
+      row<&Material::ior>("material", "ior", "", {1, 4}, render, "index of refraction")
+          .only(dielectric),
+      row<&Material::priority>("material", "priority", "", {-100, 100}, render,
+                               "where bodies overlap the highest is; of equals, an obstacle")
+          .only(dielectric),
+      row<&Material::absorption>("material", "absorption", "1/m", {0, 1e6}, render, "in the volume")
+          .as(Kind::spectrum)
+          .only(dielectric),
+      row<&Material::texture>("material", "texture", "", none, render,
+                              "PNG, JPEG or EXR that multiplies reflectance")
+          .only(cloth_type | diffuse),
+      row<&Material::checker>("material", "checker", "", none, render, "built-in checker")
+          .only(diffuse),
+      row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,
+                                   "edge of one of its squares")
+          .only(diffuse),
+  };
+}
+
+std::vector<Parameter> film_rows() {
+  return {
+      row<&Ground::present>("ground", "present", "", none, mesh | render,
+                            "a horizontal plane that is drawn; true when [ground] is written"),
+      row<&Ground::height>("ground", "height", "m", place, mesh | render, "its y"),
+      row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
+      row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
+      row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),
+
+      row<&RenderSettings::width>("render", "width", "pixel", {1, 16384}, render, "of a frame"),
+      row<&RenderSettings::height>("render", "height", "pixel", {1, 16384}, render, "of a frame"),
+      row<&RenderSettings::samples>("render", "samples", "", {1, 1e6}, render,
+                                    "camera samples a pixel"),
+      row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
+                                  "diffuse bounces; specular ones end by chance"),
+      row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,
+                                        "from the stored velocities, over the shutter"),
+      row<&RenderSettings::photons>(
+          "render", "photons", "", {0, 1000}, render,
+          "started for each camera sample, for light of lamps through water; 0: by paths alone"),
+      row<&RenderSettings::seed>("render", "seed", "", seeds, render, "of the samples"),
+  };
+}
+
+}  // namespace
+
+std::vector<Parameter> picture_rows() {
+  std::vector<Parameter> all;
+  for (const auto& part : {camera_rows(), light_rows(), material_rows(), film_rows()})
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+const std::vector<Material>& built_in_materials() {
+  static const std::vector<Material> materials = [] {
+    Material water, cotton, ground;
+    water.name = "water";
+    water.type = MaterialType::dielectric;
+    // Pure water, Pope and Fry 1997, at about 600, 540 and 450 nm: red goes first.
+    water.absorption = {0.22f, 0.047f, 0.0092f};
+    cotton.name = "cotton";
+    cotton.type = MaterialType::cloth;
+    cotton.reflectance = {0.55f, 0.53f, 0.50f};
+    cotton.transmittance = {0.20f, 0.19f, 0.17f};
+    ground.name = "ground";
+    ground.reflectance = {0.35f, 0.35f, 0.35f};
+    return std::vector<Material>{water, cotton, ground};
+  }();
+  return materials;
+}
+
+}  // namespace drench::shot_table
