@@ -68,6 +68,12 @@ CameraPose ShutterCamera::pose_at(float time) const {
   return pose;
 }
 
+V2f ShutterCamera::project(const CameraPose& pose, const V3f& point) const {
+  const V3f to = point - pose.position;
+  const float scale = 0.5f * width_ / (pose.half_width * dot(to, pose.forward));
+  return {0.5f * width_ + dot(to, pose.right) * scale, 0.5f * height_ - dot(to, pose.up) * scale};
+}
+
 template <bool thin_lens>
 Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f& lens,
                              float time) const {

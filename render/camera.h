@@ -35,9 +35,13 @@ class ShutterCamera {
       return from_pose<thin_lens>(open_, film, lens, time);
   }
 
+  /// Where a point before the camera appears, in pixels from the top left, y down.
+  V2f project(const CameraPose& pose, const V3f& point) const;
+
   bool moves() const { return moves_; }
   bool has_lens() const { return open_.lens_radius > 0 || close_.lens_radius > 0; }
   const CameraPose& open() const { return open_; }
+  const CameraPose& close() const { return close_; }
   /// Pixels that a length of 1 m at a distance of 1 m covers.
   float pixels_per_radian() const { return 0.5f * width_ / open_.half_width; }
 

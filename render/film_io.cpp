@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include <algorithm>
 #include <cstring>
+#include <deque>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
@@ -32,30 +34,70 @@ constexpr float kLargestHalf = 65504;
                           path.string(), why));
 }
 
-/// Half by channel: rgba with values that no half holds brought to the nearest it does.
-struct HalfImage {
-  std::vector<half> rgba;
-  uint64_t clamped = 0;
-};
-
-HalfImage to_half(const Film& film) {
-  HalfImage out;
-  out.rgba.resize(film.rgba.size());
-  for (size_t k = 0; k < film.rgba.size(); ++k) {
-    const float value = film.rgba[k];
+/// Values as half, those that no half holds brought to the nearest it does and counted.
+std::vector<half> to_half(const std::vector<float>& values, uint64_t& clamped) {
+  std::vector<half> out(values.size());
+  for (size_t k = 0; k < values.size(); ++k) {
+    const float value = values[k];
     const bool fits = std::abs(value) <= kLargestHalf;
-    out.clamped += fits ? 0 : 1;
-    out.rgba[k] = fits ? value : std::isnan(value) ? 0.f : std::copysign(kLargestHalf, value);
+    clamped += fits ? 0 : 1;
+    out[k] = fits ? value : std::isnan(value) ? 0.f : std::copysign(kLargestHalf, value);
   }
   return out;
 }
 
 void check_film(const Film& film) {
-  if (film.width <= 0 || film.height <= 0 ||
-      film.rgba.size() != size_t(4) * film.width * film.height)
+  const size_t pixels = size_t(std::max(film.width, 0)) * size_t(std::max(film.height, 0));
+  if (pixels == 0 || film.rgba.size() != 4 * pixels)
     throw Error(fmt::format("a film of {} x {} pixels with {} values cannot be written", film.width,
                             film.height, film.rgba.size()));
+  for (const FilmLayer& layer : film.layer)
+    if (layer.value.size() != layer.channel.size() * pixels)
+      throw Error(fmt::format("layer '{}' has {} values for {} x {} pixels of {} channels",
+                              layer.name, layer.value.size(), film.width, film.height,
+                              layer.channel.size()));
 }
+
+/// Channels of a picture and the values they are written from.
+class Channels {
+ public:
+  Channels(Imf::Header& header, const Film& film) : header_(header), width_(size_t(film.width)) {
+    add("", {"R", "G", "B", "A"}, FilmLayer::Precision::half, film.rgba);
+    for (const FilmLayer& layer : film.layer)
+      add(layer.name + ".", layer.channel, layer.precision, layer.value);
+  }
+  const Imf::FrameBuffer& buffer() const { return buffer_; }
+  uint64_t clamped() const { return clamped_; }
+
+ private:
+  void add(const std::string& prefix, const std::vector<std::string>& names,
+           FilmLayer::Precision precision, const std::vector<float>& values) {
+    if (precision == FilmLayer::Precision::full) return add_as(Imf::FLOAT, prefix, names, values);
+    halves_.push_back(to_half(values, clamped_));
+    add_as(Imf::HALF, prefix, names, halves_.back());
+  }
+
+  template <class Value>
+  void add_as(Imf::PixelType type, const std::string& prefix, const std::vector<std::string>& names,
+              const std::vector<Value>& values) {
+    const size_t stride = names.size() * sizeof(Value);
+    for (size_t c = 0; c < names.size(); ++c) {
+      const std::string name = prefix + names[c];
+      if (header_.channels().findChannel(name))
+        throw Error(fmt::format("two layers have a channel {}; give one another name", name));
+      header_.channels().insert(name, Imf::Channel(type));
+      // Imf takes no pointer to const, but writing a file only reads.
+      char* const from = reinterpret_cast<char*>(const_cast<Value*>(values.data() + c));
+      buffer_.insert(name, Imf::Slice(type, from, stride, stride * width_));
+    }
+  }
+
+  Imf::Header& header_;
+  size_t width_;
+  Imf::FrameBuffer buffer_;
+  std::deque<std::vector<half>> halves_;
+  uint64_t clamped_ = 0;
+};
 
 /// The window of pixels that a header promises, checked against the file that made the promise.
 Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header& header) {
@@ -108,33 +150,26 @@ Film read_pixels(const std::filesystem::path& path) {
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes) {
   check_film(film);
-  HalfImage image = to_half(film);
-  if (image.clamped > 0)
-    log_warning("render", fmt::format("{} values beyond half clamped file={}", image.clamped,
-                                      path.filename().string()));
   Imf::Header header(film.width, film.height);
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::addChromaticities(header, acescg_chromaticities());
-  for (const auto& [name, value] : attributes) {
-    if (name.empty() || name.size() > 31 || header.find(name.c_str()) != header.end())
-      throw Error(
-          fmt::format("'{}' cannot name an EXR attribute: use 1 to 31 characters and no "
-                      "name of OpenEXR's own",
-                      name));
-    header.insert(name, Imf::StringAttribute(value));
-  }
-  Imf::FrameBuffer buffer;
-  const size_t x_stride = 4 * sizeof(half), y_stride = x_stride * size_t(film.width);
-  const char* names[4] = {"R", "G", "B", "A"};
-  for (int c = 0; c < 4; ++c) {
-    header.channels().insert(names[c], Imf::Channel(Imf::HALF));
-    buffer.insert(names[c], Imf::Slice(Imf::HALF, reinterpret_cast<char*>(image.rgba.data() + c),
-                                       x_stride, y_stride));
-  }
+  for (const auto* entries : {&attributes, &film.header})
+    for (const auto& [name, value] : *entries) {
+      if (name.empty() || name.size() > 31 || header.find(name.c_str()) != header.end())
+        throw Error(
+            fmt::format("'{}' cannot name an EXR attribute: use 1 to 31 characters and no "
+                        "name of OpenEXR's own",
+                        name));
+      header.insert(name, Imf::StringAttribute(value));
+    }
+  const Channels channels(header, film);
+  if (channels.clamped() > 0)
+    log_warning("render", fmt::format("{} values beyond half clamped file={}", channels.clamped(),
+                                      path.filename().string()));
   return write_file_whole(path, [&](const std::filesystem::path& temporary) {
     try {
       Imf::OutputFile file(temporary.c_str(), header);
-      file.setFrameBuffer(buffer);
+      file.setFrameBuffer(channels.buffer());
       file.writePixels(film.height);
     } catch (const std::exception& e) {
       throw Error(fmt::format("{}: cannot write the frame: {}", path.string(), e.what()));

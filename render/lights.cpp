@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "pipeline/contract/error.h"
@@ -166,6 +167,25 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         break;
     }
   }
+  find_groups(lights);
+}
+
+void Lights::find_groups(const std::vector<Light>& lights) {
+  const auto add = [&](std::initializer_list<LightType> types) {
+    for (const Light& light : lights) {
+      if (std::find(types.begin(), types.end(), light.type) == types.end()) continue;
+      const std::string& name = light.group.empty() ? light.name : light.group;
+      const auto found = std::find(groups_.begin(), groups_.end(), name);
+      group_.push_back(uint32_t(found - groups_.begin()));
+      if (found == groups_.end()) groups_.push_back(name);
+    }
+  };
+  add({LightType::rectangle, LightType::sphere});
+  add({LightType::sun});
+  add({LightType::environment});
+  const auto caustics = std::find(groups_.begin(), groups_.end(), "caustics");
+  caustics_group_ = uint32_t(caustics - groups_.begin());
+  if (caustics == groups_.end()) groups_.push_back("caustics");
 }
 
 Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
@@ -216,6 +236,7 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, c
     out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf};
   }
   out.pdf *= weight / total;
+  out.group = group_[chosen];
   return out;
 }
 

@@ -2,7 +2,9 @@
 // The lights of a shot: shapes that rays can hit, suns and an environment at infinity, and a draw
 // among them by what each could send to a point.
 
+#include <algorithm>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/contract/shot.h"
@@ -16,6 +18,7 @@ struct LightSample {
   float distance = 0;  // m; infinity for sun and environment
   V3f radiance;        // W/(sr m^2)
   float pdf = 0;       // per steradian, with the choice of the light; 0: no sample
+  uint32_t group = 0;
 };
 
 /// A rectangle or sphere, ready to be hit and sampled.
@@ -74,28 +77,35 @@ class Lights {
 
   enum class Suns { seen, hidden };
 
-  /// Radiance from infinity along a direction, each part weighed by `weight(density)`, where the
-  /// density is that of `sample` at `from`; 0 if it is not asked for.
-  template <class Weight>
-  V3f infinite_radiance(const V3f& from, const V3f& direction, bool weighed, Suns suns,
-                        const Weight& weight) const {
-    V3f sum(0);
+  /// Calls `found(radiance, density, group)` for each light at infinity that shines along a
+  /// direction, where the density is that of `sample` at `from`; 0 if it is not asked for.
+  template <class Found>
+  void for_each_infinite(const V3f& from, const V3f& direction, bool weighed, Suns suns,
+                         const Found& found) const {
     if (environment_) {
       const float pdf =
           weighed && sample_environment_
               ? environment_->pdf(direction) * choice_probability(environment_index(), from)
               : 0.f;
-      sum += environment_->radiance(direction) * weight(pdf);
+      found(environment_->radiance(direction), pdf, group(environment_index()));
     }
     for (size_t s = 0; s < suns_.size() && suns == Suns::seen; ++s) {
       if (!suns_[s].covers(direction)) continue;
       const float pdf = weighed ? choice_probability(shapes_.size() + s, from) /
                                       (2 * kPi * suns_[s].one_minus_cos)
                                 : 0.f;
-      sum += suns_[s].radiance * weight(pdf);
+      found(suns_[s].radiance, pdf, group(shapes_.size() + s));
     }
-    return sum;
   }
+
+  /// Names of the groups, and which one a light is of: shapes, then suns, then the environment.
+  const std::vector<std::string>& groups() const { return groups_; }
+  uint32_t group(size_t light) const { return group_[light]; }
+  bool has_lights(uint32_t group) const {
+    return std::find(group_.begin(), group_.end(), group) != group_.end();
+  }
+  /// The group of what photons bring, whatever lamp sent them.
+  uint32_t caustics_group() const { return caustics_group_; }
 
   bool has_lamps() const { return environment_index() > 0; }
   bool has_environment() const { return environment_.has_value(); }
@@ -106,6 +116,7 @@ class Lights {
   float environment_importance() const { return environment_importance_; }
 
  private:
+  void find_groups(const std::vector<Light>& lights);
   LightSample sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const;
   size_t environment_index() const { return shapes_.size() + suns_.size(); }
   float importance(size_t index, const V3f& from) const;
@@ -114,6 +125,9 @@ class Lights {
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
   std::optional<Environment> environment_;
+  std::vector<std::string> groups_;
+  std::vector<uint32_t> group_;  // by light
+  uint32_t caustics_group_ = 0;
   bool sample_environment_ = false;
   float environment_importance_ = 0;
 };

@@ -6,6 +6,7 @@
 
 #include "render/path.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <utility>
@@ -62,8 +63,8 @@ class PathTracer {
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
-             uint64_t& rays)
-      : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays) {}
+             uint64_t& rays, PathRecord* record)
+      : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays), record_(record) {}
 
   PathSample run(const V2f& film) {
     const float time = kMoving ? sampler_.one(kTimeDimension) : 0.f;
@@ -100,19 +101,55 @@ class PathTracer {
         pass_contact(state, surface, hit.distance);
         continue;
       }
-      going = scatter(state, surface, hit.distance) && survives(state);
+      going = scatter(state, surface, hit) && survives(state);
     }
   }
 
-  bool scatter(PathState& state, const Surface& surface, float distance) {
+  bool scatter(PathState& state, const Surface& surface, const Hit& hit) {
     if constexpr (kWater) {
       // The side that was hit says for certain whether the way led through the body.
       const bool outwards = dot(state.ray.direction, surface.geometric_normal) > 0;
       state.in = outwards ? state.in | surface.body : state.in & ~surface.body;
-      absorb(state, distance);
-      if (surface.body) return scatter_interface(state, surface);
+      absorb(state, hit.distance);
+      if (surface.body) {
+        if (inside_higher_body(state, surface)) return true;
+        record_first(state, surface, hit);
+        return scatter_interface(state, surface);
+      }
     }
+    record_first(state, surface, hit);
     return scatter_cloth(state, surface);
+  }
+
+  /// Goes on through a surface that divides nothing, because a body of higher priority is there.
+  bool inside_higher_body(PathState& state, const Surface& surface) {
+    const Bodies beyond = state.in ^ surface.body;
+    if (&scene_.medium(state.in) != &scene_.medium(beyond)) return false;
+    state.in = beyond;
+    pass(state, surface);
+    return true;
+  }
+
+  void record_first(const PathState& state, const Surface& surface, const Hit& hit) {
+    if (!record_ || state.vertices > 0) return;
+    record_->first = hit;
+    record_->position = surface.position;
+    record_->normal = dot(state.ray.direction, surface.geometric_normal) < 0
+                          ? surface.shading_normal
+                          : -surface.shading_normal;
+    record_->time = state.ray.time;
+  }
+
+  void record_albedo(const V3f& albedo) {
+    if (!record_ || record_->shaded) return;
+    record_->albedo = albedo;
+    record_->shaded = true;
+  }
+
+  /// Adds light to the picture.
+  void deposit(const V3f& found, uint32_t group) {
+    radiance_ += found;
+    if (record_ && !record_->light.empty()) record_->light[group] += found;
   }
 
   /// Between water and the sheet it lies on; what little is between counts as water.
@@ -160,22 +197,26 @@ class PathTracer {
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
-    V3f found = state.throughput;
+    // What mirrors show of the sky and of lamps counts as white, the sky itself as black.
+    if (state.vertices > 0 || hit.kind == Hit::Kind::light) record_albedo(state.survival);
     if (hit.kind == Hit::Kind::light) {
       if (left_to_photons(state)) return;
       const float pdf =
           kLights && state.bsdf_pdf > 0
               ? lights.shape_pdf(int(hit.index), state.vertex, direction, hit.distance)
               : 0.f;
-      found *= lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf);
+      deposit(
+          state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf),
+          lights.group(hit.index));
     } else {
       if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
-      found *= lights.infinite_radiance(
-          state.vertex, direction, state.bsdf_pdf > 0,
-          left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
-          [&](float pdf) { return emission_weight(state, pdf); });
+      lights.for_each_infinite(state.vertex, direction, state.bsdf_pdf > 0,
+                               left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
+                               [&](const V3f& radiance, float pdf, uint32_t group) {
+                                 deposit(state.throughput * radiance * emission_weight(state, pdf),
+                                         group);
+                               });
     }
-    radiance_ += found;
   }
 
   /// Continues the path along `direction` from the surface.
@@ -187,13 +228,7 @@ class PathTracer {
 
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
-    const Medium &before = scene_.medium(state.in), &after = scene_.medium(state.in ^ surface.body);
-    if (&before == &after) {  // inside a body of higher priority
-      state.in ^= surface.body;
-      pass(state, surface);
-      return true;
-    }
-    const float eta = after.ior / before.ior;
+    const float eta = scene_.medium(state.in ^ surface.body).ior / scene_.medium(state.in).ior;
     const V3f flat = state.in & surface.body ? -surface.geometric_normal : surface.geometric_normal;
     InterfaceSplit split = split_at_interface(
         d, interface_normal(d, surface.geometric_normal, surface.shading_normal), eta);
@@ -225,6 +260,7 @@ class PathTracer {
     const ShadingMaterial& material = *surface.material;
     const ClothBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
                          material.reflectance_at(surface.uv), material.transmittance);
+    record_albedo(state.survival * bsdf.albedo());
     if (bsdf.black()) return false;
     state.interfaces = 0;
     state.has_photons = kWater && settings_.photons && !surface.small;
@@ -286,7 +322,7 @@ class PathTracer {
         surface.position, surface.geometric_normal, [&](const Photon& photon, float share) {
           (bsdf.faces(-photon.direction) ? front : back) += photon.power * share;
         });
-    radiance_ += state.throughput * bsdf.radiance(front, back);
+    deposit(state.throughput * bsdf.radiance(front, back), scene_.lights().caustics_group());
   }
 
   void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
@@ -307,7 +343,7 @@ class PathTracer {
         const V3f& a = scene_.medium(state.in).absorption;
         for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
       }
-    if (finite(found)) radiance_ += found;
+    if (finite(found)) deposit(found, light.group);
   }
 
   bool survives(PathState& state) {
@@ -336,6 +372,7 @@ class PathTracer {
   const PathSettings& settings_;
   const Sampler& sampler_;
   uint64_t& rays_;
+  PathRecord* record_;
   V3f radiance_{0, 0, 0};
   float alpha_ = 1;
   PathState pending_;
@@ -344,9 +381,12 @@ class PathTracer {
 
 template <unsigned features>
 PathSample trace(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
-                 const V2f& film, uint64_t& rays) {
-  PathSample sample = PathTracer<features>(scene, settings, sampler, rays).run(film);
-  if (!finite(sample.radiance)) sample.radiance = V3f(0);
+                 const V2f& film, uint64_t& rays, PathRecord* record) {
+  PathSample sample = PathTracer<features>(scene, settings, sampler, rays, record).run(film);
+  if (!finite(sample.radiance)) {
+    sample.radiance = V3f(0);
+    if (record) std::fill(record->light.begin(), record->light.end(), V3f(0));
+  }
   return sample;
 }
 

@@ -2,6 +2,7 @@
 // The path loop, compiled once for every set of features and chosen once for a frame.
 
 #include <cstdint>
+#include <vector>
 
 #include "render/photons.h"
 
@@ -24,6 +25,16 @@ struct PathSample {
   float alpha = 1;  // 0 where the camera sees nothing at all
 };
 
+/// What a camera sample met, for the layers of a film.
+struct PathRecord {
+  std::vector<V3f> light;  // W/(sr m^2), what each group of lights gave; empty: not asked for
+  Hit first;               // the ground or object met first, if any
+  V3f position, normal;    // of it; normal to the side seen
+  float time = 0;          // in the shutter
+  V3f albedo;              // of the first diffuse surface, through water and glass
+  bool shaded = false;     // whether there was one
+};
+
 struct PathSettings {
   int depth = 8;
   Estimator estimator = Estimator::mis;
@@ -33,9 +44,10 @@ struct PathSettings {
   const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
 };
 
-/// One camera sample. `film` in pixels; `rays` counts rays traced.
+/// One camera sample. `film` in pixels; `rays` counts rays traced; `record`, unless null, is
+/// filled.
 using PathFunction = PathSample (*)(const Scene&, const PathSettings&, const Sampler&,
-                                    const V2f& film, uint64_t& rays);
+                                    const V2f& film, uint64_t& rays, PathRecord* record);
 
 /// @param features  any of Feature, combined
 PathFunction path_function(unsigned features);

@@ -11,9 +11,11 @@
 
 #include "pipeline/contract/error.h"
 #include "render/filter.h"
+#include "render/layers.h"
 #include "render/options.h"
 #include "render/path.h"
 #include "render/photons.h"
+#include "render/pixel_sum.h"
 
 namespace drench {
 
@@ -50,22 +52,23 @@ struct Job {
   PixelFilter filter;
   PixelOrder order;
   uint32_t seed, slots_log2;
-  int samples;
+  int width, height, samples;
 };
 
-/// The mean of a pixel's samples, added in their order.
-void render_pixel(const Job& job, int x, int y, float* rgba, uint64_t& rays) {
-  double sum[4] = {0, 0, 0, 0};
-  for (int s = 0; s < job.samples; ++s) {
-    const Sampler sampler(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2,
-                          uint32_t(s));
-    const V2f film =
-        V2f(float(x) + 0.5f, float(y) + 0.5f) + job.filter.offset(sampler.two(kFilterDimension));
-    const PathSample sample = job.trace(job.scene, job.path, sampler, film, rays);
-    for (int c = 0; c < 3; ++c) sum[c] += sample.radiance[c];
-    sum[3] += sample.alpha;
-  }
-  for (int c = 0; c < 4; ++c) rgba[c] = float(sum[c] / job.samples);
+/// What the samples of a picture have added up to.
+struct Sums {
+  std::vector<PixelSum> pixel;
+  LayerFilm layers;
+};
+
+/// One more camera sample of a pixel, the next in its order.
+void add_sample(const Job& job, int x, int y, PixelSum& sum, uint64_t& rays, PathRecord* record) {
+  const Sampler sampler(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2,
+                        uint32_t(sum.samples()));
+  const V2f film =
+      V2f(float(x) + 0.5f, float(y) + 0.5f) + job.filter.offset(sampler.two(kFilterDimension));
+  const PathSample sample = job.trace(job.scene, job.path, sampler, film, rays, record);
+  sum.add(sample.radiance, sample.alpha);
 }
 
 /// Calls back with the finished share, one tile at a time.
@@ -84,15 +87,24 @@ class Progress {
   int tiles_, done_ = 0;
 };
 
-uint64_t render_tiles(const Job& job, Film& film, Progress& progress, int columns, int rows) {
+uint64_t render_tiles(const Job& job, Sums& sums, Progress& progress, int columns, int rows) {
   std::atomic<uint64_t> rays{0};
   const auto one_tile = [&](int tile) {
     const FlushDenormals flush;
     uint64_t tile_rays = 0;
+    PathRecord record = sums.layers.blank();
+    PathRecord* const recorded = sums.layers.records() ? &record : nullptr;
     const int x0 = tile % columns * kTile, y0 = tile / columns * kTile;
-    for (int y = y0; y < std::min(y0 + kTile, film.height); ++y)
-      for (int x = x0; x < std::min(x0 + kTile, film.width); ++x)
-        render_pixel(job, x, y, &film.rgba[4 * (size_t(y) * film.width + x)], tile_rays);
+    for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
+      for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
+        const size_t pixel = size_t(y) * job.width + x;
+        for (int s = 0; s < job.samples; ++s) {
+          add_sample(job, x, y, sums.pixel[pixel], tile_rays, recorded);
+          if (!recorded) continue;
+          sums.layers.add(pixel, record);
+          sums.layers.clear(record);
+        }
+      }
     rays += tile_rays;
     progress.tile_done();
   };
@@ -103,6 +115,15 @@ uint64_t render_tiles(const Job& job, Film& film, Progress& progress, int column
       },
       tbb::simple_partitioner{});
   return rays;
+}
+
+Film developed(const Job& job, const Sums& sums) {
+  Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size())};
+  for (size_t p = 0; p < sums.pixel.size(); ++p)
+    for (int c = 0; c < 4; ++c) film.rgba[4 * p + size_t(c)] = sums.pixel[p].mean(c);
+  film.layer = sums.layers.finish(sums.pixel);
+  film.header = sums.layers.header();
+  return film;
 }
 
 }  // namespace
@@ -151,18 +172,19 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                 options.pixel_order,
                 seed,
                 uint32_t(std::bit_width(samples - 1)),
+                shot.render.width,
+                shot.render.height,
                 int(samples)};
-  Film film{shot.render.width, shot.render.height, {}};
-  film.rgba.resize(size_t(4) * film.width * film.height);
-  const int columns = (film.width + kTile - 1) / kTile, rows = (film.height + kTile - 1) / kTile;
+  Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height), LayerFilm(shot, frame, scene)};
+  const int columns = (job.width + kTile - 1) / kTile, rows = (job.height + kTile - 1) / kTile;
   Progress report(progress, columns * rows);
-  const uint64_t rays = render_tiles(job, film, report, columns, rows);
+  const uint64_t rays = render_tiles(job, sums, report, columns, rows);
   if (stats) {
-    stats->camera_samples = uint64_t(film.width) * film.height * samples;
+    stats->camera_samples = uint64_t(job.width) * job.height * samples;
     stats->rays = rays + photon_rays;
     stats->cpu_s = process_cpu_seconds() - cpu_start;
   }
-  return film;
+  return developed(job, sums);
 }
 
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, RenderStats* stats,

@@ -22,10 +22,21 @@ struct FrameGeometry {
   FoamFrame foam{};                       // small white spheres; may be empty
 };
 
+/// Channels of a frame besides the beauty, in the EXR as NAME.CHANNEL.
+struct FilmLayer {
+  enum class Precision { half, full };  // in the file, 16 or 32 bits
+  std::string name;
+  std::vector<std::string> channel;
+  Precision precision = Precision::half;
+  std::vector<float> value;  // channels x width x height, a pixel's side by side
+};
+
 /// One rendered frame: beauty in linear ACEScg with alpha, row-major from the top left.
 struct Film {
   int width = 0, height = 0;
   std::vector<float> rgba;  // 4 x width x height
+  std::vector<FilmLayer> layer{};
+  std::vector<std::pair<std::string, std::string>> header{};  // entries that layers need
 };
 
 struct RenderStats {
@@ -39,9 +50,9 @@ struct RenderStats {
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                   RenderStats* stats = nullptr, const std::function<void(double)>& progress = {});
 
-/// Half RGBA, ZIP, chromaticities of ACEScg, and the given attributes as strings ("shot", "frame",
-/// "seed", "samples", "version", "key.*"); no times or dates, so that equal inputs give equal
-/// files.
+/// Half RGBA, layers, ZIP, chromaticities of ACEScg, and the given attributes as strings ("shot",
+/// "frame", "seed", "samples", "version", "key.*"); no times or dates, so that equal inputs give
+/// equal files.
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
 /// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.

@@ -132,6 +132,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     : open_(shot.render.motion_blur ? shot.camera.shutter_open : 0),
       close_(shot.render.motion_blur ? shot.camera.shutter_close : 0),
       fps_(shot.timeline.fps),
+      layers_(shot.layers),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
       lights_(shot.light, options.environment == EnvironmentSampling::always
                               ? Lights::SampleEnvironment::always
@@ -154,7 +155,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   }
   const bool has_fluid = !geometry.fluid.triangle.empty();
   if (has_fluid)
-    add_object(geometry.fluid, "fluid surface", add_material(shot, shot.fluid.material));
+    add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material));
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
@@ -168,7 +169,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
           fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
                       "surface; use a cloth or diffuse one",
                       cloth.name, material));
-    add_object(cloth.mesh, fmt::format("cloth '{}'", cloth.name), index);
+    add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
   }
   for (SceneObject& object : objects_) build(object);
   find_bodies(has_fluid);
@@ -177,6 +178,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
 
 uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
   materials_.push_back(find_material(shot, name));
+  material_names_.push_back(name);
   return uint32_t(materials_.size() - 1);
 }
 
@@ -184,7 +186,7 @@ void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) material = o.material;
-  add_object(obstacle.mesh, fmt::format("obstacle '{}'", obstacle.name),
+  add_object(obstacle.mesh, obstacle.name, fmt::format("obstacle '{}'", obstacle.name),
              add_material(shot, material));
 }
 
@@ -234,9 +236,13 @@ bool Scene::moves_visibly(const TriangleMesh& mesh) const {
   return false;
 }
 
-void Scene::add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material) {
+void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
+                       uint32_t material) {
   check_mesh(mesh, what);
   SceneObject object;
+  object.name = name;
+  object.material_name = material_names_[material];
+  if (layers_.motion) object.velocity = mesh.velocity;
   object.triangle = mesh.triangle;
   object.normal = mesh.normal.empty() ? smooth_normals(mesh) : mesh.normal;
   object.uv = mesh.uv;
@@ -276,7 +282,10 @@ void Scene::add_foam(const FoamFrame& foam) {
   white.reflectance = V3f(kFoamReflectance);
   white.transmittance = white.absorption = V3f(0);
   materials_.push_back(white);
+  material_names_.push_back("foam");
   SceneObject object;
+  object.name = object.material_name = "foam";
+  if (layers_.motion) object.velocity = foam.velocity;
   object.material = uint32_t(materials_.size() - 1);
   const auto at = [&](double frames) {
     std::vector<Imath::V4f> spheres;
@@ -452,6 +461,16 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
 
 template Surface Scene::surface<false>(const Ray&, const Hit&) const;
 template Surface Scene::surface<true>(const Ray&, const Hit&) const;
+
+V3f Scene::velocity(const Hit& hit) const {
+  if (hit.kind != Hit::Kind::object) return V3f(0);
+  const SceneObject& object = objects_[hit.index];
+  if (object.velocity.empty()) return V3f(0);
+  if (!object.sphere.empty()) return object.velocity[hit.triangle];
+  const auto& t = object.triangle[hit.triangle];
+  return object.velocity[t.x] * (1 - hit.u - hit.v) + object.velocity[t.y] * hit.u +
+         object.velocity[t.z] * hit.v;
+}
 
 Bodies Scene::bodies_at(const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};

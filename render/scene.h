@@ -27,11 +27,13 @@ struct Medium {
 
 /// One mesh, or many spheres, at shutter open and, if it moves, at shutter close.
 struct SceneObject {
+  std::string name, material_name;
   std::vector<Imath::Vec3<uint32_t>> triangle;
   std::vector<V3f> position, position_close;     // m; the last entry is padding for Embree
   std::vector<Imath::V4f> sphere, sphere_close;  // m: centre and radius; in place of triangles
   std::vector<V3f> normal;                       // unit, per vertex; empty: flat
   std::vector<V2f> uv;                           // may be empty
+  std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
   Bodies body = 0;      // its bit, if it is a dielectric
@@ -83,6 +85,9 @@ class Scene {
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
   const SceneObject& object(uint32_t index) const { return objects_[index]; }
+  size_t object_count() const { return objects_.size(); }
+  /// m/s, of what was hit; 0 unless the layer of motion is asked for.
+  V3f velocity(const Hit& hit) const;
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
   Bodies fluid() const { return fluid_; }                          // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
@@ -91,7 +96,8 @@ class Scene {
  private:
   void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
-  void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
+  void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
+                  uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
   void build(SceneObject& object);
@@ -104,10 +110,12 @@ class Scene {
 
   double open_ = 0, close_ = 0;  // shutter relative to the frame, frames
   double fps_ = 24;
+  LayerSettings layers_;
   ShutterCamera camera_;
   Lights lights_;
   EmbreeDevice device_;
   std::vector<ShadingMaterial> materials_;
+  std::vector<std::string> material_names_;
   std::vector<SceneObject> objects_;
   bool has_ground_ = false;
   V3f ground_center_;

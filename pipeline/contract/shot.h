@@ -270,6 +270,7 @@ enum class LightType { rectangle, sphere, sun, environment };
 struct Light {
   LightType type = LightType::rectangle;
   std::string name = "light";
+  std::string group;               // of its layer; empty: its name
   V3f radiance{1, 1, 1};           // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
   V3d center{0, 3, 0};             // rectangle, sphere, m
   V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
@@ -315,6 +316,19 @@ struct RenderSettings {
   uint32_t seed = 1;
 };
 
+/// Layers that a frame's EXR holds besides the beauty; what is off costs nothing.
+struct LayerSettings {
+  bool albedo = false;        // albedo.RGB of what is seen, through water and glass
+  bool normal = false;        // N.XYZ of what is met first, unit, of the world
+  bool depth = false;         // depth.Z, m along the view; 1e10: nothing
+  bool position = false;      // P.XYZ, m, of the world
+  bool motion = false;        // motion.XY, pixels to the next frame, right and up
+  bool variance = false;      // variance.RGB of the beauty's error
+  bool samples = false;       // samples.Y, camera samples that the pixel got
+  bool light_groups = false;  // light_GROUP.RGB; they sum to the beauty
+  bool cryptomatte = false;   // CryptoObject, CryptoMaterial
+};
+
 /// A whole shot.
 struct Shot {
   std::string name;            // file stem
@@ -339,6 +353,7 @@ struct Shot {
   std::vector<Material> material;  // built-in water, cotton, ground unless redefined
   Ground ground;
   RenderSettings render;
+  LayerSettings layers;
 };
 
 /// What `automatic` and 0 stand for.

@@ -38,6 +38,8 @@ std::vector<Parameter> light_rows() {
           .identity(),
       row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
           .identity(),
+      row<&Light::group>("light", "group", "", none, render,
+                         "lights of one group share a layer; none: the light's name"),
       row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
                             "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
                             "environment with a map, its factor"),
@@ -122,11 +124,38 @@ std::vector<Parameter> film_rows() {
   };
 }
 
+std::vector<Parameter> layer_rows() {
+  return {
+      row<&LayerSettings::albedo>("layers", "albedo", "", none, render,
+                                  "albedo.RGB: of what is seen, also through water and glass"),
+      row<&LayerSettings::normal>("layers", "normal", "", none, render,
+                                  "N.XYZ: of what is met first, in the world's axes"),
+      row<&LayerSettings::depth>("layers", "depth", "", none, render,
+                                 "depth.Z: m along the view, of the nearest in the pixel; 1e10 "
+                                 "where there is nothing"),
+      row<&LayerSettings::position>("layers", "position", "", none, render,
+                                    "P.XYZ: m in the world, of the nearest in the pixel"),
+      row<&LayerSettings::motion>("layers", "motion", "", none, render,
+                                  "motion.XY: pixels to the right and up from this frame to the "
+                                  "next, of the nearest in the pixel"),
+      row<&LayerSettings::variance>("layers", "variance", "", none, render,
+                                    "variance.RGB: of the beauty, as its samples tell"),
+      row<&LayerSettings::samples>("layers", "samples", "", none, render,
+                                   "samples.Y: camera samples of the pixel"),
+      row<&LayerSettings::light_groups>(
+          "layers", "light_groups", "", none, render,
+          "light_GROUP.RGB: what the lights of a group add to the beauty; photons' light is "
+          "light_caustics"),
+      row<&LayerSettings::cryptomatte>("layers", "cryptomatte", "", none, render,
+                                       "CryptoObject and CryptoMaterial, of what is met first"),
+  };
+}
+
 }  // namespace
 
 std::vector<Parameter> picture_rows() {
   std::vector<Parameter> all;
-  for (const auto& part : {camera_rows(), light_rows(), material_rows(), film_rows()})
+  for (const auto& part : {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

@@ -411,6 +411,7 @@ const std::vector<Section>& sections() {
           "material", "", "A material; water, cotton and ground are built in.")),
       single<&Shot::ground>("ground", "A plane under the scene; the simulation does not know it."),
       single<&Shot::render>("render", "The picture."),
+      single<&Shot::layers>("layers", "What else a frame's EXR holds, for compositing."),
   };
   return table;
 }

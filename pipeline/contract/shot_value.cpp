@@ -458,7 +458,7 @@ std::string value_text(const Parameter& parameter, const void* field) {
       return number_text(as<double>(field));
     case Kind::text:
     case Kind::name:
-      return quoted(as<std::string>(field));
+      return as<std::string>(field).empty() ? "" : quoted(as<std::string>(field));
     case Kind::path:
     case Kind::mesh_files:
       return as<fs::path>(field).empty() ? "" : quoted(as<fs::path>(field).string());

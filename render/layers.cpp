@@ -1,0 +1,162 @@
+#include "render/layers.h"
+
+#include <algorithm>
+
+namespace drench {
+
+namespace {
+
+/// Where the camera's shutter stands in frames, without blur on the frame.
+double shutter(const Shot& shot, double at) { return shot.render.motion_blur ? at : 0; }
+
+std::vector<float> ids_of(const NameIndex& things) {
+  std::vector<float> ids;
+  for (const std::string& name : things.name) ids.push_back(cryptomatte_id(name));
+  return ids;
+}
+
+}  // namespace
+
+void NameIndex::add(const std::string& next) {
+  const auto found = std::find(name.begin(), name.end(), next);
+  index.push_back(int(found - name.begin()));
+  if (found == name.end()) name.push_back(next);
+}
+
+LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene)
+    : scene_(scene),
+      want_(shot.layers),
+      width_(shot.render.width),
+      height_(shot.render.height),
+      fps_(shot.timeline.fps),
+      shutter_open_(shutter(shot, shot.camera.shutter_open)),
+      shutter_frames_(shutter(shot, shot.camera.shutter_close) - shutter_open_),
+      frame_camera_(shot.camera, frame, frame + 1, width_, height_) {
+  const size_t pixels = size_t(width_) * height_;
+  if (records()) pixel_.resize(pixels);
+  if (want_.light_groups) light_.resize(pixels * scene.lights().groups().size(), Imath::V3d(0));
+  for (size_t k = 0; k < scene.object_count(); ++k) {
+    objects_.add(scene.object(uint32_t(k)).name);
+    materials_.add(scene.object(uint32_t(k)).material_name);
+  }
+  // Which layers there are must not differ between the frames of a shot.
+  for (uint32_t g = 0; want_.light_groups && g < scene.lights().groups().size(); ++g)
+    if (shot.render.photons > 0 || scene.lights().has_lights(g)) shown_groups_.push_back(g);
+  objects_.add("ground");
+  materials_.add(shot.ground.material);
+}
+
+bool LayerFilm::records() const {
+  return want_.albedo || want_.normal || want_.depth || want_.position || want_.motion ||
+         want_.light_groups || want_.cryptomatte;
+}
+
+PathRecord LayerFilm::blank() const {
+  PathRecord record;
+  if (want_.light_groups) record.light.resize(scene_.lights().groups().size());
+  clear(record);
+  return record;
+}
+
+void LayerFilm::clear(PathRecord& record) const {
+  std::fill(record.light.begin(), record.light.end(), V3f(0));
+  record.first = Hit{};
+  record.albedo = record.normal = V3f(0);
+  record.shaded = false;
+}
+
+V2f LayerFilm::motion_of(const PathRecord& record) const {
+  const V3f per_frame = scene_.velocity(record.first) * float(1 / fps_);
+  const double since_frame = shutter_open_ + record.time * shutter_frames_;
+  const V3f now = record.position - per_frame * float(since_frame);
+  const V2f from = frame_camera_.project(frame_camera_.open(), now);
+  const V2f to = frame_camera_.project(frame_camera_.close(), now + per_frame);
+  return {to.x - from.x, from.y - to.y};  // rows count down, the layer up
+}
+
+void LayerFilm::add(size_t pixel, const PathRecord& record) {
+  for (size_t g = 0; g < record.light.size(); ++g)
+    light_[pixel * record.light.size() + g] += Imath::V3d(record.light[g]);
+  Pixel& p = pixel_[pixel];
+  p.albedo += record.albedo;
+  if (record.first.kind != Hit::Kind::ground && record.first.kind != Hit::Kind::object) return;
+  p.normal += record.normal;
+  const CameraPose& eye = frame_camera_.open();
+  const float depth = dot(record.position - eye.position, eye.forward);
+  if (depth < p.nearest.depth) {
+    p.nearest = {depth, record.position, V2f(0)};
+    if (want_.motion) p.nearest.motion = motion_of(record);
+  }
+  if (!want_.cryptomatte) return;
+  const size_t object =
+      record.first.kind == Hit::Kind::ground ? scene_.object_count() : size_t(record.first.index);
+  p.object.add(objects_.index[object]);
+  p.material.add(materials_.index[object]);
+}
+
+FilmLayer LayerFilm::layer(const std::string& name, const std::vector<std::string>& channels,
+                           FilmLayer::Precision precision) const {
+  return {name, channels, precision,
+          std::vector<float>(channels.size() * size_t(width_) * height_)};
+}
+
+std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels) const {
+  using enum FilmLayer::Precision;
+  std::vector<FilmLayer> out;
+  const std::vector<std::string> rgb{"R", "G", "B"}, xyz{"X", "Y", "Z"};
+  const auto fill = [&](const std::string& name, const std::vector<std::string>& channels,
+                        FilmLayer::Precision precision, auto&& value) {
+    out.push_back(layer(name, channels, precision));
+    const size_t n = channels.size();
+    for (size_t p = 0; p < pixels.size(); ++p) {
+      const auto v = value(p);
+      for (size_t c = 0; c < n; ++c) out.back().value[n * p + c] = float(v[int(c)]);
+    }
+  };
+  const auto share = [&](const V3f& sum, size_t p) { return sum * (1.f / pixels[p].samples()); };
+  if (want_.albedo) fill("albedo", rgb, half, [&](size_t p) { return share(pixel_[p].albedo, p); });
+  if (want_.normal) fill("N", xyz, half, [&](size_t p) { return share(pixel_[p].normal, p); });
+  if (want_.depth) fill("depth", {"Z"}, full, [&](size_t p) { return &pixel_[p].nearest.depth; });
+  if (want_.position) fill("P", xyz, full, [&](size_t p) { return pixel_[p].nearest.position; });
+  if (want_.motion)
+    fill("motion", {"X", "Y"}, full, [&](size_t p) { return pixel_[p].nearest.motion; });
+  if (want_.variance)
+    fill("variance", rgb, full, [&](size_t p) {
+      return V3f(pixels[p].variance(0), pixels[p].variance(1), pixels[p].variance(2));
+    });
+  if (want_.samples)
+    fill("samples", {"Y"}, full, [&](size_t p) { return std::array{pixels[p].samples()}; });
+  const std::vector<std::string>& groups = scene_.lights().groups();
+  for (const uint32_t g : shown_groups_)
+    fill("light_" + groups[g], rgb, half,
+         [&](size_t p) { return light_[p * groups.size() + g] / pixels[p].samples(); });
+  if (want_.cryptomatte) {
+    add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);
+    add_matte(out, "CryptoMaterial", materials_, &Pixel::material, pixels);
+  }
+  return out;
+}
+
+void LayerFilm::add_matte(std::vector<FilmLayer>& out, const std::string& name,
+                          const NameIndex& things, CryptomattePixel Pixel::*which,
+                          const std::vector<PixelSum>& pixels) const {
+  const std::vector<float> ids = ids_of(things);
+  const size_t first = out.size();
+  for (int part = 0; part < CryptomattePixel::kRanks / 2; ++part)
+    out.push_back(
+        layer(name + "0" + std::to_string(part), {"R", "G", "B", "A"}, FilmLayer::Precision::full));
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    const auto ranked = (pixel_[p].*which).ranked(ids, pixels[p].samples());
+    for (size_t k = 0; k < ranked.size(); ++k) out[first + k / 4].value[4 * p + k % 4] = ranked[k];
+  }
+}
+
+std::vector<std::pair<std::string, std::string>> LayerFilm::header() const {
+  if (!want_.cryptomatte) return {};
+  auto out = cryptomatte_header("CryptoObject", objects_.name);
+  const auto material = cryptomatte_header("CryptoMaterial", materials_.name);
+  out.insert(out.end(), material.begin(), material.end());
+  return out;
+}
+
+}  // namespace drench

@@ -1,0 +1,74 @@
+#pragma once
+// The layers of a film besides its beauty: what each camera sample met, put together by pixel.
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/cryptomatte.h"
+#include "render/path.h"
+#include "render/pixel_sum.h"
+#include "render/renderer.h"
+#include "render/scene.h"
+
+namespace drench {
+
+/// Names without repetition, with a number for each of a list that may repeat them.
+struct NameIndex {
+  std::vector<std::string> name;
+  std::vector<int> index;
+
+  void add(const std::string& next);
+};
+
+/// Adds up what the path loop records.
+class LayerFilm {
+ public:
+  /// @param scene  must outlive this
+  LayerFilm(const Shot& shot, int frame, const Scene& scene);
+
+  /// Whether camera samples must be recorded at all.
+  bool records() const;
+  /// A record to hand to the path loop, cleared.
+  PathRecord blank() const;
+  void clear(PathRecord& record) const;
+  /// Adds a sample to a pixel, row by row from the top left.
+  void add(size_t pixel, const PathRecord& record);
+  /// The finished layers, those that were asked for.
+  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels) const;
+  /// Header entries that belong to them.
+  std::vector<std::pair<std::string, std::string>> header() const;
+
+ private:
+  /// What is nearest to the camera in a pixel: depths of an edge's two sides must not be mixed.
+  struct Nearest {
+    float depth = kNothing;
+    V3f position{0, 0, 0};
+    V2f motion{0, 0};
+  };
+  struct Pixel {
+    V3f albedo{0, 0, 0}, normal{0, 0, 0};
+    Nearest nearest;
+    CryptomattePixel object, material;
+  };
+  static constexpr float kNothing = 1e10f;
+
+  V2f motion_of(const PathRecord& record) const;
+  FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
+                  FilmLayer::Precision precision) const;
+  void add_matte(std::vector<FilmLayer>& out, const std::string& name, const NameIndex& things,
+                 CryptomattePixel Pixel::*which, const std::vector<PixelSum>& pixels) const;
+
+  const Scene& scene_;
+  LayerSettings want_;
+  std::vector<uint32_t> shown_groups_;
+  int width_, height_;
+  double fps_, shutter_open_, shutter_frames_;
+  ShutterCamera frame_camera_;  // at this frame and the next
+  NameIndex objects_, materials_;
+  std::vector<Pixel> pixel_;
+  std::vector<Imath::V3d> light_;  // by pixel, then group
+};
+
+}  // namespace drench
