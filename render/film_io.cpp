@@ -61,7 +61,7 @@ void check_film(const Film& film) {
 /// Channels of a picture and the values they are written from.
 class Channels {
  public:
-  Channels(Imf::Header& header, const Film& film) : header_(header), width_(size_t(film.width)) {
+  Channels(Imf::Header& header, const Film& film) : header_(header) {
     add("", {"R", "G", "B", "A"}, FilmLayer::Precision::half, film.rgba);
     for (const FilmLayer& layer : film.layer)
       add(layer.name + ".", layer.channel, layer.precision, layer.value);
@@ -87,13 +87,13 @@ class Channels {
         throw Error(fmt::format("two layers have a channel {}; give one another name", name));
       header_.channels().insert(name, Imf::Channel(type));
       // Imf takes no pointer to const, but writing a file only reads.
-      char* const from = reinterpret_cast<char*>(const_cast<Value*>(values.data() + c));
-      buffer_.insert(name, Imf::Slice(type, from, stride, stride * width_));
+      const Imath::Box2i& window = header_.dataWindow();
+      buffer_.insert(name, Imf::Slice::Make(type, const_cast<Value*>(values.data() + c), window,
+                                            stride, stride * size_t(window.size().x + 1)));
     }
   }
 
   Imf::Header& header_;
-  size_t width_;
   Imf::FrameBuffer buffer_;
   std::deque<std::vector<half>> halves_;
   uint64_t clamped_ = 0;
@@ -151,6 +151,12 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes) {
   check_film(film);
   Imf::Header header(film.width, film.height);
+  const FilmWindow& window = film.window;
+  if (window.frame_width > 0) {
+    header.displayWindow() = {{0, 0}, {window.frame_width - 1, window.frame_height - 1}};
+    header.dataWindow() = {{window.x, window.y},
+                           {window.x + film.width - 1, window.y + film.height - 1}};
+  }
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::addChromaticities(header, acescg_chromaticities());
   for (const auto* entries : {&attributes, &film.header})

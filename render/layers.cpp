@@ -23,15 +23,15 @@ void NameIndex::add(const std::string& next) {
   if (found == name.end()) name.push_back(next);
 }
 
-LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene)
+LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width, int height)
     : scene_(scene),
       want_(shot.layers),
-      width_(shot.render.width),
-      height_(shot.render.height),
+      width_(width),
+      height_(height),
       fps_(shot.timeline.fps),
       shutter_open_(shutter(shot, shot.camera.shutter_open)),
       shutter_frames_(shutter(shot, shot.camera.shutter_close) - shutter_open_),
-      frame_camera_(shot.camera, frame, frame + 1, width_, height_) {
+      frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height) {
   const size_t pixels = size_t(width_) * height_;
   if (records()) pixel_.resize(pixels);
   if (want_.light_groups) light_.resize(pixels * scene.lights().groups().size(), Imath::V3d(0));

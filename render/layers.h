@@ -25,8 +25,9 @@ struct NameIndex {
 /// Adds up what the path loop records.
 class LayerFilm {
  public:
-  /// @param scene  must outlive this
-  LayerFilm(const Shot& shot, int frame, const Scene& scene);
+  /// @param scene          must outlive this
+  /// @param width, height  of the part of the frame that is rendered
+  LayerFilm(const Shot& shot, int frame, const Scene& scene, int width, int height);
 
   /// Whether camera samples must be recorded at all.
   bool records() const;

@@ -16,6 +16,7 @@
 #include "render/path.h"
 #include "render/photons.h"
 #include "render/pixel_sum.h"
+#include "render/sample_plan.h"
 
 namespace drench {
 
@@ -36,6 +37,10 @@ void check_settings(const RenderSettings& r) {
                             r.height, kLargest));
   if (r.samples < 1 || r.samples > kMostSamples)
     throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, kMostSamples));
+  if (r.crop_max != V2i(0, 0) &&
+      !(r.crop_min.x >= 0 && r.crop_min.y >= 0 && r.crop_min.x < r.crop_max.x &&
+        r.crop_min.y < r.crop_max.y && r.crop_max.x <= r.width && r.crop_max.y <= r.height))
+    throw Error("render: crop_min and crop_max give no part of the picture; mend them");
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
 }
 
@@ -52,7 +57,11 @@ struct Job {
   PixelFilter filter;
   PixelOrder order;
   uint32_t seed, slots_log2;
-  int width, height, samples;
+  FilmWindow window;
+  int width, height;  // pixels, of the window
+
+  int columns() const { return (width + kTile - 1) / kTile; }  // of tiles
+  int rows() const { return (height + kTile - 1) / kTile; }
 };
 
 /// What the samples of a picture have added up to.
@@ -71,54 +80,74 @@ void add_sample(const Job& job, int x, int y, PixelSum& sum, uint64_t& rays, Pat
   sum.add(sample.radiance, sample.alpha);
 }
 
-/// Calls back with the finished share, one tile at a time.
+/// Calls back with the finished share of the samples that are expected, one tile at a time.
 class Progress {
  public:
-  Progress(const std::function<void(double)>& report, int tiles) : report_(report), tiles_(tiles) {}
-  void tile_done() {
-    if (!report_) return;
+  explicit Progress(const std::function<void(double)>& report) : report_(report) {}
+  void expect(double samples) { expected_ = samples; }
+  void done(uint64_t samples) {
     const std::lock_guard lock(mutex_);
-    report_(double(++done_) / tiles_);
+    done_ += samples;
+    // What is expected may grow; what has been reported does not fall.
+    share_ = std::max(share_, std::min(double(done_) / expected_, 1.));
+    if (report_) report_(share_);
   }
+  uint64_t samples() const { return done_; }
 
  private:
   const std::function<void(double)>& report_;
   std::mutex mutex_;
-  int tiles_, done_ = 0;
+  uint64_t done_ = 0;
+  double expected_ = 1, share_ = 0;
 };
 
-uint64_t render_tiles(const Job& job, Sums& sums, Progress& progress, int columns, int rows) {
-  std::atomic<uint64_t> rays{0};
-  const auto one_tile = [&](int tile) {
-    const FlushDenormals flush;
-    uint64_t tile_rays = 0;
-    PathRecord record = sums.layers.blank();
-    PathRecord* const recorded = sums.layers.records() ? &record : nullptr;
-    const int x0 = tile % columns * kTile, y0 = tile / columns * kTile;
-    for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
-      for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
-        const size_t pixel = size_t(y) * job.width + x;
-        for (int s = 0; s < job.samples; ++s) {
-          add_sample(job, x, y, sums.pixel[pixel], tile_rays, recorded);
-          if (!recorded) continue;
-          sums.layers.add(pixel, record);
-          sums.layers.clear(record);
-        }
+/// Brings the pixels of a tile to the numbers of samples that are planned. @return those added
+uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sums, uint64_t& rays) {
+  const FlushDenormals flush;
+  PathRecord record = sums.layers.blank();
+  PathRecord* const recorded = sums.layers.records() ? &record : nullptr;
+  uint64_t added = 0;
+  const int x0 = tile % job.columns() * kTile, y0 = tile / job.columns() * kTile;
+  for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
+    for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
+      const size_t pixel = size_t(y) * job.width + x;
+      for (int s = sums.pixel[pixel].samples(); s < plan.wanted(pixel); ++s, ++added) {
+        add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
+        if (!recorded) continue;
+        sums.layers.add(pixel, record);
+        sums.layers.clear(record);
       }
-    rays += tile_rays;
-    progress.tile_done();
-  };
+    }
+  return added;
+}
+
+uint64_t render_tiles(const Job& job, const SamplePlan& plan, Sums& sums, Progress& progress) {
+  std::atomic<uint64_t> rays{0};
   tbb::parallel_for(
-      tbb::blocked_range<int>(0, columns * rows, 1),
+      tbb::blocked_range<int>(0, job.columns() * job.rows(), 1),
       [&](const tbb::blocked_range<int>& range) {
-        for (int tile = range.begin(); tile < range.end(); ++tile) one_tile(tile);
+        uint64_t traced = 0;
+        for (int tile = range.begin(); tile < range.end(); ++tile)
+          progress.done(render_tile(job, plan, tile, sums, traced));
+        rays += traced;
       },
       tbb::simple_partitioner{});
   return rays;
 }
 
+double picture_error(const std::vector<PixelSum>& pixels) {
+  double sum = 0;
+  for (const PixelSum& pixel : pixels) sum += relative_error(pixel);
+  return sum / double(pixels.size());
+}
+
+FilmWindow window_of(const RenderSettings& r) {
+  if (r.crop_max == V2i(0, 0)) return {};
+  return {r.crop_min.x, r.crop_min.y, r.width, r.height};
+}
+
 Film developed(const Job& job, const Sums& sums) {
-  Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size())};
+  Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
   for (size_t p = 0; p < sums.pixel.size(); ++p)
     for (int c = 0; c < 4; ++c) film.rgba[4 * p + size_t(c)] = sums.pixel[p].mean(c);
   film.layer = sums.layers.finish(sums.pixel);
@@ -157,7 +186,6 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;
   path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
-  const uint32_t samples = uint32_t(shot.render.samples);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
   uint64_t photon_rays = 0;
   PhotonMap photons;
@@ -165,24 +193,29 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
     photons = trace_photons(scene, seed, photon_count(shot.render), photon_rays);
     path.photons = &photons;
   }
+  const FilmWindow window = window_of(shot.render);
+  const bool whole = window.frame_width == 0;
   const Job job{scene,
                 path,
                 path_function(scene.features() | options.force_features),
                 PixelFilter(),
                 options.pixel_order,
                 seed,
-                uint32_t(std::bit_width(samples - 1)),
-                shot.render.width,
-                shot.render.height,
-                int(samples)};
-  Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height), LayerFilm(shot, frame, scene)};
-  const int columns = (job.width + kTile - 1) / kTile, rows = (job.height + kTile - 1) / kTile;
-  Progress report(progress, columns * rows);
-  const uint64_t rays = render_tiles(job, sums, report, columns, rows);
+                uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
+                window,
+                whole ? shot.render.width : shot.render.crop_max.x - window.x,
+                whole ? shot.render.height : shot.render.crop_max.y - window.y};
+  Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
+            LayerFilm(shot, frame, scene, job.width, job.height)};
+  SamplePlan plan(job.width, job.height, shot.render.samples, shot.render.error);
+  Progress report(progress);
+  uint64_t rays = photon_rays;
+  while (plan.next(sums.pixel)) {
+    report.expect(plan.expected());
+    rays += render_tiles(job, plan, sums, report);
+  }
   if (stats) {
-    stats->camera_samples = uint64_t(job.width) * job.height * samples;
-    stats->rays = rays + photon_rays;
-    stats->cpu_s = process_cpu_seconds() - cpu_start;
+    *stats = {report.samples(), rays, picture_error(sums.pixel), process_cpu_seconds() - cpu_start};
   }
   return developed(job, sums);
 }

@@ -31,17 +31,26 @@ struct FilmLayer {
   std::vector<float> value;  // channels x width x height, a pixel's side by side
 };
 
-/// One rendered frame: beauty in linear ACEScg with alpha, row-major from the top left.
+/// Where a film lies in the whole frame; a size of 0: it is the whole frame.
+struct FilmWindow {
+  int x = 0, y = 0;  // of its top left pixel
+  int frame_width = 0, frame_height = 0;
+};
+
+/// One rendered frame or a part of it: beauty in linear ACEScg with alpha, row-major from the top
+/// left.
 struct Film {
   int width = 0, height = 0;
   std::vector<float> rgba;  // 4 x width x height
+  FilmWindow window{};
   std::vector<FilmLayer> layer{};
   std::vector<std::pair<std::string, std::string>> header{};  // entries that layers need
 };
 
 struct RenderStats {
   uint64_t camera_samples = 0, rays = 0;
-  double cpu_s = 0;  // of the whole process during the call
+  double relative_mse = 0;  // of the frame, as its samples tell; 0 with fewer than 16 a pixel
+  double cpu_s = 0;         // of the whole process during the call
 };
 
 /// Path-traces one frame. The same bits for any thread count and tile order.

@@ -16,6 +16,7 @@ class PictureChecker : CheckBase {
 
   void check() const {
     check_camera();
+    check_crop();
     for (size_t i = 0; i < shot_.light.size(); ++i) check_light(i);
     for (size_t i = 0; i < shot_.material.size(); ++i) check_material(i);
     check_material_uses();
@@ -48,6 +49,19 @@ class PictureChecker : CheckBase {
                                       text_of(camera.up), frame));
       }
     }
+  }
+
+  void check_crop() const {
+    const RenderSettings& r = shot_.render;
+    if (r.crop_max == V2i(0, 0) && r.crop_min == V2i(0, 0)) return;
+    if (r.crop_min.x < r.crop_max.x && r.crop_min.y < r.crop_max.y && r.crop_max.x <= r.width &&
+        r.crop_max.y <= r.height)
+      return;
+    fail("render.crop_max",
+         fmt::format("render.crop_min is [{}, {}] and render.crop_max is [{}, {}]; that is no part "
+                     "of a frame of {} x {} pixels. Let max be greater than min and no greater "
+                     "than the frame",
+                     r.crop_min.x, r.crop_min.y, r.crop_max.x, r.crop_max.y, r.width, r.height));
   }
 
   void check_light(size_t i) const {

@@ -308,9 +308,11 @@ struct Ground {
 };
 
 struct RenderSettings {
-  int width = 960, height = 540;  // pixels
-  int samples = 64;               // camera samples a pixel
-  int depth = 8;                  // diffuse bounces; specular ones end by roulette
+  int width = 960, height = 540;       // pixels
+  V2i crop_min{0, 0}, crop_max{0, 0};  // pixels of it to render, from the top left; max is beyond
+  int samples = 64;                    // camera samples a pixel, at most where there is a target
+  double error = 0;                    // relative MSE to sample until; 0: all samples everywhere
+  int depth = 8;                       // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
   double photons = 0.05;  // of caustics, for each camera sample; 0: caustics by paths alone
   uint32_t seed = 1;

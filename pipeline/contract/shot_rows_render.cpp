@@ -111,8 +111,17 @@ std::vector<Parameter> film_rows() {
 
       row<&RenderSettings::width>("render", "width", "pixel", {1, 16384}, render, "of a frame"),
       row<&RenderSettings::height>("render", "height", "pixel", {1, 16384}, render, "of a frame"),
-      row<&RenderSettings::samples>("render", "samples", "", {1, 1e6}, render,
-                                    "camera samples a pixel"),
+      row<&RenderSettings::crop_min>("render", "crop_min", "pixel", {0, 16384}, render,
+                                     "first column and row to render, from the top left"),
+      row<&RenderSettings::crop_max>("render", "crop_max", "pixel", {0, 16384}, render,
+                                     "first column and row beyond; [0, 0]: the whole frame"),
+      row<&RenderSettings::samples>(
+          "render", "samples", "", {1, 1e6}, render,
+          "camera samples a pixel, or with an error the most a pixel gets"),
+      row<&RenderSettings::error>(
+          "render", "error", "", {0, 1}, render,
+          "relative MSE at which a frame is good enough, as its samples tell: mean of error^2 / "
+          "(colour^2 + 0.01); 0: every pixel gets all samples"),
       row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,

@@ -188,13 +188,19 @@ class ShotStages final : public Stages {
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
     all.emplace_back("samples", std::to_string(shot_.render.samples));
+    if (shot_.render.error > 0)
+      all.emplace_back("relative_mse", fmt::format("{:.3g}", stats.relative_mse));
     all.emplace_back("photons", fmt::format("{}", shot_.render.photons));
     StageReport report;
     report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, all));
-    report.json =
-        json{{"camera_samples", stats.camera_samples}, {"rays", stats.rays}, {"cpu_s", stats.cpu_s}}
-            .dump();
-    report.line = fmt::format("camera_samples={} rays={}", stats.camera_samples, stats.rays);
+    report.json = json{
+        {"camera_samples", stats.camera_samples},
+        {"rays", stats.rays},
+        {"relative_mse", stats.relative_mse},
+        {"cpu_s",
+         stats.cpu_s}}.dump();
+    report.line = fmt::format("camera_samples={} rays={} relative_mse={:.2g}", stats.camera_samples,
+                              stats.rays, stats.relative_mse);
     return report;
   }
 
