@@ -26,6 +26,7 @@ void NameIndex::add(const std::string& next) {
 LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width, int height)
     : scene_(scene),
       want_(shot.layers),
+      features_(shot.render.denoise),
       width_(width),
       height_(height),
       fps_(shot.timeline.fps),
@@ -47,8 +48,8 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
 }
 
 bool LayerFilm::records() const {
-  return want_.albedo || want_.normal || want_.depth || want_.position || want_.motion ||
-         want_.light_groups || want_.cryptomatte;
+  return features_ || want_.albedo || want_.normal || want_.depth || want_.position ||
+         want_.motion || want_.light_groups || want_.cryptomatte;
 }
 
 PathRecord LayerFilm::blank() const {
@@ -79,10 +80,14 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
     light_[pixel * record.light.size() + g] += Imath::V3d(record.light[g]);
   Pixel& p = pixel_[pixel];
   p.albedo += record.albedo;
+  p.albedo2 += record.albedo * record.albedo;
   if (record.first.kind != Hit::Kind::ground && record.first.kind != Hit::Kind::object) return;
   p.normal += record.normal;
+  p.normal2 += record.normal * record.normal;
   const CameraPose& eye = frame_camera_.open();
   const float depth = dot(record.position - eye.position, eye.forward);
+  p.inverse_depth += 1 / depth;
+  p.inverse_depth2 += 1 / (depth * depth);
   if (depth < p.nearest.depth) {
     p.nearest = {depth, record.position, V2f(0)};
     if (want_.motion) p.nearest.motion = motion_of(record);
@@ -149,6 +154,32 @@ void LayerFilm::add_matte(std::vector<FilmLayer>& out, const std::string& name,
     const auto ranked = (pixel_[p].*which).ranked(ids, pixels[p].samples());
     for (size_t k = 0; k < ranked.size(); ++k) out[first + k / 4].value[4 * p + k % 4] = ranked[k];
   }
+}
+
+void LayerFilm::add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const {
+  const auto add = [&](auto&& sum, auto&& squares, double unit) {
+    NoisyPicture::Plane mean(pixels.size()), variance(pixels.size());
+    for (size_t p = 0; p < pixels.size(); ++p) {
+      const double n = pixels[p].samples(), m = sum(pixel_[p]) / n;
+      mean[p] = float(m / unit);
+      variance[p] = float(std::max(0., squares(pixel_[p]) / n - m * m) / ((n - 1) * unit * unit));
+    }
+    picture.feature.push_back(std::move(mean));
+    picture.feature_variance.push_back(std::move(variance));
+  };
+  for (int c = 0; c < 3; ++c)
+    add([c](const Pixel& p) { return double(p.albedo[c]); },
+        [c](const Pixel& p) { return double(p.albedo2[c]); }, 1);
+  for (int c = 0; c < 3; ++c)
+    add([c](const Pixel& p) { return double(p.normal[c]); },
+        [c](const Pixel& p) { return double(p.normal2[c]); }, 1);
+  double largest_nearness = 0;
+  for (size_t p = 0; p < pixels.size(); ++p)
+    largest_nearness =
+        std::max(largest_nearness, double(pixel_[p].inverse_depth) / pixels[p].samples());
+  add([](const Pixel& p) { return double(p.inverse_depth); },
+      [](const Pixel& p) { return double(p.inverse_depth2); },
+      largest_nearness > 0 ? largest_nearness : 1);
 }
 
 std::vector<std::pair<std::string, std::string>> LayerFilm::header() const {

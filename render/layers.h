@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/cryptomatte.h"
+#include "render/denoise.h"
 #include "render/path.h"
 #include "render/pixel_sum.h"
 #include "render/renderer.h"
@@ -38,6 +39,8 @@ class LayerFilm {
   void add(size_t pixel, const PathRecord& record);
   /// The finished layers, those that were asked for.
   std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels) const;
+  /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
+  void add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const;
   /// Header entries that belong to them.
   std::vector<std::pair<std::string, std::string>> header() const;
 
@@ -50,6 +53,8 @@ class LayerFilm {
   };
   struct Pixel {
     V3f albedo{0, 0, 0}, normal{0, 0, 0};
+    V3f albedo2{0, 0, 0}, normal2{0, 0, 0};  // sums of squares
+    float inverse_depth = 0, inverse_depth2 = 0;
     Nearest nearest;
     CryptomattePixel object, material;
   };
@@ -63,6 +68,7 @@ class LayerFilm {
 
   const Scene& scene_;
   LayerSettings want_;
+  bool features_;
   std::vector<uint32_t> shown_groups_;
   int width_, height_;
   double fps_, shutter_open_, shutter_frames_;

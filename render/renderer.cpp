@@ -41,6 +41,9 @@ void check_settings(const RenderSettings& r) {
       !(r.crop_min.x >= 0 && r.crop_min.y >= 0 && r.crop_min.x < r.crop_max.x &&
         r.crop_min.y < r.crop_max.y && r.crop_max.x <= r.width && r.crop_max.y <= r.height))
     throw Error("render: crop_min and crop_max give no part of the picture; mend them");
+  if (r.denoise && r.samples < 2 * PixelSum::kBatch)
+    throw Error(fmt::format("render.denoise needs at least {} samples, render.samples is {}",
+                            2 * PixelSum::kBatch, r.samples));
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
 }
 
@@ -146,6 +149,45 @@ FilmWindow window_of(const RenderSettings& r) {
   return {r.crop_min.x, r.crop_min.y, r.width, r.height};
 }
 
+/// Mean of the 3 x 3 pixels around each: so few batches tell a pixel's own variance badly.
+NoisyPicture::Plane smoothed(const NoisyPicture::Plane& from, int width, int height) {
+  NoisyPicture::Plane out(from.size());
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      float sum = 0;
+      int count = 0;
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height - 1); ++v)
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width - 1); ++u, ++count)
+          sum += from[size_t(v) * width + u];
+      out[size_t(y) * width + x] = sum / float(count);
+    }
+  return out;
+}
+
+/// Puts the denoised beauty in the place of the noisy one, which becomes a layer.
+void denoise_film(const Sums& sums, Film& film) {
+  NoisyPicture picture;
+  picture.width = film.width;
+  picture.height = film.height;
+  for (int c = 0; c < 3; ++c) {
+    NoisyPicture::Plane variance;
+    for (const PixelSum& pixel : sums.pixel) {
+      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
+      variance.push_back(2 * pixel.variance(c));
+    }
+    picture.variance[c] = smoothed(variance, film.width, film.height);
+  }
+  sums.layers.add_features(picture, sums.pixel);
+  const std::vector<NoisyPicture::Plane> clean = denoise(picture);
+  FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
+  for (size_t p = 0; p < sums.pixel.size(); ++p)
+    for (size_t c = 0; c < 3; ++c) {
+      noisy.value.push_back(film.rgba[4 * p + c]);
+      film.rgba[4 * p + c] = clean[c][p];
+    }
+  film.layer.push_back(std::move(noisy));
+}
+
 Film developed(const Job& job, const Sums& sums) {
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
   for (size_t p = 0; p < sums.pixel.size(); ++p)
@@ -214,10 +256,12 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
     report.expect(plan.expected());
     rays += render_tiles(job, plan, sums, report);
   }
+  Film film = developed(job, sums);
+  if (shot.render.denoise) denoise_film(sums, film);
   if (stats) {
     *stats = {report.samples(), rays, picture_error(sums.pixel), process_cpu_seconds() - cpu_start};
   }
-  return developed(job, sums);
+  return film;
 }
 
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, RenderStats* stats,

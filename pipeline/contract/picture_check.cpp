@@ -17,6 +17,7 @@ class PictureChecker : CheckBase {
   void check() const {
     check_camera();
     check_crop();
+    check_denoise();
     for (size_t i = 0; i < shot_.light.size(); ++i) check_light(i);
     for (size_t i = 0; i < shot_.material.size(); ++i) check_material(i);
     check_material_uses();
@@ -62,6 +63,15 @@ class PictureChecker : CheckBase {
                      "of a frame of {} x {} pixels. Let max be greater than min and no greater "
                      "than the frame",
                      r.crop_min.x, r.crop_min.y, r.crop_max.x, r.crop_max.y, r.width, r.height));
+  }
+
+  void check_denoise() const {
+    const RenderSettings& r = shot_.render;
+    if (!r.denoise || r.samples >= 16) return;
+    fail("render.denoise",
+         fmt::format("render.denoise needs at least 16 samples a pixel to tell noise from detail; "
+                     "render.samples is {}. Give more or leave denoise out",
+                     r.samples));
   }
 
   void check_light(size_t i) const {

@@ -312,6 +312,7 @@ struct RenderSettings {
   V2i crop_min{0, 0}, crop_max{0, 0};  // pixels of it to render, from the top left; max is beyond
   int samples = 64;                    // camera samples a pixel, at most where there is a target
   double error = 0;                    // relative MSE to sample until; 0: all samples everywhere
+  bool denoise = false;                // of the beauty, by its layers' help
   int depth = 8;                       // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
   double photons = 0.05;  // of caustics, for each camera sample; 0: caustics by paths alone

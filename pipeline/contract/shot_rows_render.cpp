@@ -122,6 +122,8 @@ std::vector<Parameter> film_rows() {
           "render", "error", "", {0, 1}, render,
           "relative MSE at which a frame is good enough, as its samples tell: mean of error^2 / "
           "(colour^2 + 0.01); 0: every pixel gets all samples"),
+      row<&RenderSettings::denoise>("render", "denoise", "", none, render,
+                                    "smooths the beauty's noise; what was rendered is noisy.RGB"),
       row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,

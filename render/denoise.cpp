@@ -1,0 +1,226 @@
+#include "render/denoise.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+namespace drench {
+
+namespace {
+
+using Plane = NoisyPicture::Plane;
+
+constexpr int kTile = 32;  // pixels a side of what is worked on at once
+constexpr int kReach = 7;  // of the window
+constexpr int kPatch = 3;  // of the patches compared
+constexpr int kPad = kReach + kPatch;
+constexpr int kPadded = kTile + 2 * kPad;
+constexpr int kCompared = kTile + 2 * kPatch;
+/// Patches this many standard deviations apart (squared) count little.
+constexpr float kBandwidth2 = 1;
+constexpr float kLeastVariance = 1e-10f;
+/// Ridge of a feature without noise, in units of its square.
+constexpr float kRidge = 1e-4f;
+constexpr int kMostFeatures = 9;               // with the two of the place in the picture
+constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
+constexpr int kRows = kMostTerms + 3;          // and the colours
+
+using TileRow = std::array<float, kTile>;
+
+/// One plane around a tile, the picture's edge pixels repeated beyond it.
+struct Padded {
+  std::array<float, kPadded * kPadded> value;
+
+  void take(const Plane& from, int x0, int y0, int width, int height) {
+    for (int y = 0; y < kPadded; ++y)
+      for (int x = 0; x < kPadded; ++x)
+        value[size_t(y * kPadded + x)] =
+            from[size_t(std::clamp(y0 + y - kPad, 0, height - 1)) * size_t(width) +
+                 size_t(std::clamp(x0 + x - kPad, 0, width - 1))];
+  }
+  /// Row of the tile's coordinates, which start at 0 within the padding.
+  const float* row(int x, int y) const { return &value[size_t((y + kPad) * kPadded + x + kPad)]; }
+};
+
+struct TileInput {
+  Padded half[2][3], variance[3];
+  std::vector<Padded> feature, feature_variance;
+};
+
+/// Sums over 2 kPatch + 1 values in a row, and then in a column.
+void sum_patches(const std::array<float, kCompared * kCompared>& distance,
+                 std::array<float, kTile * kTile>& out) {
+  std::array<float, kCompared * kTile> rows;
+  for (int y = 0; y < kCompared; ++y)
+    for (int x = 0; x < kTile; ++x) {
+      float sum = 0;
+      for (int k = 0; k <= 2 * kPatch; ++k) sum += distance[size_t(y * kCompared + x + k)];
+      rows[size_t(y * kTile + x)] = sum;
+    }
+  for (int y = 0; y < kTile; ++y)
+    for (int x = 0; x < kTile; ++x) {
+      float sum = 0;
+      for (int k = 0; k <= 2 * kPatch; ++k) sum += rows[size_t((y + k) * kTile + x)];
+      out[size_t(y * kTile + x)] = sum;
+    }
+}
+
+/// How much the pixel at an offset counts for each of the tile, by the looks of one half.
+void weigh(const TileInput& tile, int half, int dx, int dy,
+           std::array<float, kTile * kTile>& weight) {
+  std::array<float, kCompared * kCompared> distance{};
+  for (int c = 0; c < 3; ++c)
+    for (int y = 0; y < kCompared; ++y) {
+      const float *a = tile.half[half][c].row(-kPatch, y - kPatch),
+                  *b = tile.half[half][c].row(dx - kPatch, y - kPatch + dy),
+                  *va = tile.variance[c].row(-kPatch, y - kPatch),
+                  *vb = tile.variance[c].row(dx - kPatch, y - kPatch + dy);
+      float* out = &distance[size_t(y * kCompared)];
+      for (int x = 0; x < kCompared; ++x) {
+        const float d = a[x] - b[x];
+        out[x] += (d * d - (va[x] + std::min(va[x], vb[x]))) /
+                  (kLeastVariance + kBandwidth2 * (va[x] + vb[x]));
+      }
+    }
+  sum_patches(distance, weight);
+  constexpr float kShare = 1.f / (3 * (2 * kPatch + 1) * (2 * kPatch + 1));
+  for (float& w : weight) w = std::exp(-std::max(0.f, w * kShare));
+}
+
+/// Sums of the normal equations for a row of pixels: the upper triangle of terms x (terms +
+/// colours).
+struct NormalEquations {
+  std::array<std::array<TileRow, kRows>, kMostTerms> sum;
+  std::array<TileRow, kMostFeatures> noise;  // variance of features, weighed
+};
+
+/// Solves for one pixel by Cholesky's factors. @return the constants: the colours at the pixel
+std::array<float, 3> solve(const NormalEquations& equations, int x, int terms) {
+  double a[kMostTerms][kRows];
+  for (int i = 0; i < terms; ++i)
+    for (int j = i; j < terms + 3; ++j)
+      a[i][j] = double(equations.sum[size_t(i)][size_t(j)][size_t(x)]);
+  const double total = a[0][0];
+  for (int i = 1; i < terms; ++i)
+    a[i][i] += double(equations.noise[size_t(i - 1)][size_t(x)]) + kRidge * total;
+  for (int i = 0; i < terms; ++i)
+    for (int k = i + 1; k < terms; ++k) {
+      const double factor = a[i][k] / a[i][i];
+      for (int j = k; j < terms + 3; ++j) a[k][j] -= factor * a[i][j];
+    }
+  std::array<float, 3> out;
+  for (int c = 0; c < 3; ++c) {
+    double v[kMostTerms];
+    for (int i = terms - 1; i >= 0; --i) {
+      v[i] = a[i][terms + c];
+      for (int j = i + 1; j < terms; ++j) v[i] -= a[i][j] * v[j];
+      v[i] /= a[i][i];
+    }
+    out[size_t(c)] = float(v[0]);
+  }
+  return out;
+}
+
+class TileDenoiser {
+ public:
+  TileDenoiser(const NoisyPicture& picture, int x0, int y0)
+      : picture_(picture), x0_(x0), y0_(y0), terms_(int(picture.feature.size()) + 3) {
+    const auto take = [&](Padded& to, const Plane& from) {
+      to.take(from, x0, y0, picture.width, picture.height);
+    };
+    for (int c = 0; c < 3; ++c) {
+      for (int h = 0; h < 2; ++h) take(tile_.half[h][c], picture.half[h][c]);
+      take(tile_.variance[c], picture.variance[c]);
+    }
+    tile_.feature.resize(picture.feature.size());
+    tile_.feature_variance.resize(picture.feature.size());
+    for (size_t f = 0; f < picture.feature.size(); ++f) {
+      take(tile_.feature[f], picture.feature[f]);
+      take(tile_.feature_variance[f], picture.feature_variance[f]);
+    }
+  }
+
+  void run(std::vector<Plane>& out) {
+    for (int h = 0; h < 2; ++h) {
+      size_t k = 0;
+      for (int dy = -kReach; dy <= kReach; ++dy)
+        for (int dx = -kReach; dx <= kReach; ++dx) weigh(tile_, 1 - h, dx, dy, weight_[k++]);
+      for (int y = 0; y < std::min(kTile, picture_.height - y0_); ++y) fit_row(h, y, out);
+    }
+  }
+
+ private:
+  void fit_row(int half, int y, std::vector<Plane>& out) {
+    for (auto& row : equations_.sum)
+      for (TileRow& sum : row) sum.fill(0);
+    for (TileRow& noise : equations_.noise) noise.fill(0);
+    size_t k = 0;
+    for (int dy = -kReach; dy <= kReach; ++dy)
+      for (int dx = -kReach; dx <= kReach; ++dx)
+        add_neighbour(half, y, dx, dy, &weight_[k++][size_t(y * kTile)]);
+    for (int x = 0; x < std::min(kTile, picture_.width - x0_); ++x) {
+      const std::array<float, 3> colour = solve(equations_, x, terms_);
+      const size_t pixel = size_t(y0_ + y) * size_t(picture_.width) + size_t(x0_ + x);
+      for (size_t c = 0; c < 3; ++c) out[c][pixel] += 0.5f * std::max(0.f, colour[c]);
+    }
+  }
+
+  void add_neighbour(int half, int y, int dx, int dy, const float* weight) {
+    std::array<TileRow, kRows> term;
+    term[0].fill(1);
+    term[1].fill(float(dx) / kReach);
+    term[2].fill(float(dy) / kReach);
+    for (size_t f = 0; f < tile_.feature.size(); ++f) {
+      const float *here = tile_.feature[f].row(0, y), *there = tile_.feature[f].row(dx, y + dy),
+                  *noise = tile_.feature_variance[f].row(dx, y + dy);
+      TileRow& sum = equations_.noise[f + 2];
+      for (int x = 0; x < kTile; ++x) {
+        term[f + 3][size_t(x)] = there[x] - here[x];
+        sum[size_t(x)] += weight[x] * noise[x];
+      }
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      const float* there = tile_.half[half][c].row(dx, y + dy);
+      std::copy(there, there + kTile, term[size_t(terms_) + c].begin());
+    }
+    for (size_t i = 0; i < size_t(terms_); ++i) {
+      TileRow weighed;
+      for (size_t x = 0; x < kTile; ++x) weighed[x] = weight[x] * term[i][x];
+      for (size_t j = i; j < size_t(terms_) + 3; ++j) {
+        TileRow& sum = equations_.sum[i][j];
+        for (size_t x = 0; x < kTile; ++x) sum[x] += weighed[x] * term[j][x];
+      }
+    }
+  }
+
+  const NoisyPicture& picture_;
+  int x0_, y0_, terms_;
+  TileInput tile_;
+  std::array<std::array<float, kTile * kTile>, (2 * kReach + 1) * (2 * kReach + 1)> weight_;
+  NormalEquations equations_;
+};
+
+}  // namespace
+
+std::vector<Plane> denoise(const NoisyPicture& picture) {
+  std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
+  const int columns = (picture.width + kTile - 1) / kTile;
+  const int rows = (picture.height + kTile - 1) / kTile;
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, columns * rows, 1),
+      [&](const tbb::blocked_range<int>& range) {
+        for (int t = range.begin(); t < range.end(); ++t) {
+          const auto tile =
+              std::make_unique<TileDenoiser>(picture, t % columns * kTile, t / columns * kTile);
+          tile->run(out);
+        }
+      },
+      tbb::simple_partitioner{});
+  return out;
+}
+
+}  // namespace drench

@@ -1,0 +1,154 @@
+// The denoiser on made pictures whose truth is known, and on rendered ones against many samples.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <random>
+
+#include "render/denoise.h"
+#include "tests/render/support.h"
+
+namespace drench::test {
+namespace {
+
+constexpr int kSize = 64;
+constexpr float kNoise = 0.2f;
+
+/// A picture of truth(x, y) in grey with Gaussian noise of its halves, guided by feature(x, y).
+template <class Truth, class Feature>
+NoisyPicture made(const Truth& truth, const Feature& feature, float noise, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> scatter(0, 1);
+  NoisyPicture picture;
+  picture.width = picture.height = kSize;
+  picture.feature.resize(1);
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        for (auto& half : picture.half) half[c].push_back(truth(x, y) + noise * scatter(random));
+        picture.variance[c].push_back(noise * noise);
+      }
+      picture.feature[0].push_back(feature(x, y));
+    }
+  picture.feature_variance.assign(1, NoisyPicture::Plane(kSize * kSize, 0.f));
+  return picture;
+}
+
+/// RMS error of the green over pixels `margin` from the picture's edge.
+template <class Truth>
+double rms(const std::vector<NoisyPicture::Plane>& out, const Truth& truth) {
+  double sum = 0;
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      const double d = out[1][size_t(y * kSize + x)] - truth(x, y);
+      sum += d * d;
+    }
+  return std::sqrt(sum / (kSize * kSize));
+}
+
+const auto none = [](int, int) { return 0.f; };
+
+TEST(Denoise, LeavesWhatHasNoNoise) {
+  const auto truth = [](int x, int y) { return 0.5f + 0.4f * std::sin(float(x * y) * 0.3f); };
+  EXPECT_LT(rms(denoise(made(truth, none, 0, 1)), truth), 1e-5);
+}
+
+/// 225 neighbours and two halves hold sqrt(450) times less noise, a fit with a slope twice that.
+TEST(Denoise, SmoothsAFlatPictureWithoutBias) {
+  const auto truth = [](int, int) { return 1.f; };
+  double mean = 0;
+  const auto out = denoise(made(truth, none, kNoise, 2));
+  for (const float v : out[1]) mean += v / (kSize * kSize);
+  EXPECT_LT(rms(out, truth), 0.12 * kNoise);
+  EXPECT_NEAR(mean, 1, 4 * kNoise / std::sqrt(2.) / kSize);
+}
+
+/// Neither is an edge that a feature shows lost, however little it stands out of the noise, nor a
+/// slope, nor an edge that stands out by itself.
+TEST(Denoise, KeepsEdgesAndSlopes) {
+  const auto faint = [](int x, int y) { return (x / 8 + y / 8) % 2 ? 0.5f : 0.55f; };
+  const auto feature = [](int x, int y) { return (x / 8 + y / 8) % 2 ? 0.2f : 0.9f; };
+  const auto slope = [](int x, int y) { return 0.3f + 0.03f * float(x) + 0.01f * float(y); };
+  const auto bold = [](int x, int y) { return (x / 16 + y / 16) % 2 ? 0.f : 4.f; };
+  EXPECT_LT(rms(denoise(made(faint, feature, kNoise, 3)), faint), 0.12 * kNoise);
+  EXPECT_LT(rms(denoise(made(slope, none, kNoise, 4)), slope), 0.2 * kNoise);
+  EXPECT_LT(rms(denoise(made(bold, none, kNoise, 5)), bold), 0.35 * kNoise);
+}
+
+/// A guide that is itself noise must not bring it in.
+TEST(Denoise, TrustsNoisyFeaturesLess) {
+  const auto truth = [](int, int) { return 1.f; };
+  std::mt19937 random(6);
+  std::normal_distribution<float> scatter(0, 0.3f);
+  NoisyPicture picture = made(
+      truth, [&](int, int) { return scatter(random); }, kNoise, 7);
+  const double trusting = rms(denoise(picture), truth);
+  picture.feature_variance[0].assign(kSize * kSize, 0.09f);
+  const double wary = rms(denoise(picture), truth);
+  EXPECT_LT(wary, trusting);
+  EXPECT_LT(wary, 0.15 * kNoise);
+}
+
+TEST(Denoise, GivesTheSameBitsForAnyThreads) {
+  const NoisyPicture picture = made([](int x, int) { return float(x); }, none, kNoise, 8);
+  std::vector<NoisyPicture::Plane> expected;
+  for (const size_t threads : {1, 2, 16}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    const auto out = denoise(picture);
+    if (expected.empty()) expected = out;
+    EXPECT_EQ(out, expected);
+  }
+}
+
+/// A ball with an edge of light and shade on a checkered floor.
+Shot checkered_shot(int samples) {
+  Shot shot = plain_shot(samples, 96);
+  add_ground(shot, 0.6f);
+  shot.material[0].checker = true;
+  shot.material[0].checker_size = 0.25;
+  shot.material.push_back(diffuse("water", 0.5f));
+  shot.light = {panel({1, 2, 0}, 0.3, 0.3, 12), sky(0.1f)};
+  shot.camera.position = V3d(0, 1.5, 3);
+  shot.camera.target = V3d(0, 0.3, 0);
+  return shot;
+}
+
+double relative_mse(const Film& film, const Film& reference) {
+  double sum = 0;
+  for (size_t p = 0; p < film.rgba.size(); ++p) {
+    const double r = reference.rgba[p], d = film.rgba[p] - r;
+    sum += d * d / (r * r + 0.01);
+  }
+  return sum / double(film.rgba.size());
+}
+
+TEST(DenoisedFrame, ErrsLessAtThreeNumbersOfSamples) {
+  FrameGeometry geometry;
+  geometry.fluid = sphere_mesh(4);
+  for (V3f& p : geometry.fluid.position) p = p * 0.4f + V3f(0, 0.4f, 0);
+  Shot exact = checkered_shot(2048);
+  exact.render.seed = 9;
+  const Film reference = render_frame(exact, 1001, geometry);
+  for (const int samples : {16, 32, 64}) {
+    Shot shot = checkered_shot(samples);
+    const Film noisy = render_frame(shot, 1001, geometry);
+    shot.render.denoise = true;
+    const Film clean = render_frame(shot, 1001, geometry);
+    EXPECT_LT(relative_mse(clean, reference), 0.75 * relative_mse(noisy, reference)) << samples;
+    const double mean = channel_mean(noisy, 1).value;
+    EXPECT_NEAR(channel_mean(clean, 1).value, mean, 0.005 * mean) << samples;
+    ASSERT_EQ(clean.layer.back().name, "noisy");
+    for (size_t p = 0; p < noisy.rgba.size() / 4; ++p)
+      for (size_t c = 0; c < 3; ++c)
+        ASSERT_EQ(clean.layer.back().value[3 * p + c], noisy.rgba[4 * p + c]);
+  }
+}
+
+TEST(DenoisedFrame, OfTooFewSamplesIsRefused) {
+  Shot shot = checkered_shot(8);
+  shot.render.denoise = true;
+  EXPECT_THROW(render_frame(shot, 1001, {}), Error);
+}
+
+}  // namespace
+}  // namespace drench::test
