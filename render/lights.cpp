@@ -44,15 +44,35 @@ ShapeLight make_rectangle(const Light& light) {
   return out;
 }
 
-ShapeLight make_sphere(const Light& light) {
+void check_radius(const Light& light) {
   if (!(light.radius > 0) || !std::isfinite(light.radius))
     fail(light, fmt::format("radius is {} m; it must be positive", light.radius));
+}
+
+ShapeLight make_sphere(const Light& light) {
+  check_radius(light);
   ShapeLight out;
   out.type = LightType::sphere;
   out.radiance = light.radiance;
   out.center = V3f(light.center);
   out.radius = float(light.radius);
   out.area = 4 * kPi * out.radius * out.radius;
+  return out;
+}
+
+ShapeLight make_disk(const Light& light) {
+  check_radius(light);
+  if (!(light.direction.length() > 0)) fail(light, "direction has no length");
+  ShapeLight out;
+  out.type = LightType::disk;
+  out.radiance = light.radiance;
+  out.center = V3f(light.center);
+  out.radius = float(light.radius);
+  out.normal = V3f(light.direction.normalized());
+  const Basis basis(out.normal);
+  out.u = basis.tangent * out.radius;
+  out.v = basis.bitangent * out.radius;
+  out.area = kPi * out.radius * out.radius;
   return out;
 }
 
@@ -74,12 +94,13 @@ SunLight make_sun(const Light& light) {
 
 float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
   const V3f to_center = center - origin;
-  if (type == LightType::rectangle) {
+  if (type != LightType::sphere) {
     const float facing = dot(direction, normal);
     if (!(facing < 0)) return kInfinity;  // it shines along its normal only
     const float t = dot(to_center, normal) / facing;
     if (!(t > 0)) return kInfinity;
     const V3f p = direction * t - to_center;
+    if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : kInfinity;
     return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
   }
   const float along = dot(to_center, direction);
@@ -93,8 +114,10 @@ float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
 LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
   LightSample out;
   out.radiance = radiance;
-  if (type == LightType::rectangle) {
-    const V3f to = center + u * (2 * u2.x - 1) + v * (2 * u2.y - 1) - from;
+  if (type != LightType::sphere) {
+    const V2f square(2 * u2.x - 1, 2 * u2.y - 1);
+    const V2f p = type == LightType::disk ? sample_disc(u2) : square;
+    const V3f to = center + u * p.x + v * p.y - from;
     const float distance2 = dot(to, to);
     out.distance = std::sqrt(distance2);
     out.direction = to * (1 / out.distance);
@@ -116,7 +139,7 @@ LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
 }
 
 float ShapeLight::pdf(const V3f& from, const V3f& direction, float distance) const {
-  if (type == LightType::rectangle) {
+  if (type != LightType::sphere) {
     const float facing = -dot(direction, normal);
     return facing > 0 ? distance * distance / (area * facing) : 0;
   }
@@ -148,6 +171,9 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
     switch (light.type) {
       case LightType::rectangle:
         shapes_.push_back(make_rectangle(light));
+        break;
+      case LightType::disk:
+        shapes_.push_back(make_disk(light));
         break;
       case LightType::sphere:
         shapes_.push_back(make_sphere(light));

@@ -58,10 +58,11 @@ class PictureChecker : CheckBase {
                              "edges that are not parallel",
                              path, text_of(light.u), text_of(light.v)));
     }
-    if (light.type == LightType::sphere) {
+    if (light.type == LightType::sphere || light.type == LightType::disk) {
       check_positive(path + ".radius", light.radius, " m", "the light has no area");
     }
-    if (light.type == LightType::sun) check_not_zero(path + ".direction", light.direction);
+    if (light.type == LightType::sun || light.type == LightType::disk)
+      check_not_zero(path + ".direction", light.direction);
   }
 
   void check_material(size_t i) const {

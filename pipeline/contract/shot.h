@@ -265,16 +265,16 @@ struct Camera {
   double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
 };
 
-enum class LightType { rectangle, sphere, sun, environment };
+enum class LightType { rectangle, sphere, sun, environment, disk };
 
 struct Light {
   LightType type = LightType::rectangle;
   std::string name = "light";
   V3f radiance{1, 1, 1};           // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
-  V3d center{0, 3, 0};             // rectangle, sphere, m
+  V3d center{0, 3, 0};             // rectangle, sphere, disk, m
   V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
-  double radius = 0.1;             // sphere, m
-  V3d direction{0, -1, 0};         // sun: the way its light travels
+  double radius = 0.1;             // sphere, disk, m
+  V3d direction{0, -1, 0};         // sun, disk: the way its light travels
   double angle_deg = 0.53;         // sun: apparent diameter
   std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
   double rotation_deg = 0;         // environment, about Y

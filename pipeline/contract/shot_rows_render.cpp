@@ -5,8 +5,9 @@ namespace drench::shot_table {
 
 namespace {
 
-constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
-constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
+// Bits of LightType and of MaterialType.
+constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8, disk = 16;
+constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;
 
 std::vector<Parameter> camera_rows() {
   return {
@@ -33,7 +34,7 @@ std::vector<Parameter> camera_rows() {
 std::vector<Parameter> light_rows() {
   return {
       row<&Light::type>("light", "type", "", none, render, "kind of light")
-          .one_of({"rectangle", "sphere", "sun", "environment"})
+          .one_of({"rectangle", "sphere", "sun", "environment", "disk"})
           .needed()
           .identity(),
       row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
@@ -41,13 +42,14 @@ std::vector<Parameter> light_rows() {
       row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
                             "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
                             "environment with a map, its factor"),
-      row<&Light::center>("light", "center", "m", place, render, "centre").only(rectangle | sphere),
+      row<&Light::center>("light", "center", "m", place, render, "centre")
+          .only(rectangle | sphere | disk),
       row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
           .only(rectangle),
       row<&Light::v>("light", "v", "m", place, render, "half edge").only(rectangle),
-      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere),
+      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere | disk),
       row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
-          .only(sun),
+          .only(sun | disk),
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
           .only(sun),
       row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")

@@ -232,6 +232,8 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
       {"[[light]]\nname = \"k\"\n", {"scene.toml:4", "has no type"}},
       {"[[light]]\ntype = \"rectangle\"\nu = [0, 0, 1]\n", {"scene.toml:4", "no area"}},
       {"[[light]]\ntype = \"sun\"\nradius = 2\n", {"scene.toml:6", "type sphere", "is a sun"}},
+      {"[[light]]\ntype = \"disk\"\nradius = 0\n", {"scene.toml:6", "no area"}},
+      {"[[light]]\ntype = \"disk\"\ndirection = [0, 0, 0]\n", {"scene.toml:6", "no direction"}},
       {"[[light]]\ntype = \"environment\"\nmap = \"none.exr\"\n",
        {"scene.toml:6", "does not exist"}},
       {"[[cloth]]\nmaterial = \"silk\"\n", {"scene.toml:5", "\"silk\"", "water, cotton, ground"}},

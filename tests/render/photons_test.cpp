@@ -118,6 +118,23 @@ TEST(Photons, GiveThePictureThatPathsGive) {
   expect_the_mean_of_paths(shot, {waves(), {}});
 }
 
+// And with a disk, which photons start from as from other lamps.
+TEST(Photons, OfADiskGiveThePictureThatPathsGive) {
+  Shot shot = pool_shot(kIndex, 0.3f);
+  shot.render.samples = 512;
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  Light disk;
+  disk.type = LightType::disk;
+  disk.center = {-0.6, 1.8, 0.4};
+  disk.direction = {0.3, -1, 0};
+  disk.radius = 0.2;
+  disk.radiance = V3f(40);
+  shot.light = {disk, sky(0.1f)};
+  expect_the_mean_of_paths(shot, {waves(), {}});
+}
+
 // Foam is too small for a density of photons: paths bring its light, and the picture is theirs.
 TEST(Photons, LeaveFoamToPaths) {
   Shot shot = pool_shot(kIndex, 0.3f);

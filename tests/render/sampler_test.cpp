@@ -190,6 +190,15 @@ TEST(ChiSquare, SphereLight) {
   expect_shape_density({light}, V3f(-0.2f, 0.1f, 0.4f));
 }
 
+TEST(ChiSquare, DiskLight) {
+  Light light;
+  light.type = LightType::disk;
+  light.center = {0.3, 1.1, 0.5};
+  light.direction = {0.4, -1, -0.2};
+  light.radius = 0.8;
+  expect_shape_density({light}, V3f(-0.2f, 0.1f, 0.4f));
+}
+
 TEST(ChiSquare, ChoiceAmongLights) {
   Light sphere;
   sphere.type = LightType::sphere;
