@@ -90,6 +90,16 @@ SunLight make_sun(const Light& light) {
   return out;
 }
 
+SunLight make_sun(const MapSun& sun) {
+  SunLight out;
+  out.toward = sun.toward;
+  out.one_minus_cos = sun.solid_angle / (2 * kPi);
+  out.sin2 = out.one_minus_cos * (2 - out.one_minus_cos);
+  out.radiance = sun.irradiance / (kPi * out.sin2);
+  out.importance = luminance(sun.irradiance);
+  return out;
+}
+
 }  // namespace
 
 float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
@@ -188,6 +198,7 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
         environment_.emplace(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
+        for (const MapSun& sun : environment_->suns()) suns_.push_back(make_sun(sun));
         environment_importance_ = kPi * luminance(environment_->mean());
         break;
     }

@@ -278,6 +278,7 @@ struct Light {
   double angle_deg = 0.53;         // sun: apparent diameter
   std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
   double rotation_deg = 0;         // environment, about Y
+  bool split_suns = true;          // environment: small bright regions of its map become suns
   V3f horizon{1, 1, 1};  // environment without a map: radiance at the horizon / at the zenith
   V3f below{1, 1, 1};    // the same below the horizon
 };

@@ -56,6 +56,9 @@ std::vector<Parameter> light_rows() {
           .only(environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
           .only(environment),
+      row<&Light::split_suns>("light", "split_suns", "", none, render,
+                              "small bright regions of the map become suns: less noise")
+          .only(environment),
       row<&Light::horizon>("light", "horizon", "", {0, 1000}, render,
                            "sky without a map: radiance at the horizon over that at the zenith")
           .as(Kind::spectrum)
