@@ -216,7 +216,8 @@ Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float dis
 
 float Lights::importance(size_t index, const V3f& from) const {
   if (index < shapes_.size()) return shapes_[index].importance(from);
-  if (index < environment_index()) return suns_[index - shapes_.size()].importance;
+  if (index < lamps()) return suns_[index - shapes_.size()].importance;
+  if (index < environment_index()) return meshes_[index - lamps()].importance(from);
   return environment_importance_;
 }
 
@@ -231,7 +232,8 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
   return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
 }
 
-LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const {
+LightSample Lights::sample_first(size_t count, const V3f& from, float time, float u_light,
+                                 const V2f& u) const {
   float total = 0;
   for (size_t k = 0; k < count; ++k) total += importance(k, from);
   if (!(total > 0)) return {};
@@ -244,10 +246,12 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, c
   LightSample out;
   if (chosen < shapes_.size()) {
     out = shapes_[chosen].sample(from, u);
-  } else if (chosen < environment_index()) {
+  } else if (chosen < lamps()) {
     const SunLight& sun = suns_[chosen - shapes_.size()];
     out = {Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos)), kInfinity, sun.radiance,
            1 / (2 * kPi * sun.one_minus_cos)};
+  } else if (chosen < environment_index()) {
+    out = meshes_[chosen - lamps()].sample(from, time, u);
   } else {
     const DirectionSample d = environment_->sample(u);
     out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf};

@@ -1,28 +1,22 @@
 #pragma once
-// The lights of a shot: shapes that rays can hit, suns and an environment at infinity, and a draw
-// among them by what each could send to a point.
+// The lights of a shot: shapes that rays can hit, objects that shine, suns and an environment at
+// infinity, and a draw among them by what each could send to a point.
 
 #include <optional>
 #include <vector>
 
 #include "pipeline/contract/shot.h"
 #include "render/environment.h"
+#include "render/light_sample.h"
+#include "render/mesh_light.h"
 
 namespace drench {
 
-/// Light arriving at a point from one sampled direction.
-struct LightSample {
-  V3f direction;       // unit, towards the light
-  float distance = 0;  // m; infinity for sun and environment
-  V3f radiance;        // W/(sr m^2)
-  float pdf = 0;       // per steradian, with the choice of the light; 0: no sample
-};
-
-/// A rectangle or sphere, ready to be hit and sampled.
+/// A rectangle, disk or sphere, ready to be hit and sampled.
 struct ShapeLight {
   LightType type = LightType::rectangle;
   V3f radiance;
-  V3f center, u, v, normal;  // m; half edges, unit normal on the shining side
+  V3f center, u, v, normal;  // m; half edges or radii, unit normal on the shining side
   V3f dual_u, dual_v;        // 1/m; a point of the plane is (dual_u . p) u + (dual_v . p) v
   float area = 0, radius = 0;
 
@@ -52,6 +46,12 @@ class Lights {
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
   Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment);
 
+  /// Adds an object that shines. @return its number among them
+  int add_mesh(const MeshLight::Faces& faces, const V3f& radiance) {
+    meshes_.emplace_back(faces, radiance);
+    return int(meshes_.size()) - 1;
+  }
+
   struct Hit {
     int light = -1;
     float distance = 0;
@@ -59,18 +59,25 @@ class Lights {
   /// Nearest shape light closer than `distance`.
   Hit intersect(const V3f& origin, const V3f& direction, float distance) const;
 
-  /// Draws a light, then a direction to it.
-  LightSample sample(const V3f& from, float u_light, const V2f& u) const {
-    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, u_light, u);
+  /// Draws a light, then a direction to it. `time` of the shutter, 0..1.
+  LightSample sample(const V3f& from, float time, float u_light, const V2f& u) const {
+    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, time, u_light,
+                        u);
   }
-  /// The same among all but the environment.
+  /// The same among lamps: shapes and suns.
   LightSample sample_lamps(const V3f& from, float u_light, const V2f& u) const {
-    return sample_first(environment_index(), from, u_light, u);
+    return sample_first(lamps(), from, 0, u_light, u);
   }
 
   /// Radiance of a hit shape light, and the density with which `sample` finds it from `from`.
   V3f shape_radiance(int light) const { return shapes_[light].radiance; }
   float shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const;
+  /// Density with which `sample` finds the outer side of a triangle of a mesh from `from`.
+  float mesh_pdf(int mesh, uint32_t triangle, const V3f& from, float time, float distance,
+                 float facing) const {
+    return meshes_[mesh].pdf(triangle, time, distance, facing) *
+           choice_probability(lamps() + size_t(mesh), from);
+  }
 
   enum class Suns { seen, hidden };
 
@@ -97,22 +104,26 @@ class Lights {
     return sum;
   }
 
-  bool has_lamps() const { return environment_index() > 0; }
+  /// How many shapes and suns there are.
+  size_t lamps() const { return shapes_.size() + suns_.size(); }
   bool has_environment() const { return environment_.has_value(); }
-  bool can_sample() const { return !shapes_.empty() || !suns_.empty() || sample_environment_; }
+  bool can_sample() const { return environment_index() > 0 || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }
+  const std::vector<MeshLight>& meshes() const { return meshes_; }
   /// Mean irradiance of the environment, as luminance.
   float environment_importance() const { return environment_importance_; }
 
  private:
-  LightSample sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const;
-  size_t environment_index() const { return shapes_.size() + suns_.size(); }
+  LightSample sample_first(size_t count, const V3f& from, float time, float u_light,
+                           const V2f& u) const;
+  size_t environment_index() const { return lamps() + meshes_.size(); }
   float importance(size_t index, const V3f& from) const;
   float choice_probability(size_t index, const V3f& from) const;
 
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
+  std::vector<MeshLight> meshes_;
   std::optional<Environment> environment_;
   bool sample_environment_ = false;
   float environment_importance_ = 0;

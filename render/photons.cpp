@@ -272,7 +272,7 @@ PhotonMap::PhotonMap(std::vector<Photon> photons) {
 }
 
 bool can_trace_photons(const Scene& scene) {
-  return !scene.bodies().empty() && scene.lights().has_lamps() && !scene.lights_in_bodies();
+  return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
 PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint64_t& rays) {

@@ -34,6 +34,7 @@ struct SceneObject {
   std::vector<V2f> uv;                           // may be empty
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
+  int light = -1;       // its number among the meshes that shine
   Bodies body = 0;      // its bit, if it is a dielectric
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
@@ -58,6 +59,8 @@ struct Surface {
   V3f shading_normal;    // unit, in the hemisphere of geometric_normal
   V2f uv;
   const ShadingMaterial* material = nullptr;
+  int light = -1;  // the object's
+  uint32_t triangle = 0;
   Bodies body = 0;       // whose surface it is; 0: of no dielectric
   bool contact = false;  // of the fluid with a sheet: no air meets water here
   bool small = false;    // a sphere of foam: too small for a density of photons
@@ -86,6 +89,7 @@ class Scene {
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
   Bodies fluid() const { return fluid_; }                          // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
+  bool lamps_in_bodies() const { return lamps_in_bodies_; }
   unsigned features() const { return features_; }
 
  private:
@@ -94,6 +98,8 @@ class Scene {
   void add_object(const TriangleMesh& mesh, const std::string& what, uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
+  void find_mesh_lights();
+  void find_lights_in(const SceneObject& body);
   void build(SceneObject& object);
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
@@ -116,7 +122,7 @@ class Scene {
   std::vector<uint32_t> bodies_;
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;
-  bool lights_in_bodies_ = false;
+  bool lights_in_bodies_ = false, lamps_in_bodies_ = false;
   unsigned features_ = 0;
 };
 

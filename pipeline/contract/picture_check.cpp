@@ -113,6 +113,18 @@ class PictureChecker : CheckBase {
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse");
+    check_dark("fluid.material", shot_.fluid.material, "the fluid");
+    check_dark("ground.material", shot_.ground.material, "the ground");
+    for (size_t i = 0; i < shot_.cloth.size(); ++i)
+      check_dark(fmt::format("cloth[{}].material", i), shot_.cloth[i].material, "cloth");
+  }
+
+  void check_dark(const std::string& key, const std::string& name, std::string_view user) const {
+    for (const Material& m : shot_.material)
+      if (m.name == name && m.emission != V3f(0))
+        fail(key, fmt::format("{} is \"{}\", which has an emission, but {} does not shine. Use a "
+                              "material without, or an obstacle",
+                              key, name, user));
   }
 };
 

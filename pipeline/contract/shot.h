@@ -289,6 +289,7 @@ struct Material {
   std::string name;
   MaterialType type = MaterialType::diffuse;
   V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth
+  V3f emission{0, 0, 0};              // diffuse, W/(sr m^2); of obstacles, from their outer side
   V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
   double ior = 1.333;                 // dielectric
   int priority = 0;                   // dielectric: of bodies in one place the highest is there

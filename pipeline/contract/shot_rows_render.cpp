@@ -81,6 +81,9 @@ std::vector<Parameter> material_rows() {
       row<&Material::reflectance>("material", "reflectance", "", share, render,
                                   "diffuse reflection")
           .only(cloth_type | diffuse),
+      row<&Material::emission>("material", "emission", "W/(sr m^2)", {0, 1e9}, render,
+                               "light of its own, of obstacles only, from their outer side")
+          .only(diffuse),
       row<&Material::transmittance>("material", "transmittance", "", share, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(cloth_type),

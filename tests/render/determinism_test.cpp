@@ -7,6 +7,7 @@
 #include "render/path.h"
 #include "render/scene.h"
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {

@@ -164,7 +164,7 @@ void expect_shape_density(const std::vector<Light>& list, const V3f& from) {
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) {
                   const float u = uniform2(r).x;
-                  return lights.sample(from, u, uniform2(r)).direction;
+                  return lights.sample(from, 0, u, uniform2(r)).direction;
                 },
                 [&](const V3f& d) { return shape_density(lights, from, d); }),
             kWorstDeviate);
