@@ -66,7 +66,7 @@ class PathTracer {
       : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays) {}
 
   PathSample run(const V2f& film) {
-    const float time = kMoving ? sampler_.one(kTimeDimension) : 0.f;
+    const float time = kMoving ? scene_.camera().time(sampler_.one(kTimeDimension), film) : 0.f;
     const V2f lens = (features & kThinLens) ? sampler_.two(kLensDimension) : V2f(0);
     PathState state;
     state.ray =

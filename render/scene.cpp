@@ -130,7 +130,7 @@ V3f Surface::leave(const V3f& direction) const {
 Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
              const RenderOptions& options)
     : open_(shot.render.motion_blur ? shot.camera.shutter_open : 0),
-      close_(shot.render.motion_blur ? shot.camera.shutter_close : 0),
+      close_(shot.render.motion_blur ? ShutterCurve::end(shot.camera) : 0),
       fps_(shot.timeline.fps),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
       lights_(shot.light, options.environment == EnvironmentSampling::always

@@ -108,7 +108,7 @@ class Scene {
   bool moves_visibly(const FoamFrame& foam) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
-  double open_ = 0, close_ = 0;  // shutter relative to the frame, frames
+  double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
   double fps_ = 24;
   ShutterCamera camera_;
   Lights lights_;

@@ -32,6 +32,7 @@ class PictureChecker : CheckBase {
                       camera.shutter_open, camera.shutter_close));
     }
     check_not_zero("camera.up", camera.up);
+    check_aperture_and_curve();
     std::set<double> frames;
     for (const auto& [frame, value] : camera.position.keys) frames.insert(frame);
     for (const auto& [frame, value] : camera.target.keys) frames.insert(frame);
@@ -47,6 +48,24 @@ class PictureChecker : CheckBase {
                                       "has no upright. Use another up, for example [0, 0, -1]",
                                       text_of(camera.up), frame));
       }
+    }
+  }
+
+  void check_aperture_and_curve() const {
+    const Camera& camera = shot_.camera;
+    if (camera.blades == 1 || camera.blades == 2) {
+      fail("camera.blades",
+           fmt::format("camera.blades is {}, which enclose no opening. Use 0 for a "
+                       "round aperture, or 3 and more",
+                       camera.blades));
+    }
+    if (camera.shutter_opening + camera.shutter_closing > 1 + 1e-9) {
+      fail("camera.shutter_opening",
+           fmt::format(
+               "camera.shutter_opening is {} and camera.shutter_closing is {}, together more "
+               "than the whole time; the shutter would close before it is open. Keep the "
+               "sum at most 1",
+               camera.shutter_opening, camera.shutter_closing));
     }
   }
 

@@ -261,8 +261,13 @@ struct Camera {
   Animated<double> fov_deg{40.0};                                // horizontal
   Animated<double> focus_distance{0.0};                          // m; 0: distance to target
   Animated<double> lens_radius{0.0};                             // m; 0: pinhole
+  int blades = 0;                 // of the aperture, 3 or more; 0: round
+  double blade_rotation_deg = 0;  // clockwise in the picture; 0: a corner is up
+  double squeeze = 1;             // of an anamorphic lens: its aperture is narrower by this factor
   V3d up{0, 1, 0};
   double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
+  double shutter_opening = 0, shutter_closing = 0;    // shares of that time; sum at most 1
+  double rolling_shutter = 0;  // how much later the last row is than the first, in shutter times
 };
 
 enum class LightType { rectangle, sphere, sun, environment, disk };

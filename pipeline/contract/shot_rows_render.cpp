@@ -19,11 +19,26 @@ std::vector<Parameter> camera_rows() {
                                    "0: the distance to the target; may be animated"),
       row<&Camera::lens_radius>("camera", "lens_radius", "m", {0, 10}, render,
                                 "0: a pinhole; may be animated"),
+      row<&Camera::blades>("camera", "blades", "", {0, 64}, render,
+                           "of the aperture, whose corners lie lens_radius from its middle; 0: "
+                           "round"),
+      row<&Camera::blade_rotation_deg>("camera", "blade_rotation_deg", "deg", {-360, 360}, render,
+                                       "clockwise in the picture; 0: a corner is up"),
+      row<&Camera::squeeze>("camera", "squeeze", "", {0.25, 4}, render,
+                            "of an anamorphic lens: blur is narrower than high by this factor; "
+                            "the field of view is not changed"),
       row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
       row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
                                  "relative to the frame"),
       row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
                                   "relative to the frame"),
+      row<&Camera::shutter_opening>("camera", "shutter_opening", "", share, render,
+                                    "share of the shutter in which it opens evenly; 0: at once"),
+      row<&Camera::shutter_closing>("camera", "shutter_closing", "", share, render,
+                                    "share in which it closes; 0.5 and 0.5 give a triangle"),
+      row<&Camera::rolling_shutter>("camera", "rolling_shutter", "", {0, 100}, render,
+                                    "how much later the bottom row is exposed than the top one, "
+                                    "in times from shutter_open to shutter_close; 0: all at once"),
       row<&Camera::position>("camera", "interp", "", none, render,
                              "between the keys of every animated value of the camera")
           .as(Kind::track_mode)

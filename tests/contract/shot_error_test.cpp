@@ -245,6 +245,13 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
       {"[camera]\nposition = [0, 0.5, 0]\ntarget = [0, 0.5, 0]\n",
        {"scene.toml:6", "looks nowhere"}},
       {"[camera]\nup = [0, 0, 0]\n", {"scene.toml:5", "no direction"}},
+      {"[camera]\nblades = 2\n", {"scene.toml:5", "no opening", "3 and more"}},
+      {"[camera]\nshutter_opening = 0.6\nshutter_closing = 0.5\n",
+       {"scene.toml:5", "0.6", "0.5", "at most 1"}},
+      {"[[material]]\nname = \"glow\"\nemission = [1, 1, 1]\n[[cloth]]\nmaterial = \"glow\"\n",
+       {"scene.toml:8", "cloth", "does not shine"}},
+      {"[[material]]\nname = \"glow\"\nemission = [1, 1, 1]\n[ground]\nmaterial = \"glow\"\n",
+       {"scene.toml:8", "the ground", "does not shine"}},
       {"[camera]\nposition = [0, 3, 0]\ntarget = [0, 0, 0]\n", {"along the view"}},
   });
 }
