@@ -128,6 +128,16 @@ TEST(MapSuns, KeepTheIrradianceAtPolesAndAtTheSeam) {
   }
 }
 
+// A single texel of 5.6 degrees: what it lights is its tent, twice as wide.
+TEST(MapSuns, KeepTheIrradianceOfOneLargeTexel) {
+  const TemporaryFolder folder;
+  constexpr int kWidth = 64;
+  Texture map = sky_map(kWidth, {});
+  map.texel[8 * kWidth + 20] = V3f(500, 400, 300);
+  expect_the_light_of(map_light(map, folder / "texel.exr"), kWidth,
+                      {{0, 1, 0}, direction_of(20, 12, kWidth, kWidth / 2)});
+}
+
 TEST(MapSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
   for (const double diameter : {0.5, 2.}) {
     Texture map = sky_map(2048, {{kToward, diameter, V3f(9000, 8000, 6000)}});
