@@ -49,13 +49,54 @@ bool same(const CameraPose& a, const CameraPose& b) {
 
 }  // namespace
 
+ShutterCurve::ShutterCurve(const Camera& camera)
+    : opening_(float(camera.shutter_opening)),
+      closing_(float(camera.shutter_closing)),
+      late_(float(camera.rolling_shutter)),
+      open_(1 - (opening_ + closing_) / 2),
+      share_(1 / (1 + late_)) {
+  if (!(opening_ >= 0 && closing_ >= 0 && opening_ + closing_ <= 1 + 1e-6f))
+    throw Error(
+        fmt::format("camera: shutter_opening is {} and shutter_closing is {}; neither may be "
+                    "negative nor their sum more than 1",
+                    opening_, closing_));
+  if (!(late_ >= 0) || !std::isfinite(late_))
+    throw Error(fmt::format("camera: rolling_shutter is {}; it must not be negative", late_));
+}
+
 ShutterCamera::ShutterCamera(const Camera& camera, double open, double close, int width, int height)
     : open_(pose_of(camera, open)),
       close_(pose_of(camera, close)),
+      curve_(camera),
+      blades_(camera.blades),
+      blade_rotation_(float(camera.blade_rotation_deg * std::numbers::pi / 180)),
+      narrowing_(float(1 / camera.squeeze)),
       world_up_(camera.up),
       width_(float(width)),
       height_(float(height)),
-      moves_(!same(open_, close_)) {}
+      moves_(!same(open_, close_)) {
+  if (blades_ < 0 || blades_ == 1 || blades_ == 2)
+    throw Error(fmt::format("camera: blades is {}; it must be 0 or at least 3", blades_));
+  if (!(camera.squeeze > 0) || !std::isfinite(camera.squeeze))
+    throw Error(fmt::format("camera: squeeze is {}; it must be positive", camera.squeeze));
+}
+
+/// Evenly on the unit disc, or the polygon with its corners on the circle: x right, y up.
+V2f ShutterCamera::aperture(const V2f& lens) const {
+  V2f p;
+  if (blades_ == 0) {
+    p = sample_disc(lens);
+  } else {
+    const float along = lens.x * float(blades_), first = std::floor(along), part = along - first;
+    const auto corner = [&](float k) {
+      const float angle = 2 * kPi * k / float(blades_) + blade_rotation_;
+      return V2f(std::sin(angle), std::cos(angle));
+    };
+    p = (corner(first) * (1 - part) + corner(first + 1) * part) * std::sqrt(lens.y);
+  }
+  p.x *= narrowing_;
+  return p;
+}
 
 CameraPose ShutterCamera::pose_at(float time) const {
   const auto mix = [time](const auto& a, const auto& b) { return a + (b - a) * time; };
@@ -81,7 +122,7 @@ Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f&
   const V3f through = pose.forward + pose.right * ((film.x - 0.5f * width_) * scale) -
                       pose.up * ((film.y - 0.5f * height_) * scale);
   if constexpr (!thin_lens) return {pose.position, normalized(through), time};
-  const V2f d = sample_disc(lens) * pose.lens_radius;
+  const V2f d = aperture(lens) * pose.lens_radius;
   const V3f shift = pose.right * d.x + pose.up * d.y;
   // Divided by the focus distance, so that a lens of radius 0 gives the pinhole's bits.
   return {pose.position + shift, normalized(through - shift * (1 / pose.focus_distance)), time};

@@ -62,7 +62,11 @@ Environment::Environment(const Light& light, Sampling sampling)
       horizon_(light.radiance * light.horizon),
       ground_(light.radiance * light.below),
       rotation_(float(light.rotation_deg / 360 - std::floor(light.rotation_deg / 360))) {
-  if (!light.map.empty()) read_map(light);
+  if (!light.map.empty()) {
+    read_map(light);
+    if (light.split_suns) suns_ = split_suns(map_, rotation_);
+    for (MapSun& sun : suns_) sun.irradiance *= scale_;
+  }
   const int columns = is_map() ? map_.width : kGradientColumns;
   const int rows = is_map() ? map_.height : kGradientRows;
   V3f sum(0);

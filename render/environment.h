@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/contract/shot.h"
+#include "render/map_suns.h"
 #include "render/texture.h"
 
 namespace drench {
@@ -39,6 +40,7 @@ class Environment {
  public:
   enum class Sampling { off, on };
 
+  /// What the map's suns send is taken out of it, unless the light says otherwise.
   /// @throws Error for a map that cannot be read or holds negative or infinite light.
   Environment(const Light& light, Sampling sampling);
 
@@ -47,6 +49,8 @@ class Environment {
   float pdf(const V3f& direction) const;
   /// Mean radiance over the sphere.
   V3f mean() const { return mean_; }
+  /// Suns that were taken out, as they stand in the sky.
+  const std::vector<MapSun>& suns() const { return suns_; }
   bool is_map() const { return map_.width > 0; }
 
  private:
@@ -58,6 +62,7 @@ class Environment {
   V3f scale_, horizon_, ground_, mean_;
   float rotation_ = 0;  // turns of the map, 0..1
   Texture map_;
+  std::vector<MapSun> suns_;
   int columns_ = 0, rows_ = 0;
   AliasTable row_table_;
   std::vector<AliasTable> column_tables_;

@@ -25,8 +25,27 @@ V3f sample_lobe(float core, const V2f& u) {
 
 }  // namespace
 
+/// Aimed at a ball of the given radius; none at what is not above.
+RefractedLightGuide::Lobe RefractedLightGuide::lobe_at(const V3f& to, float reach) const {
+  Lobe out;
+  const float cos_wave = std::cos(kWaveAngle), sin_wave = std::sin(kWaveAngle);
+  const float distance = std::sqrt(dot(to, to));
+  if (!(to.y > 0) || !(distance > 0)) return out;
+  const float sin = std::min(reach / distance, 0.95f), cos = std::sqrt(1 - sin * sin);
+  out.axis = to * (1 / distance);
+  out.core = 1 - (cos * cos_wave - sin * sin_wave);
+  out.importance = 1;
+  return out;
+}
+
 RefractedLightGuide::Lobe RefractedLightGuide::lobe(size_t light, const V3f& point) const {
   Lobe out;
+  if (light >= lights_.lamps()) {
+    const MeshLight& mesh = lights_.meshes()[light - lights_.lamps()];
+    out = lobe_at(mesh.center() - point, mesh.radius());
+    out.importance *= mesh.importance(point);
+    return out;
+  }
   const float cos_wave = std::cos(kWaveAngle), sin_wave = std::sin(kWaveAngle);
   if (light >= lights_.shapes().size()) {
     const SunLight& sun = lights_.suns()[light - lights_.shapes().size()];
@@ -46,17 +65,14 @@ RefractedLightGuide::Lobe RefractedLightGuide::lobe(size_t light, const V3f& poi
   const float reach = shape.type == LightType::sphere
                           ? shape.radius
                           : std::sqrt(shape.area * std::max(facing, 0.1f) / kPi);
-  if (!(to.y > 0) || !(distance > 0)) return out;
-  const float sin = std::min(reach / distance, 0.95f), cos = std::sqrt(1 - sin * sin);
-  out.axis = to * (1 / distance);
-  out.core = 1 - (cos * cos_wave - sin * sin_wave);
-  out.importance = shape.importance(point);
+  out = lobe_at(to, reach);
+  out.importance *= shape.importance(point);
   return out;
 }
 
 float RefractedLightGuide::total_importance(const V3f& point) const {
   float total = 0;
-  for (size_t k = 0; k < count(); ++k) total += lobe(k, point).importance;
+  for (size_t k = first_; k < count(); ++k) total += lobe(k, point).importance;
   return total;
 }
 
@@ -69,8 +85,8 @@ DirectionSample RefractedLightGuide::sample(const V3f& point, float u_light, con
   const float total = total_importance(point);
   if (!(total > 0)) return {};
   float target = u_light * total;
-  size_t chosen = 0;
-  Lobe aimed = lobe(0, point);
+  size_t chosen = first_;
+  Lobe aimed = lobe(first_, point);
   while (target >= aimed.importance && chosen + 1 < count()) {
     target -= aimed.importance;
     aimed = lobe(++chosen, point);
@@ -90,7 +106,7 @@ float RefractedLightGuide::pdf(const V3f& point, const V3f& direction) const {
   if (!(direction.y > 0) || !(cos2 > 0)) return 0;
   const V3f air(x, std::sqrt(cos2), z);
   float total = 0, density = 0;
-  for (size_t k = 0; k < count(); ++k) {
+  for (size_t k = first_; k < count(); ++k) {
     const Lobe c = lobe(k, point);
     total += c.importance;
     if (c.importance > 0) density += c.importance * lobe_density(c.core, 1 - dot(air, c.axis));

@@ -10,8 +10,11 @@ namespace drench {
 
 class RefractedLightGuide {
  public:
+  enum class Aim { all, meshes };  // what photons do not bring is that of meshes alone
+
   /// @param ior  of the fluid
-  RefractedLightGuide(const Lights& lights, float ior) : lights_(lights), ior_(ior) {}
+  RefractedLightGuide(const Lights& lights, float ior, Aim aim = Aim::all)
+      : lights_(lights), ior_(ior), first_(aim == Aim::meshes ? lights.lamps() : 0) {}
 
   /// Share of the rays from `point` to aim, by what lamps and sky give there: 0 without lamps.
   float share(const V3f& point) const;
@@ -26,12 +29,14 @@ class RefractedLightGuide {
     float core = 0;  // 1 - cos of the angle that holds half of it
     float importance = 0;
   };
-  size_t count() const { return lights_.shapes().size() + lights_.suns().size(); }
+  size_t count() const { return lights_.lamps() + lights_.meshes().size(); }
   Lobe lobe(size_t light, const V3f& point) const;
+  Lobe lobe_at(const V3f& to, float reach) const;
   float total_importance(const V3f& point) const;
 
   const Lights& lights_;
   float ior_;
+  size_t first_;  // light to aim at
 };
 
 }  // namespace drench

@@ -35,14 +35,17 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
       frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height) {
   const size_t pixels = size_t(width_) * height_;
   if (records()) pixel_.resize(pixels);
-  if (want_.light_groups) light_.resize(pixels * scene.lights().groups().size(), Imath::V3d(0));
   for (size_t k = 0; k < scene.object_count(); ++k) {
     objects_.add(scene.object(uint32_t(k)).name);
     materials_.add(scene.object(uint32_t(k)).material_name);
   }
   // Which layers there are must not differ between the frames of a shot.
-  for (uint32_t g = 0; want_.light_groups && g < scene.lights().groups().size(); ++g)
-    if (shot.render.photons > 0 || scene.lights().has_lights(g)) shown_groups_.push_back(g);
+  if (want_.light_groups) {
+    groups_ = scene.lights().groups();
+    groups_.push_back("caustics");
+    light_.resize(pixels * groups_.size(), Imath::V3d(0));
+    shown_groups_ = groups_.size() - (shot.render.photons > 0 ? 0 : 1);
+  }
   objects_.add("ground");
   materials_.add(shot.ground.material);
 }
@@ -54,7 +57,7 @@ bool LayerFilm::records() const {
 
 PathRecord LayerFilm::blank() const {
   PathRecord record;
-  if (want_.light_groups) record.light.resize(scene_.lights().groups().size());
+  record.light.resize(groups_.size());
   clear(record);
   return record;
 }
@@ -131,10 +134,9 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels) co
     });
   if (want_.samples)
     fill("samples", {"Y"}, full, [&](size_t p) { return std::array{pixels[p].samples()}; });
-  const std::vector<std::string>& groups = scene_.lights().groups();
-  for (const uint32_t g : shown_groups_)
-    fill("light_" + groups[g], rgb, half,
-         [&](size_t p) { return light_[p * groups.size() + g] / pixels[p].samples(); });
+  for (size_t g = 0; g < shown_groups_; ++g)
+    fill("light_" + groups_[g], rgb, half,
+         [&](size_t p) { return light_[p * groups_.size() + g] / pixels[p].samples(); });
   if (want_.cryptomatte) {
     add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);
     add_matte(out, "CryptoMaterial", materials_, &Pixel::material, pixels);

@@ -69,7 +69,8 @@ class LayerFilm {
   const Scene& scene_;
   LayerSettings want_;
   bool features_;
-  std::vector<uint32_t> shown_groups_;
+  std::vector<std::string> groups_;  // of light, the last is photons'
+  size_t shown_groups_ = 0;
   int width_, height_;
   double fps_, shutter_open_, shutter_frames_;
   ShutterCamera frame_camera_;  // at this frame and the next

@@ -45,15 +45,35 @@ ShapeLight make_rectangle(const Light& light) {
   return out;
 }
 
-ShapeLight make_sphere(const Light& light) {
+void check_radius(const Light& light) {
   if (!(light.radius > 0) || !std::isfinite(light.radius))
     fail(light, fmt::format("radius is {} m; it must be positive", light.radius));
+}
+
+ShapeLight make_sphere(const Light& light) {
+  check_radius(light);
   ShapeLight out;
   out.type = LightType::sphere;
   out.radiance = light.radiance;
   out.center = V3f(light.center);
   out.radius = float(light.radius);
   out.area = 4 * kPi * out.radius * out.radius;
+  return out;
+}
+
+ShapeLight make_disk(const Light& light) {
+  check_radius(light);
+  if (!(light.direction.length() > 0)) fail(light, "direction has no length");
+  ShapeLight out;
+  out.type = LightType::disk;
+  out.radiance = light.radiance;
+  out.center = V3f(light.center);
+  out.radius = float(light.radius);
+  out.normal = V3f(light.direction.normalized());
+  const Basis basis(out.normal);
+  out.u = basis.tangent * out.radius;
+  out.v = basis.bitangent * out.radius;
+  out.area = kPi * out.radius * out.radius;
   return out;
 }
 
@@ -71,16 +91,27 @@ SunLight make_sun(const Light& light) {
   return out;
 }
 
+SunLight make_sun(const MapSun& sun) {
+  SunLight out;
+  out.toward = sun.toward;
+  out.one_minus_cos = sun.solid_angle / (2 * kPi);
+  out.sin2 = out.one_minus_cos * (2 - out.one_minus_cos);
+  out.radiance = sun.irradiance / (kPi * out.sin2);
+  out.importance = luminance(sun.irradiance);
+  return out;
+}
+
 }  // namespace
 
 float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
   const V3f to_center = center - origin;
-  if (type == LightType::rectangle) {
+  if (type != LightType::sphere) {
     const float facing = dot(direction, normal);
     if (!(facing < 0)) return kInfinity;  // it shines along its normal only
     const float t = dot(to_center, normal) / facing;
     if (!(t > 0)) return kInfinity;
     const V3f p = direction * t - to_center;
+    if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : kInfinity;
     return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
   }
   const float along = dot(to_center, direction);
@@ -94,8 +125,10 @@ float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
 LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
   LightSample out;
   out.radiance = radiance;
-  if (type == LightType::rectangle) {
-    const V3f to = center + u * (2 * u2.x - 1) + v * (2 * u2.y - 1) - from;
+  if (type != LightType::sphere) {
+    const V2f square(2 * u2.x - 1, 2 * u2.y - 1);
+    const V2f p = type == LightType::disk ? sample_disc(u2) : square;
+    const V3f to = center + u * p.x + v * p.y - from;
     const float distance2 = dot(to, to);
     out.distance = std::sqrt(distance2);
     out.direction = to * (1 / out.distance);
@@ -117,7 +150,7 @@ LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
 }
 
 float ShapeLight::pdf(const V3f& from, const V3f& direction, float distance) const {
-  if (type == LightType::rectangle) {
+  if (type != LightType::sphere) {
     const float facing = -dot(direction, normal);
     return facing > 0 ? distance * distance / (area * facing) : 0;
   }
@@ -149,12 +182,19 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
     switch (light.type) {
       case LightType::rectangle:
         shapes_.push_back(make_rectangle(light));
+        shapes_.back().group = group_of(light);
+        break;
+      case LightType::disk:
+        shapes_.push_back(make_disk(light));
+        shapes_.back().group = group_of(light);
         break;
       case LightType::sphere:
         shapes_.push_back(make_sphere(light));
+        shapes_.back().group = group_of(light);
         break;
       case LightType::sun:
         suns_.push_back(make_sun(light));
+        suns_.back().group = group_of(light);
         break;
       case LightType::environment:
         if (environment_) fail(light, "a shot has one environment at most; remove one");
@@ -163,29 +203,26 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
         environment_.emplace(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
+        environment_group_ = group_of(light);
+        for (const MapSun& sun : environment_->suns()) {
+          suns_.push_back(make_sun(sun));
+          suns_.back().group = environment_group_;
+        }
         environment_importance_ = kPi * luminance(environment_->mean());
         break;
     }
   }
-  find_groups(lights);
 }
 
-void Lights::find_groups(const std::vector<Light>& lights) {
-  const auto add = [&](std::initializer_list<LightType> types) {
-    for (const Light& light : lights) {
-      if (std::find(types.begin(), types.end(), light.type) == types.end()) continue;
-      const std::string& name = light.group.empty() ? light.name : light.group;
-      const auto found = std::find(groups_.begin(), groups_.end(), name);
-      group_.push_back(uint32_t(found - groups_.begin()));
-      if (found == groups_.end()) groups_.push_back(name);
-    }
-  };
-  add({LightType::rectangle, LightType::sphere});
-  add({LightType::sun});
-  add({LightType::environment});
-  const auto caustics = std::find(groups_.begin(), groups_.end(), "caustics");
-  caustics_group_ = uint32_t(caustics - groups_.begin());
-  if (caustics == groups_.end()) groups_.push_back("caustics");
+uint32_t Lights::group_of(const Light& light) {
+  return group_named(light.group.empty() ? light.name : light.group);
+}
+
+uint32_t Lights::group_named(const std::string& name) {
+  const auto found = std::find(groups_.begin(), groups_.end(), name);
+  const uint32_t group = uint32_t(found - groups_.begin());
+  if (found == groups_.end()) groups_.push_back(name);
+  return group;
 }
 
 Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
@@ -199,7 +236,8 @@ Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float dis
 
 float Lights::importance(size_t index, const V3f& from) const {
   if (index < shapes_.size()) return shapes_[index].importance(from);
-  if (index < environment_index()) return suns_[index - shapes_.size()].importance;
+  if (index < lamps()) return suns_[index - shapes_.size()].importance;
+  if (index < environment_index()) return meshes_[index - lamps()].importance(from);
   return environment_importance_;
 }
 
@@ -214,7 +252,8 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
   return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
 }
 
-LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const {
+LightSample Lights::sample_first(size_t count, const V3f& from, float time, float u_light,
+                                 const V2f& u) const {
   float total = 0;
   for (size_t k = 0; k < count; ++k) total += importance(k, from);
   if (!(total > 0)) return {};
@@ -227,16 +266,19 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float u_light, c
   LightSample out;
   if (chosen < shapes_.size()) {
     out = shapes_[chosen].sample(from, u);
-  } else if (chosen < environment_index()) {
+    out.group = shapes_[chosen].group;
+  } else if (chosen < lamps()) {
     const SunLight& sun = suns_[chosen - shapes_.size()];
     out = {Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos)), kInfinity, sun.radiance,
-           1 / (2 * kPi * sun.one_minus_cos)};
+           1 / (2 * kPi * sun.one_minus_cos), sun.group};
+  } else if (chosen < environment_index()) {
+    out = meshes_[chosen - lamps()].sample(from, time, u);
+    out.group = mesh_group_[chosen - lamps()];
   } else {
     const DirectionSample d = environment_->sample(u);
-    out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf};
+    out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf, environment_group_};
   }
   out.pdf *= weight / total;
-  out.group = group_[chosen];
   return out;
 }
 

@@ -1,33 +1,26 @@
 #pragma once
-// The lights of a shot: shapes that rays can hit, suns and an environment at infinity, and a draw
-// among them by what each could send to a point.
+// The lights of a shot: shapes that rays can hit, objects that shine, suns and an environment at
+// infinity, and a draw among them by what each could send to a point.
 
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/shot.h"
 #include "render/environment.h"
+#include "render/light_sample.h"
+#include "render/mesh_light.h"
 
 namespace drench {
 
-/// Light arriving at a point from one sampled direction.
-struct LightSample {
-  V3f direction;       // unit, towards the light
-  float distance = 0;  // m; infinity for sun and environment
-  V3f radiance;        // W/(sr m^2)
-  float pdf = 0;       // per steradian, with the choice of the light; 0: no sample
-  uint32_t group = 0;
-};
-
-/// A rectangle or sphere, ready to be hit and sampled.
+/// A rectangle, disk or sphere, ready to be hit and sampled.
 struct ShapeLight {
   LightType type = LightType::rectangle;
   V3f radiance;
-  V3f center, u, v, normal;  // m; half edges, unit normal on the shining side
+  V3f center, u, v, normal;  // m; half edges or radii, unit normal on the shining side
   V3f dual_u, dual_v;        // 1/m; a point of the plane is (dual_u . p) u + (dual_v . p) v
   float area = 0, radius = 0;
+  uint32_t group = 0;
 
   /// Distance along the ray of its emitting side, or infinity.
   float intersect(const V3f& origin, const V3f& direction) const;
@@ -44,6 +37,7 @@ struct SunLight {
   float one_minus_cos = 0;  // of the half angle
   float sin2 = 0;
   float importance = 0;
+  uint32_t group = 0;
 
   bool covers(const V3f& direction) const;
 };
@@ -55,6 +49,13 @@ class Lights {
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
   Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment);
 
+  /// Adds an object that shines. @return its number among them
+  int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {
+    meshes_.emplace_back(faces, radiance);
+    mesh_group_.push_back(group_named(group));
+    return int(meshes_.size()) - 1;
+  }
+
   struct Hit {
     int light = -1;
     float distance = 0;
@@ -62,18 +63,25 @@ class Lights {
   /// Nearest shape light closer than `distance`.
   Hit intersect(const V3f& origin, const V3f& direction, float distance) const;
 
-  /// Draws a light, then a direction to it.
-  LightSample sample(const V3f& from, float u_light, const V2f& u) const {
-    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, u_light, u);
+  /// Draws a light, then a direction to it. `time` of the shutter, 0..1.
+  LightSample sample(const V3f& from, float time, float u_light, const V2f& u) const {
+    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, time, u_light,
+                        u);
   }
-  /// The same among all but the environment.
+  /// The same among lamps: shapes and suns.
   LightSample sample_lamps(const V3f& from, float u_light, const V2f& u) const {
-    return sample_first(environment_index(), from, u_light, u);
+    return sample_first(lamps(), from, 0, u_light, u);
   }
 
   /// Radiance of a hit shape light, and the density with which `sample` finds it from `from`.
   V3f shape_radiance(int light) const { return shapes_[light].radiance; }
   float shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const;
+  /// Density with which `sample` finds the outer side of a triangle of a mesh from `from`.
+  float mesh_pdf(int mesh, uint32_t triangle, const V3f& from, float time, float distance,
+                 float facing) const {
+    return meshes_[mesh].pdf(triangle, time, distance, facing) *
+           choice_probability(lamps() + size_t(mesh), from);
+  }
 
   enum class Suns { seen, hidden };
 
@@ -87,47 +95,49 @@ class Lights {
           weighed && sample_environment_
               ? environment_->pdf(direction) * choice_probability(environment_index(), from)
               : 0.f;
-      found(environment_->radiance(direction), pdf, group(environment_index()));
+      found(environment_->radiance(direction), pdf, environment_group_);
     }
     for (size_t s = 0; s < suns_.size() && suns == Suns::seen; ++s) {
       if (!suns_[s].covers(direction)) continue;
       const float pdf = weighed ? choice_probability(shapes_.size() + s, from) /
                                       (2 * kPi * suns_[s].one_minus_cos)
                                 : 0.f;
-      found(suns_[s].radiance, pdf, group(shapes_.size() + s));
+      found(suns_[s].radiance, pdf, suns_[s].group);
     }
   }
 
-  /// Names of the groups, and which one a light is of: shapes, then suns, then the environment.
+  /// Names of the groups of lights; photons are a group of their own beyond them.
   const std::vector<std::string>& groups() const { return groups_; }
-  uint32_t group(size_t light) const { return group_[light]; }
-  bool has_lights(uint32_t group) const {
-    return std::find(group_.begin(), group_.end(), group) != group_.end();
-  }
-  /// The group of what photons bring, whatever lamp sent them.
-  uint32_t caustics_group() const { return caustics_group_; }
+  uint32_t caustics_group() const { return uint32_t(groups_.size()); }
+  uint32_t shape_group(uint32_t shape) const { return shapes_[shape].group; }
+  uint32_t mesh_group(int mesh) const { return mesh_group_[size_t(mesh)]; }
 
-  bool has_lamps() const { return environment_index() > 0; }
+  /// How many shapes and suns there are.
+  size_t lamps() const { return shapes_.size() + suns_.size(); }
   bool has_environment() const { return environment_.has_value(); }
-  bool can_sample() const { return !shapes_.empty() || !suns_.empty() || sample_environment_; }
+  bool can_sample() const { return environment_index() > 0 || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }
+  const std::vector<MeshLight>& meshes() const { return meshes_; }
   /// Mean irradiance of the environment, as luminance.
   float environment_importance() const { return environment_importance_; }
 
  private:
-  void find_groups(const std::vector<Light>& lights);
-  LightSample sample_first(size_t count, const V3f& from, float u_light, const V2f& u) const;
-  size_t environment_index() const { return shapes_.size() + suns_.size(); }
+  uint32_t group_of(const Light& light);
+  uint32_t group_named(const std::string& name);
+  LightSample sample_first(size_t count, const V3f& from, float time, float u_light,
+                           const V2f& u) const;
+  size_t environment_index() const { return lamps() + meshes_.size(); }
   float importance(size_t index, const V3f& from) const;
   float choice_probability(size_t index, const V3f& from) const;
 
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
+  std::vector<MeshLight> meshes_;
   std::optional<Environment> environment_;
   std::vector<std::string> groups_;
-  std::vector<uint32_t> group_;  // by light
-  uint32_t caustics_group_ = 0;
+  std::vector<uint32_t> mesh_group_;
+  uint32_t environment_group_ = 0;
   bool sample_environment_ = false;
   float environment_importance_ = 0;
 };

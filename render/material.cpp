@@ -29,6 +29,9 @@ void check(const Material& m) {
     if (!(m.absorption[c] >= 0) || !std::isfinite(m.absorption[c]))
       fail("absorption must not be negative");
   }
+  for (int c = 0; c < 3; ++c)
+    if (!(m.emission[c] >= 0) || !std::isfinite(m.emission[c]))
+      fail("emission must not be negative");
   if (m.type == MaterialType::dielectric && !(m.ior >= 1 && m.ior <= 10))
     fail(fmt::format("ior is {}; it must lie between 1 and 10", m.ior));
   if (m.checker && !(m.checker_size > 0)) fail("checker_size must be positive");
@@ -66,6 +69,7 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
     out.transmittance = found->transmittance;
   else
     out.transmittance = V3f(0);
+  if (found->type == MaterialType::diffuse) out.emission = found->emission;
   out.ior = float(found->ior);
   out.priority = found->priority;
   out.absorption = found->absorption;

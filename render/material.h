@@ -11,6 +11,7 @@ namespace drench {
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
   V3f reflectance, transmittance;
+  V3f emission{0, 0, 0};  // W/(sr m^2)
   float ior = 1;
   int priority = 0;
   V3f absorption;  // 1/m

@@ -67,7 +67,7 @@ class PathTracer {
       : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays), record_(record) {}
 
   PathSample run(const V2f& film) {
-    const float time = kMoving ? sampler_.one(kTimeDimension) : 0.f;
+    const float time = kMoving ? scene_.camera().time(sampler_.one(kTimeDimension), film) : 0.f;
     const V2f lens = (features & kThinLens) ? sampler_.two(kLensDimension) : V2f(0);
     PathState state;
     state.ray =
@@ -118,6 +118,8 @@ class PathTracer {
       }
     }
     record_first(state, surface, hit);
+    if constexpr (kLights)
+      if (surface.light >= 0) add_own_light(state, surface, hit.distance);
     return scatter_cloth(state, surface);
   }
 
@@ -207,7 +209,7 @@ class PathTracer {
               : 0.f;
       deposit(
           state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf),
-          lights.group(hit.index));
+          lights.shape_group(hit.index));
     } else {
       if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
       lights.for_each_infinite(state.vertex, direction, state.bsdf_pdf > 0,
@@ -217,6 +219,19 @@ class PathTracer {
                                          group);
                                });
     }
+  }
+
+  /// Light of a surface's own, from its outer side.
+  void add_own_light(const PathState& state, const Surface& surface, float distance) {
+    const float facing = -dot(state.ray.direction, surface.geometric_normal);
+    if (!(facing > 0)) return;
+    const Lights& lights = scene_.lights();
+    const float pdf = state.bsdf_pdf > 0
+                          ? lights.mesh_pdf(surface.light, surface.triangle, state.vertex,
+                                            state.ray.time, distance, facing)
+                          : 0.f;
+    deposit(state.throughput * surface.material->emission * emission_weight(state, pdf),
+            lights.mesh_group(surface.light));
   }
 
   /// Continues the path along `direction` from the surface.
@@ -285,15 +300,19 @@ class PathTracer {
     return true;
   }
 
-  /// The next direction: drawn from the surface, or in water from a mixture with the guide.
+  /// The next direction: drawn from the surface, or in water from a mixture with the guide. Its
+  /// density is the surface's own in either case: light samples are weighed against that one.
   ClothScatter sample_scatter(const PathState& state, const Surface& surface,
                               const ClothBsdf& bsdf) const {
     const V2f uv = point(state, kScatterDirection);
     if constexpr (!kWater) return bsdf.sample(uv);
-    if (state.in != scene_.fluid() || state.in == 0 || state.has_photons ||
+    if (state.in != scene_.fluid() || state.in == 0 ||
+        (state.has_photons && scene_.lights().meshes().empty()) ||
         settings_.water_guide == WaterGuide::off)
       return bsdf.sample(uv);
-    const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior);
+    using Aim = RefractedLightGuide::Aim;
+    const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior,
+                                    state.has_photons ? Aim::meshes : Aim::all);
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(uv);
     const float u = number(state, kScatterSide);
@@ -311,8 +330,7 @@ class PathTracer {
     }
     const V3f value = bsdf.value(out.direction, out.pdf);
     if (!(out.pdf > 0)) return {};
-    out.pdf = share * guide_pdf + (1 - share) * out.pdf;
-    out.weight = value * (1 / out.pdf);
+    out.weight = value * (1 / (share * guide_pdf + (1 - share) * out.pdf));
     return out;
   }
 
@@ -326,8 +344,8 @@ class PathTracer {
   }
 
   void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
-    const LightSample light = scene_.lights().sample(surface.position, number(state, kLightChoice),
-                                                     point(state, kLightPoint));
+    const LightSample light = scene_.lights().sample(
+        surface.position, state.ray.time, number(state, kLightChoice), point(state, kLightPoint));
     if (!(light.pdf > 0)) return;
     float bsdf_pdf = 0;
     const V3f value = bsdf.value(light.direction, bsdf_pdf);

@@ -14,7 +14,15 @@ namespace drench {
 namespace {
 
 /// Sampling dimensions of a photon; each interface takes two.
-enum PhotonDimension : uint32_t { kStart, kStartPoint, kLamp, kLampPoint, kTime, kInterfaces };
+enum PhotonDimension : uint32_t {
+  kStart,
+  kStartPoint,
+  kLamp,
+  kLampPoint,
+  kTime,
+  kInterfaces,
+  kRow = kInterfaces  // free: interfaces count from 1
+};
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
 constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
@@ -111,7 +119,8 @@ class PhotonTracer {
  private:
   /// From a lamp to a point of a body that it reaches.
   bool start(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
-    flight.ray.time = sampler.one(kTime);
+    const ShutterCurve& curve = scene_.camera().curve();
+    flight.ray.time = curve.time(sampler.one(kTime), curve.rolls() ? sampler.one(kRow) : 0.f);
     const auto [hit, area_ratio] =
         starts_.sample(sampler.one(kStart), sampler.two(kStartPoint), flight.ray.time);
     surface = scene_.surface<true>(flight.ray, hit);
@@ -272,7 +281,7 @@ PhotonMap::PhotonMap(std::vector<Photon> photons) {
 }
 
 bool can_trace_photons(const Scene& scene) {
-  return !scene.bodies().empty() && scene.lights().has_lamps() && !scene.lights_in_bodies();
+  return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
 PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint64_t& rays) {

@@ -130,7 +130,7 @@ V3f Surface::leave(const V3f& direction) const {
 Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
              const RenderOptions& options)
     : open_(shot.render.motion_blur ? shot.camera.shutter_open : 0),
-      close_(shot.render.motion_blur ? shot.camera.shutter_close : 0),
+      close_(shot.render.motion_blur ? ShutterCurve::end(shot.camera) : 0),
       fps_(shot.timeline.fps),
       layers_(shot.layers),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
@@ -172,6 +172,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
   }
   for (SceneObject& object : objects_) build(object);
+  find_mesh_lights();
   find_bodies(has_fluid);
   find_features();
 }
@@ -209,12 +210,30 @@ void Scene::find_bodies(bool has_fluid) {
     object.body = Bodies{1} << bit;
     medium_.push_back({materials_[object.material].absorption, materials_[object.material].ior});
     if (has_fluid && bodies_[bit] == 0) fluid_ = object.body;
-    for (const ShapeLight& light : lights_.shapes()) {
-      V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
-      if (light.type == LightType::sphere) reach = V3f(light.radius);
-      lights_in_bodies_ |=
-          object.bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
-    }
+    find_lights_in(object);
+  }
+}
+
+void Scene::find_lights_in(const SceneObject& body) {
+  for (const ShapeLight& light : lights_.shapes()) {
+    V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
+    if (light.type == LightType::sphere) reach = V3f(light.radius);
+    lamps_in_bodies_ |=
+        body.bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
+  }
+  lights_in_bodies_ |= lamps_in_bodies_;
+  for (const SceneObject& object : objects_)
+    lights_in_bodies_ |= object.light >= 0 && body.bounds.intersects(object.bounds);
+}
+
+void Scene::find_mesh_lights() {
+  for (SceneObject& object : objects_) {
+    const V3f& emission = materials_[object.material].emission;
+    if (is_black(emission) || object.triangle.empty()) continue;
+    object.light =
+        lights_.add_mesh({object.triangle, object.position.data(),
+                          object.position_close.empty() ? nullptr : object.position_close.data()},
+                         emission, object.name);
   }
 }
 
@@ -455,6 +474,8 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
+  s.light = object.light;
+  s.triangle = hit.triangle;
   s.contact = !object.contact.empty() && object.contact[hit.triangle];
   return s;
 }

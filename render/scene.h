@@ -36,6 +36,7 @@ struct SceneObject {
   std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
+  int light = -1;       // its number among the meshes that shine
   Bodies body = 0;      // its bit, if it is a dielectric
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
@@ -60,6 +61,8 @@ struct Surface {
   V3f shading_normal;    // unit, in the hemisphere of geometric_normal
   V2f uv;
   const ShadingMaterial* material = nullptr;
+  int light = -1;  // the object's
+  uint32_t triangle = 0;
   Bodies body = 0;       // whose surface it is; 0: of no dielectric
   bool contact = false;  // of the fluid with a sheet: no air meets water here
   bool small = false;    // a sphere of foam: too small for a density of photons
@@ -91,6 +94,7 @@ class Scene {
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
   Bodies fluid() const { return fluid_; }                          // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
+  bool lamps_in_bodies() const { return lamps_in_bodies_; }
   unsigned features() const { return features_; }
 
  private:
@@ -100,6 +104,8 @@ class Scene {
                   uint32_t material);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
+  void find_mesh_lights();
+  void find_lights_in(const SceneObject& body);
   void build(SceneObject& object);
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
@@ -108,7 +114,7 @@ class Scene {
   bool moves_visibly(const FoamFrame& foam) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
-  double open_ = 0, close_ = 0;  // shutter relative to the frame, frames
+  double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
   double fps_ = 24;
   LayerSettings layers_;
   ShutterCamera camera_;
@@ -124,7 +130,7 @@ class Scene {
   std::vector<uint32_t> bodies_;
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;
-  bool lights_in_bodies_ = false;
+  bool lights_in_bodies_ = false, lamps_in_bodies_ = false;
   unsigned features_ = 0;
 };
 

@@ -34,6 +34,7 @@ class PictureChecker : CheckBase {
                       camera.shutter_open, camera.shutter_close));
     }
     check_not_zero("camera.up", camera.up);
+    check_aperture_and_curve();
     std::set<double> frames;
     for (const auto& [frame, value] : camera.position.keys) frames.insert(frame);
     for (const auto& [frame, value] : camera.target.keys) frames.insert(frame);
@@ -74,18 +75,42 @@ class PictureChecker : CheckBase {
                      r.samples));
   }
 
+  void check_aperture_and_curve() const {
+    const Camera& camera = shot_.camera;
+    if (camera.blades == 1 || camera.blades == 2) {
+      fail("camera.blades",
+           fmt::format("camera.blades is {}, which enclose no opening. Use 0 for a "
+                       "round aperture, or 3 and more",
+                       camera.blades));
+    }
+    if (camera.shutter_opening + camera.shutter_closing > 1 + 1e-9) {
+      fail("camera.shutter_opening",
+           fmt::format(
+               "camera.shutter_opening is {} and camera.shutter_closing is {}, together more "
+               "than the whole time; the shutter would close before it is open. Keep the "
+               "sum at most 1",
+               camera.shutter_opening, camera.shutter_closing));
+    }
+  }
+
   void check_light(size_t i) const {
     const Light& light = shot_.light[i];
     const std::string path = fmt::format("light[{}]", i);
+    if ((light.group.empty() ? light.name : light.group) == "caustics") {
+      fail(path + (light.group.empty() ? ".name" : ".group"),
+           "the group of lights \"caustics\" is that of what comes through water; choose another "
+           "name");
+    }
     if (light.type == LightType::rectangle && !(light.u.cross(light.v).length() > 1e-12)) {
       fail(path, fmt::format("{0}.u is {1} and {0}.v is {2}; the light has no area. Give two half "
                              "edges that are not parallel",
                              path, text_of(light.u), text_of(light.v)));
     }
-    if (light.type == LightType::sphere) {
+    if (light.type == LightType::sphere || light.type == LightType::disk) {
       check_positive(path + ".radius", light.radius, " m", "the light has no area");
     }
-    if (light.type == LightType::sun) check_not_zero(path + ".direction", light.direction);
+    if (light.type == LightType::sun || light.type == LightType::disk)
+      check_not_zero(path + ".direction", light.direction);
   }
 
   void check_material(size_t i) const {
@@ -136,6 +161,18 @@ class PictureChecker : CheckBase {
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse");
+    check_dark("fluid.material", shot_.fluid.material, "the fluid");
+    check_dark("ground.material", shot_.ground.material, "the ground");
+    for (size_t i = 0; i < shot_.cloth.size(); ++i)
+      check_dark(fmt::format("cloth[{}].material", i), shot_.cloth[i].material, "cloth");
+  }
+
+  void check_dark(const std::string& key, const std::string& name, std::string_view user) const {
+    for (const Material& m : shot_.material)
+      if (m.name == name && m.emission != V3f(0))
+        fail(key, fmt::format("{} is \"{}\", which has an emission, but {} does not shine. Use a "
+                              "material without, or an obstacle",
+                              key, name, user));
   }
 };
 

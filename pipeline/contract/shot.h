@@ -261,24 +261,30 @@ struct Camera {
   Animated<double> fov_deg{40.0};                                // horizontal
   Animated<double> focus_distance{0.0};                          // m; 0: distance to target
   Animated<double> lens_radius{0.0};                             // m; 0: pinhole
+  int blades = 0;                 // of the aperture, 3 or more; 0: round
+  double blade_rotation_deg = 0;  // clockwise in the picture; 0: a corner is up
+  double squeeze = 1;             // of an anamorphic lens: its aperture is narrower by this factor
   V3d up{0, 1, 0};
   double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
+  double shutter_opening = 0, shutter_closing = 0;    // shares of that time; sum at most 1
+  double rolling_shutter = 0;  // how much later the last row is than the first, in shutter times
 };
 
-enum class LightType { rectangle, sphere, sun, environment };
+enum class LightType { rectangle, sphere, sun, environment, disk };
 
 struct Light {
   LightType type = LightType::rectangle;
   std::string name = "light";
   std::string group;               // of its layer; empty: its name
   V3f radiance{1, 1, 1};           // W/(sr m^2), linear ACEScg; sun: irradiance facing it, W/m^2
-  V3d center{0, 3, 0};             // rectangle, sphere, m
+  V3d center{0, 3, 0};             // rectangle, sphere, disk, m
   V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
-  double radius = 0.1;             // sphere, m
-  V3d direction{0, -1, 0};         // sun: the way its light travels
+  double radius = 0.1;             // sphere, disk, m
+  V3d direction{0, -1, 0};         // sun, disk: the way its light travels
   double angle_deg = 0.53;         // sun: apparent diameter
   std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
   double rotation_deg = 0;         // environment, about Y
+  bool split_suns = true;          // environment: small bright regions of its map become suns
   V3f horizon{1, 1, 1};  // environment without a map: radiance at the horizon / at the zenith
   V3f below{1, 1, 1};    // the same below the horizon
 };
@@ -289,6 +295,7 @@ struct Material {
   std::string name;
   MaterialType type = MaterialType::diffuse;
   V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth
+  V3f emission{0, 0, 0};              // diffuse, W/(sr m^2); of obstacles, from their outer side
   V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
   double ior = 1.333;                 // dielectric
   int priority = 0;                   // dielectric: of bodies in one place the highest is there

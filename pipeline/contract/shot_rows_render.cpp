@@ -5,8 +5,9 @@ namespace drench::shot_table {
 
 namespace {
 
-constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8;  // bits of LightType
-constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;          // bits of MaterialType
+// Bits of LightType and of MaterialType.
+constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8, disk = 16;
+constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;
 
 std::vector<Parameter> camera_rows() {
   return {
@@ -18,11 +19,26 @@ std::vector<Parameter> camera_rows() {
                                    "0: the distance to the target; may be animated"),
       row<&Camera::lens_radius>("camera", "lens_radius", "m", {0, 10}, render,
                                 "0: a pinhole; may be animated"),
+      row<&Camera::blades>("camera", "blades", "", {0, 64}, render,
+                           "of the aperture, whose corners lie lens_radius from its middle; 0: "
+                           "round"),
+      row<&Camera::blade_rotation_deg>("camera", "blade_rotation_deg", "deg", {-360, 360}, render,
+                                       "clockwise in the picture; 0: a corner is up"),
+      row<&Camera::squeeze>("camera", "squeeze", "", {0.25, 4}, render,
+                            "of an anamorphic lens: blur is narrower than high by this factor; "
+                            "the field of view is not changed"),
       row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
       row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
                                  "relative to the frame"),
       row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
                                   "relative to the frame"),
+      row<&Camera::shutter_opening>("camera", "shutter_opening", "", share, render,
+                                    "share of the shutter in which it opens evenly; 0: at once"),
+      row<&Camera::shutter_closing>("camera", "shutter_closing", "", share, render,
+                                    "share in which it closes; 0.5 and 0.5 give a triangle"),
+      row<&Camera::rolling_shutter>("camera", "rolling_shutter", "", {0, 100}, render,
+                                    "how much later the bottom row is exposed than the top one, "
+                                    "in times from shutter_open to shutter_close; 0: all at once"),
       row<&Camera::position>("camera", "interp", "", none, render,
                              "between the keys of every animated value of the camera")
           .as(Kind::track_mode)
@@ -33,7 +49,7 @@ std::vector<Parameter> camera_rows() {
 std::vector<Parameter> light_rows() {
   return {
       row<&Light::type>("light", "type", "", none, render, "kind of light")
-          .one_of({"rectangle", "sphere", "sun", "environment"})
+          .one_of({"rectangle", "sphere", "sun", "environment", "disk"})
           .needed()
           .identity(),
       row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
@@ -43,18 +59,22 @@ std::vector<Parameter> light_rows() {
       row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
                             "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
                             "environment with a map, its factor"),
-      row<&Light::center>("light", "center", "m", place, render, "centre").only(rectangle | sphere),
+      row<&Light::center>("light", "center", "m", place, render, "centre")
+          .only(rectangle | sphere | disk),
       row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
           .only(rectangle),
       row<&Light::v>("light", "v", "m", place, render, "half edge").only(rectangle),
-      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere),
+      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere | disk),
       row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
-          .only(sun),
+          .only(sun | disk),
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
           .only(sun),
       row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")
           .only(environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
+          .only(environment),
+      row<&Light::split_suns>("light", "split_suns", "", none, render,
+                              "small bright regions of the map become suns: less noise")
           .only(environment),
       row<&Light::horizon>("light", "horizon", "", {0, 1000}, render,
                            "sky without a map: radiance at the horizon over that at the zenith")
@@ -78,6 +98,9 @@ std::vector<Parameter> material_rows() {
       row<&Material::reflectance>("material", "reflectance", "", share, render,
                                   "diffuse reflection")
           .only(cloth_type | diffuse),
+      row<&Material::emission>("material", "emission", "W/(sr m^2)", {0, 1e9}, render,
+                               "light of its own, of obstacles only, from their outer side")
+          .only(diffuse),
       row<&Material::transmittance>("material", "transmittance", "", share, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(cloth_type),

@@ -232,8 +232,8 @@ Shot one_of_everything(const std::string& name) {
     probe.name += std::to_string(shot.probe.size() + 1);
     shot.probe.push_back(probe);
   }
-  for (const LightType type :
-       {LightType::rectangle, LightType::sphere, LightType::sun, LightType::environment}) {
+  for (const LightType type : {LightType::rectangle, LightType::sphere, LightType::sun,
+                               LightType::environment, LightType::disk}) {
     Light light;
     light.type = type;
     light.name += std::to_string(shot.light.size() + 1);

@@ -6,7 +6,7 @@
 #include "render/filter.h"
 #include "render/path.h"
 #include "render/scene.h"
-#include "tests/render/support.h"
+#include "tests/render/strip.h"
 
 namespace drench::test {
 namespace {
@@ -22,40 +22,6 @@ TEST(Camera, SpansItsHorizontalFieldOfView) {
   EXPECT_NEAR(std::atan2(-left.x, -left.z) * 180 / kPi64, 30, 1e-4);
   EXPECT_NEAR(top.y / -top.z, std::tan(kPi64 / 6) / 2, 1e-6);
 }
-
-/// Mean darkness of every column of a film of a black thing before a sky of radiance 1.
-std::vector<double> darkness_of_columns(const Film& film) {
-  std::vector<double> out(film.width);
-  for (int y = 0; y < film.height; ++y)
-    for (int x = 0; x < film.width; ++x)
-      out[x] += (1 - film.rgba[4 * (size_t(y) * film.width + x)]) / film.height;
-  return out;
-}
-
-/// A black strip of `width` pixels before the sky, whose middle moves `travel` pixels.
-struct Strip {
-  Shot shot = plain_shot(256);
-  FrameGeometry geometry;
-  static constexpr double kPixel = 0.02;  // m: 64 pixels over 1.28 m at distance 1
-
-  Strip(double width, double travel) {
-    shot.render.width = 64;
-    shot.render.height = 16;
-    shot.render.motion_blur = true;
-    shot.camera.position = V3d(0, 0, 1);
-    shot.camera.target = V3d(0, 0, 0);
-    shot.camera.fov_deg = 2 * std::atan(0.64) * 180 / kPi64;
-    shot.light = {sky(1)};
-    shot.material = {diffuse("cotton", 0)};
-    TriangleMesh mesh;
-    const float half = float(width * kPixel / 2);
-    mesh.position = {{-half, -0.2f, 0}, {half, -0.2f, 0}, {half, 0.2f, 0}, {-half, 0.2f, 0}};
-    mesh.triangle = {{0, 1, 2}, {0, 2, 3}};
-    const double shutter = (shot.camera.shutter_close - shot.camera.shutter_open) / 24;  // s
-    mesh.velocity.assign(4, V3f(float(travel * kPixel / shutter), 0, 0));
-    geometry.cloth = {{"cloth", mesh}};
-  }
-};
 
 TEST(MotionBlur, SpreadsAMovingStripIntoATrapezoid) {
   constexpr double kWidth = 6, kTravel = 20;

@@ -7,6 +7,7 @@
 #include "render/path.h"
 #include "render/scene.h"
 #include "tests/render/support.h"
+#include "tests/temporary_folder.h"
 
 namespace drench::test {
 namespace {
@@ -53,6 +54,45 @@ TEST(RenderedBits, AreTheSameForAnyNumberOfThreads) {
   scene.shot.render.photons = 1;
   const Film one = on_threads(1, scene);
   EXPECT_GT(channel_mean(one, 0).value, 0.05);
+  for (int threads : {2, 16}) EXPECT_EQ(on_threads(threads, scene).rgba, one.rgba) << threads;
+}
+
+/// With every light and every feature of the camera.
+struct EveryLightAndLens : Everything {
+  TemporaryFolder folder;
+
+  EveryLightAndLens() {
+    move();
+    shot.render.photons = 1;
+    shot.camera.blades = 5;
+    shot.camera.squeeze = 1.8;
+    shot.camera.shutter_opening = shot.camera.shutter_closing = 0.3;
+    shot.camera.rolling_shutter = 0.7;
+    Light disk;
+    disk.type = LightType::disk;
+    disk.center = {1, 3, 1};
+    shot.light.push_back(disk);
+    Film map{64, 32, std::vector<float>(64 * 32 * 4, 0.3f)};
+    for (int c = 0; c < 3; ++c) map.rgba[4 * (8 * 64 + 20) + c] = 400;
+    write_exr(folder / "map.exr", map, {});
+    shot.light[2].map = folder / "map.exr";
+    shot.material.push_back(diffuse("lamp", 0.2f));
+    shot.material.back().emission = V3f(3);
+    Obstacle lamp;
+    lamp.material = "lamp";
+    shot.obstacle = {lamp};
+    TriangleMesh box = box_mesh({-1.5f, 0.5f, 0.5f}, {-1, 0.8f, 1});
+    for (V3f& v : box.velocity) v = {3, 1, 0};
+    geometry.obstacle = {{lamp.name, box}};
+  }
+};
+
+TEST(RenderedBits, OfEveryLightAndLensAreTheSameForAnyNumberOfThreads) {
+  const EveryLightAndLens scene;
+  const Scene built(scene.shot, 1001, scene.geometry, {});
+  EXPECT_EQ(built.lights().suns().size(), 2u);
+  EXPECT_EQ(built.lights().meshes().size(), 1u);
+  const Film one = on_threads(1, scene);
   for (int threads : {2, 16}) EXPECT_EQ(on_threads(threads, scene).rgba, one.rgba) << threads;
 }
 

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <nlohmann/json.hpp>
 
@@ -63,8 +64,18 @@ TEST(LightGroups, SumToTheBeauty) {
   shot.layers.light_groups = true;
   shot.light[2].group = "out_of_doors";
   shot.light[1].group = "out_of_doors";
-  const Film film = render_frame(shot, 1001, pool_geometry());
-  ASSERT_EQ(film.layer.size(), 3u);  // panel, out_of_doors, caustics
+  FrameGeometry geometry = pool_geometry();
+  Obstacle lantern;
+  lantern.name = "lantern";
+  lantern.material = "glow";
+  shot.obstacle = {lantern};
+  shot.material.push_back(diffuse("glow", 0.2f));
+  shot.material.back().emission = V3f(3, 2, 1);
+  geometry.obstacle = {{"lantern", box_mesh({-0.2f, 0.8f, -0.2f}, {0.2f, 1.2f, 0.2f})}};
+  const Film film = render_frame(shot, 1001, geometry);
+  ASSERT_EQ(film.layer.size(), 4u);  // panel, out_of_doors, the lantern, caustics
+  const std::vector<float>& glow = layer_of(film, "light_lantern").value;
+  EXPECT_GE(*std::max_element(glow.begin(), glow.end()), 2);
   for (int k = 0; k < film.width * film.height; ++k)
     for (size_t c = 0; c < 3; ++c) {
       double sum = 0;

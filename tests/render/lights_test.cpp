@@ -47,6 +47,26 @@ TEST(SphereLight, GivesIrradianceOfItsSolidAngle) {
   EXPECT_NEAR(mean.value, shown(kPi64 * 2 * (0.5 * 0.5) / (1.5 * 1.5)), bound(mean));
 }
 
+Light disk(const V3d& center, const V3d& direction, double radius, float radiance) {
+  Light light;
+  light.type = LightType::disk;
+  light.center = center;
+  light.direction = direction;
+  light.radius = radius;
+  light.radiance = V3f(radiance);
+  return light;
+}
+
+TEST(DiskLight, GivesItsIrradianceOnTheAxis) {
+  // E = pi L r^2 / (r^2 + D^2), and nothing on the side it turns away from.
+  Shot shot = ground_shot(256);
+  shot.light = {disk({0, 1.5, 0}, {0, -2, 0}, 0.8, 2)};
+  const Mean mean = channel_mean(render_frame(shot, 1001, {}), 0);
+  EXPECT_NEAR(mean.value, shown(kPi64 * 2 * 0.64 / (0.64 + 1.5 * 1.5)), bound(mean));
+  shot.light[0].direction = {0, 1, 0};
+  EXPECT_EQ(channel_mean(render_frame(shot, 1001, {}), 0).value, 0);
+}
+
 TEST(SunLight, GivesItsIrradianceTimesCosine) {
   Shot shot = ground_shot(64);
   Light sun;
@@ -112,7 +132,8 @@ struct EveryLight {
     sun.radiance = V3f(1);
     environment.map = map;
     environment.rotation_deg = 30;
-    shot.light = {panel({-1, 1.8, 0}, 0.6, 0.5, 3), sphere, sun, environment};
+    shot.light = {panel({-1, 1.8, 0}, 0.6, 0.5, 3), sphere, sun, environment,
+                  disk({0.2, 1.6, -1.2}, {0.2, -1, 0.5}, 0.5, 3)};
     geometry.cloth = {{"cloth", sheet_mesh(16, [](float x, float z) {
                          return 0.6f + 0.1f * std::sin(3 * x) * std::cos(2 * z);
                        })}};

@@ -107,6 +107,34 @@ TEST(Photons, AreSpreadOverTheShutter) {
   EXPECT_NEAR(irradiance(map, 1), expected, 0.02 * expected);
 }
 
+// Water that rises as the shutter opens and closes evenly: times are those of a triangle, for rows
+// that are exposed one after the other spread over twice the time.
+TEST(Photons, FollowTheShutterOfTheCamera) {
+  for (const double late : {0., 1.}) {
+    Shot shot = pool_shot(1, 2);
+    shot.render.motion_blur = true;
+    shot.camera.position = V3d(0, 3, 0.5);
+    shot.camera.shutter_open = -0.25, shot.camera.shutter_close = 0.25;
+    shot.camera.shutter_opening = 0.2, shot.camera.shutter_closing = 0.8;
+    shot.camera.rolling_shutter = late;
+    shot.light = {sun({0, -1, 0}, 0.5)};
+    TriangleMesh water = box_mesh({-3, -0.1f, -3}, {3, 0.5f, 3});
+    for (size_t v = 0; v < water.position.size(); ++v)
+      if (water.position[v].y > 0) water.velocity[v] = V3f(0, float(0.6 * 2 * 24), 0);
+    const PhotonMap map = photons_of(shot, water, 1000000);
+    // 0.2 m deep at open, 0.8 at close, 1.4 when the last row is done: by its definition.
+    double expected = 0, all = 0;
+    for (int i = 0; i < 400; ++i)
+      for (int row = 0; row < 40; ++row) {
+        const double t = (i + 0.5) / 400, open = t < 0.2 ? t / 0.2 : (1 - t) / 0.8;
+        expected += 2 * open * std::exp(-2 * (0.2 + 0.6 * (t + late * (row + 0.5) / 40)));
+        all += open;
+      }
+    expected /= all;
+    EXPECT_NEAR(irradiance(map, 1), expected, 0.02 * expected) << late;
+  }
+}
+
 // The same picture from photons and from paths, of a wavy pool with a lamp and a sun.
 TEST(Photons, GiveThePictureThatPathsGive) {
   Shot shot = pool_shot(kIndex, 0.3f);
@@ -115,6 +143,23 @@ TEST(Photons, GiveThePictureThatPathsGive) {
   shot.camera.target = V3d(0, 0, 0);
   shot.camera.fov_deg = 20.0;
   shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun({1, -2, 0}, 5), sky(0.2f)};
+  expect_the_mean_of_paths(shot, {waves(), {}});
+}
+
+// And with a disk, which photons start from as from other lamps.
+TEST(Photons, OfADiskGiveThePictureThatPathsGive) {
+  Shot shot = pool_shot(kIndex, 0.3f);
+  shot.render.samples = 512;
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  Light disk;
+  disk.type = LightType::disk;
+  disk.center = {-0.6, 1.8, 0.4};
+  disk.direction = {0.3, -1, 0};
+  disk.radius = 0.2;
+  disk.radiance = V3f(40);
+  shot.light = {disk, sky(0.1f)};
   expect_the_mean_of_paths(shot, {waves(), {}});
 }
 

@@ -164,7 +164,7 @@ void expect_shape_density(const std::vector<Light>& list, const V3f& from) {
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) {
                   const float u = uniform2(r).x;
-                  return lights.sample(from, u, uniform2(r)).direction;
+                  return lights.sample(from, 0, u, uniform2(r)).direction;
                 },
                 [&](const V3f& d) { return shape_density(lights, from, d); }),
             kWorstDeviate);
@@ -186,6 +186,15 @@ TEST(ChiSquare, SphereLight) {
   Light light;
   light.type = LightType::sphere;
   light.center = {0.3, -1, 0.5};
+  light.radius = 0.8;
+  expect_shape_density({light}, V3f(-0.2f, 0.1f, 0.4f));
+}
+
+TEST(ChiSquare, DiskLight) {
+  Light light;
+  light.type = LightType::disk;
+  light.center = {0.3, 1.1, 0.5};
+  light.direction = {0.4, -1, -0.2};
   light.radius = 0.8;
   expect_shape_density({light}, V3f(-0.2f, 0.1f, 0.4f));
 }

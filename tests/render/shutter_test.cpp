@@ -1,0 +1,135 @@
+// The course of the shutter and rows that are exposed one after the other, against streaks by
+// definition.
+
+#include <gtest/gtest.h>
+
+#include "render/camera.h"
+#include "render/filter.h"
+#include "render/sampler.h"
+#include "tests/render/strip.h"
+
+namespace drench::test {
+namespace {
+
+/// Share of the light that has come by a time, for shares of opening and closing.
+double come_by(double time, double opening, double closing) {
+  constexpr int kSteps = 4000;
+  double by = 0, all = 0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double t = (k + 0.5) / kSteps;
+    const double rise = opening > 0 ? std::min(t / opening, 1.) : 1;
+    const double fall = closing > 0 ? std::min((1 - t) / closing, 1.) : 1;
+    const double open = std::min(rise, fall);
+    all += open;
+    if (t < time) by += open;
+  }
+  return by / all;
+}
+
+TEST(ShutterCurve, DrawsTimesAsItIsOpen) {
+  for (const auto& [opening, closing] :
+       {std::pair(0., 0.), {0.25, 0.25}, {0.5, 0.5}, {0.1, 0.6}, {0., 1.}, {1., 0.}}) {
+    Camera camera;
+    camera.shutter_opening = opening;
+    camera.shutter_closing = closing;
+    const ShutterCurve curve(camera);
+    for (const float u : {0.f, 0.01f, 0.2f, 0.37f, 0.5f, 0.81f, 0.99f, kOneMinusEpsilon}) {
+      const float t = curve.time(u, 0.3f);
+      EXPECT_GE(t, 0);
+      EXPECT_LE(t, 1);
+      EXPECT_NEAR(come_by(t, opening, closing), u, 1e-3) << opening << ' ' << closing;
+    }
+  }
+}
+
+TEST(ShutterCurve, OfAnEvenGlobalShutterIsTheNumberItselfToTheBit) {
+  const ShutterCurve curve{Camera{}};
+  for (uint32_t k = 0; k < 4096; ++k) {
+    const float u = unit_float(hash_bits(k));
+    EXPECT_EQ(curve.time(u, float(k) / 4096), u);
+  }
+}
+
+TEST(ShutterCurve, RefusesWhatClosesBeforeItIsOpen) {
+  Camera camera;
+  camera.shutter_opening = 0.6;
+  camera.shutter_closing = 0.5;
+  EXPECT_THROW(ShutterCurve{camera}, Error);
+  camera.shutter_closing = 0.2;
+  camera.rolling_shutter = -0.1;
+  EXPECT_THROW(ShutterCurve{camera}, Error);
+}
+
+TEST(ShutterCurve, FadesTheStreakOfAMovingStrip) {
+  constexpr double kWidth = 4, kTravel = 24;
+  for (const auto& [opening, closing] : {std::pair(0.5, 0.5), {0.1, 0.6}}) {
+    Strip strip(kWidth, kTravel);
+    strip.shot.camera.shutter_opening = opening;
+    strip.shot.camera.shutter_closing = closing;
+    const std::vector<double> dark =
+        darkness_of_columns(render_frame(strip.shot, 1001, strip.geometry));
+    // It covers x while its middle, at (t - 1/2) travel, is within half a width of it.
+    const auto coverage = [&](double x) {
+      const double from = (x - kWidth / 2) / kTravel + 0.5, to = (x + kWidth / 2) / kTravel + 0.5;
+      return come_by(to, opening, closing) - come_by(from, opening, closing);
+    };
+    const PixelFilter filter;
+    double sum = 0;
+    for (int column = 0; column < 64; ++column) {
+      double expected = 0;
+      for (int q = 0; q < 64; ++q)
+        expected += coverage(column + 0.5 - 32 + filter.offset({(q + 0.5f) / 64, 0.5f}).x) / 64;
+      EXPECT_NEAR(dark[column], expected, 0.01) << column;
+      sum += dark[column];
+    }
+    EXPECT_NEAR(sum, kWidth, 0.01 * kWidth);
+  }
+}
+
+TEST(RollingShutter, SlantsAMovingStripByItsLatenessAndBlursItNoMore) {
+  constexpr double kWidth = 4, kTravel = 8, kLate = 1.5;
+  Strip strip(kWidth, kTravel);
+  strip.shot.camera.rolling_shutter = kLate;
+  const Film film = render_frame(strip.shot, 1001, strip.geometry);
+  const PixelFilter filter;
+  double filter_square = 0;
+  for (int q = 0; q < 4096; ++q)
+    filter_square += std::pow(filter.offset({(q + 0.5f) / 4096, 0.5f}).x, 2) / 4096;
+  // Slant within a row's filter, uniform strip and uniform travel: their variances add.
+  const double slope = kLate * kTravel / 16;
+  const double variance =
+      (kWidth * kWidth + kTravel * kTravel) / 12 + (1 + slope * slope) * filter_square;
+  for (int y = 2; y < 14; ++y) {  // rows whose filter does not reach beyond the film
+    double sum = 0, moment = 0, square = 0;
+    for (int x = 0; x < 64; ++x) {
+      const double dark = 1 - film.rgba[4 * size_t(y * 64 + x)], at = x + 0.5 - 32;
+      sum += dark, moment += dark * at, square += dark * at * at;
+    }
+    const double middle = moment / sum;
+    EXPECT_NEAR(sum, kWidth, 0.02 * kWidth) << y;
+    EXPECT_NEAR(middle, slope * (y + 0.5), 0.15) << y;
+    EXPECT_NEAR(square / sum - middle * middle, variance, 0.06 * variance) << y;
+  }
+}
+
+TEST(RollingShutter, KeepsTheFirstRowOnTimeForAMovingCameraToo) {
+  // A pan seen by rows: the camera that moves left is the strip that moves right.
+  Strip strip(4, 8), still(4, 0);
+  still.shot.camera.rolling_shutter = strip.shot.camera.rolling_shutter = 1;
+  const double reach = 8 * Strip::kPixel / 2;
+  for (Animated<V3d>* key : {&still.shot.camera.position, &still.shot.camera.target}) {
+    const V3d middle = key->keys.front().second;
+    key->keys = {{1000.75, middle + V3d(reach, 0, 0)}, {1001.75, middle - V3d(3 * reach, 0, 0)}};
+  }
+  const Film a = render_frame(strip.shot, 1001, strip.geometry),
+             b = render_frame(still.shot, 1001, still.geometry);
+  for (int y = 0; y < 16; ++y) {
+    double difference = 0;
+    for (int x = 0; x < 64; ++x)
+      difference += std::abs(a.rgba[4 * size_t(y * 64 + x)] - b.rgba[4 * size_t(y * 64 + x)]);
+    EXPECT_LT(difference, 0.03 * 4) << y;
+  }
+}
+
+}  // namespace
+}  // namespace drench::test
