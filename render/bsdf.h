@@ -1,10 +1,10 @@
 #pragma once
-// What the path loop asks of a surface that scatters light over many directions. Every such lobe
-// has
+// What the path loop asks of a surface that scatters light over many directions. Every lobe has
 //   V3f value(const V3f& incoming, float& pdf) const   value x |cos|, and the density of `sample`
-//   Scatter sample(...) const
+//   Scatter sample(const V2f& u) const                 a rough dielectric takes one number more
+// and every surface, of one lobe or two,
 //   V3f albedo() const                                 share of the light that goes on, roughly
-// and the loop is a template over it: lobes are told apart by the material's type alone.
+// The loop's parts are templates over them; which it is the material's type says.
 
 #include "render/vector.h"
 
