@@ -149,8 +149,9 @@ void expect_all_estimators_alike(const Stage& stage, double most_error = 0.02) {
 }
 
 TEST(GlossyLight, IsTheSameByAllEstimators) {
-  for (const Material& material : {rough_glass("thing", 0.5), rough_glass("thing", 0.8, 2),
-                                   metal("thing", 0.8f, 0.5), coated("thing", 0.4f, 0.5)}) {
+  for (const Material& material :
+       {rough_glass("thing", 0.5), rough_glass("thing", 0.8, 2), metal("thing", 0.8f, 0.5),
+        coated("thing", 0.4f, 0.5), metal("thing", 0.8f, 0), coated("thing", 0.4f, 0)}) {
     Stage stage;
     stage.stand(material, ball({0, 0.4f, 0}, 0.4f));
     expect_all_estimators_alike(stage);
