@@ -2,14 +2,14 @@
 // Thin two-sided cloth: Lambertian reflection and Lambertian transmission. Without transmission it
 // is the diffuse ground.
 
+#include "render/bsdf.h"
 #include "render/sampling.h"
 
 namespace drench {
 
-struct ClothScatter {
-  V3f direction;  // unit
-  V3f weight;     // value x |cos| / pdf, per channel
-  float pdf = 0;  // per steradian; 0: absorbed
+/// Of photons, on the side that is looked at and on the other, W/m^2.
+struct Irradiance {
+  V3f front{0, 0, 0}, back{0, 0, 0};
 };
 
 class ClothBsdf {
@@ -40,16 +40,19 @@ class ClothBsdf {
     return (side > 0 ? reflectance_ : transmittance_) * (density * terminator(incoming, cos, side));
   }
 
-  /// Radiance that leaves for irradiance of this side and of the other, on the real surface.
-  V3f radiance(const V3f& front, const V3f& back) const {
-    return (reflectance_ * front + transmittance_ * back) * (1 / kPi);
+  /// Adds light on the real surface from the direction `incoming`.
+  void receive(Irradiance& light, const V3f& incoming, const V3f& power) const {
+    (dot(incoming, geometric_) > 0 ? light.front : light.back) += power;
   }
-  bool faces(const V3f& incoming) const { return dot(incoming, geometric_) > 0; }
+  /// Radiance that leaves for it.
+  V3f radiance(const Irradiance& light) const {
+    return (reflectance_ * light.front + transmittance_ * light.back) * (1 / kPi);
+  }
 
   /// One number says both the side and a direction on it: a number of its own for the side would
   /// leave either side a random part of a pixel's even set of directions.
-  ClothScatter sample(const V2f& u) const {
-    ClothScatter out;
+  Scatter sample(const V2f& u) const {
+    Scatter out;
     const float p = reflect_probability_, side = u.x < p ? 1.f : -1.f;
     const float x = side > 0 ? u.x / p : (u.x - p) / (1 - p);
     out.direction =

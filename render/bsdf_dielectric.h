@@ -12,6 +12,26 @@ struct InterfaceSplit {
   float reflectance = 1;     // Fresnel's, unpolarised; 1 is total reflection, without `refracted`
 };
 
+/// Fresnel's share of unpolarised light, of the cosines on both sides.
+inline float fresnel_reflectance(float cos_in, float cos_out, float eta) {
+  const float parallel = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
+  const float perpendicular = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
+  return 0.5f * (parallel * parallel + perpendicular * perpendicular);
+}
+
+/// The same; 1 beyond the critical angle. @param eta  index beyond over index before
+inline float fresnel_reflectance(float cos_in, float eta) {
+  const float sin2_out = (1 - cos_in * cos_in) / (eta * eta);
+  return sin2_out < 1 ? fresnel_reflectance(cos_in, std::sqrt(1 - sin2_out), eta) : 1.f;
+}
+
+/// Where light that leaves along `outgoing` came from through a surface of normal `h`, below the
+/// critical angle; unit to rounding. @param cos  dot(outgoing, h) > 0
+inline V3f refract_about(const V3f& outgoing, const V3f& h, float cos, float eta) {
+  const float cos_beyond = std::sqrt(std::max(0.f, 1 - (1 - cos * cos) / (eta * eta)));
+  return h * (cos / eta - cos_beyond) - outgoing * (1 / eta);
+}
+
 /// @param direction  unit, towards the surface
 /// @param normal     unit, dot(direction, normal) < 0
 /// @param eta        index beyond the surface over index before it
@@ -22,9 +42,7 @@ inline InterfaceSplit split_at_interface(const V3f& direction, const V3f& normal
   const float sin2_out = (1 - cos_in * cos_in) / (eta * eta);
   if (sin2_out >= 1) return out;
   const float cos_out = std::sqrt(1 - sin2_out);
-  const float parallel = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
-  const float perpendicular = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
-  out.reflectance = 0.5f * (parallel * parallel + perpendicular * perpendicular);
+  out.reflectance = fresnel_reflectance(cos_in, cos_out, eta);
   out.refracted = normalized(direction * (1 / eta) + normal * (cos_in / eta - cos_out));
   return out;
 }

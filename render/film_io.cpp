@@ -113,7 +113,7 @@ Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header
   return window;
 }
 
-Film read_pixels(const std::filesystem::path& path) {
+Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
@@ -136,7 +136,7 @@ Film read_pixels(const std::filesystem::path& path) {
 
   const Imf::Chromaticities from =
       Imf::hasChromaticities(header) ? Imf::chromaticities(header) : rec709_chromaticities();
-  if (from == acescg_chromaticities()) return film;
+  if (primaries == Primaries::as_they_are || from == acescg_chromaticities()) return film;
   const ColorMatrix matrix = color_conversion(from, acescg_chromaticities());
   for (size_t p = 0; p < film.rgba.size(); p += 4) {
     const V3f rgb = matrix({film.rgba[p], film.rgba[p + 1], film.rgba[p + 2]});
@@ -183,10 +183,10 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
   });
 }
 
-Film read_exr(const std::filesystem::path& path) {
+Film read_exr(const std::filesystem::path& path, Primaries primaries) {
   if (!std::filesystem::is_regular_file(path)) fail_read(path, "there is no such file");
   try {
-    return read_pixels(path);
+    return read_pixels(path, primaries);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& e) {

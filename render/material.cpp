@@ -11,6 +11,8 @@ namespace {
 
 /// The dark squares of the built-in checker, as a share of the reflectance.
 constexpr float kDarkSquare = 0.45f;
+/// Below it facets would be narrower than float directions resolve: smooth.
+constexpr double kLeastRoughness = 0.01;
 
 const Material* named(const std::vector<Material>& materials, const std::string& name) {
   for (const Material& m : materials)
@@ -32,8 +34,11 @@ void check(const Material& m) {
   for (int c = 0; c < 3; ++c)
     if (!(m.emission[c] >= 0) || !std::isfinite(m.emission[c]))
       fail("emission must not be negative");
-  if (m.type == MaterialType::dielectric && !(m.ior >= 1 && m.ior <= 10))
+  const bool refracts = m.type == MaterialType::dielectric || m.type == MaterialType::coated;
+  if (refracts && !(m.ior >= 1 && m.ior <= 10))
     fail(fmt::format("ior is {}; it must lie between 1 and 10", m.ior));
+  if (!(m.roughness >= 0 && m.roughness <= 1))
+    fail(fmt::format("roughness is {}; it must lie between 0 and 1", m.roughness));
   if (m.checker && !(m.checker_size > 0)) fail("checker_size must be positive");
 }
 
@@ -47,10 +52,23 @@ V3f ShadingMaterial::reflectance_at(const V2f& uv) const {
     if (squares & 1) out *= kDarkSquare;
   }
   if (texture) {
-    const V3f color = texture->at(checker ? uv * inverse_checker_size : uv);
+    const V3f color = texture->at(picture_uv(uv));
     for (int c = 0; c < 3; ++c) out[c] = std::clamp(out[c] * color[c], 0.f, 1 - transmittance[c]);
   }
   return out;
+}
+
+V3f ShadingMaterial::normal_at(const V2f& uv, const V3f& shading, const V3f& along_u,
+                               const V3f& along_v) const {
+  const V3f across = along_u - shading * dot(along_u, shading);
+  const float square = dot(across, across);
+  if (!(square > 0)) return shading;
+  const V3f tangent = across * (1 / std::sqrt(square));
+  V3f bitangent = cross(shading, tangent);
+  if (dot(bitangent, along_v) < 0) bitangent = -bitangent;  // a mirrored picture
+  const V3f n = normal_map->at(picture_uv(uv));
+  const V3f mapped = tangent * n.x + bitangent * n.y + shading * n.z;
+  return dot(mapped, mapped) > 0 ? normalized(mapped) : shading;
 }
 
 ShadingMaterial find_material(const Shot& shot, const std::string& name) {
@@ -70,11 +88,18 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
   else
     out.transmittance = V3f(0);
   if (found->type == MaterialType::diffuse) out.emission = found->emission;
+  const bool facets = found->type == MaterialType::dielectric ||
+                      found->type == MaterialType::metal || found->type == MaterialType::coated;
+  if (facets && found->roughness >= kLeastRoughness)
+    out.alpha = float(found->roughness * found->roughness);
+  out.edge = found->edge;
   out.ior = float(found->ior);
   out.priority = found->priority;
   out.absorption = found->absorption;
   if (!found->texture.empty())
     out.texture = std::make_shared<const Texture>(read_texture(found->texture));
+  if (!found->normal_map.empty())
+    out.normal_map = std::make_shared<const Texture>(read_normal_map(found->normal_map));
   out.checker = found->checker;
   out.inverse_checker_size = float(1 / found->checker_size);
   return out;

@@ -3,24 +3,41 @@
 
 #include <memory>
 
+#include <vector>
+
 #include "pipeline/contract/shot.h"
+#include "render/albedo_table.h"
 #include "render/texture.h"
 
 namespace drench {
 
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
-  V3f reflectance, transmittance;
+  V3f reflectance, transmittance, edge{1, 1, 1};
+  float alpha = 0;        // of GGX facets; 0: smooth
   V3f emission{0, 0, 0};  // W/(sr m^2)
   float ior = 1;
   int priority = 0;
   V3f absorption;  // 1/m
-  std::shared_ptr<const Texture> texture;
+  std::shared_ptr<const Texture> texture, normal_map;
   bool checker = false;
   float inverse_checker_size = 1;  // 1/m
 
+  /// By the medium outside: seen from there, and for a rough dielectric from within; of metal one.
+  /// None where the indices are the same. Scene fills them in, for what has facets.
+  std::vector<std::shared_ptr<const AlbedoTable>> albedo_outside, albedo_inside;
+
+  bool has_facets() const {
+    return type == MaterialType::metal || type == MaterialType::coated || alpha > 0;
+  }
   /// Diffuse reflectance at a surface point; with the transmittance never above 1.
   V3f reflectance_at(const V2f& uv) const;
+  /// The mapped normal. @param shading  unit  @param along_u, along_v  of growing u and v, any
+  /// length
+  V3f normal_at(const V2f& uv, const V3f& shading, const V3f& along_u, const V3f& along_v) const;
+
+ private:
+  V2f picture_uv(const V2f& uv) const { return checker ? uv * inverse_checker_size : uv; }
 };
 
 /// The shot's material of that name, or the built-in "water", "cotton" or "ground".

@@ -12,7 +12,10 @@
 #include <utility>
 
 #include "render/bsdf_cloth.h"
+#include "render/bsdf_coated.h"
 #include "render/bsdf_dielectric.h"
+#include "render/bsdf_metal.h"
+#include "render/bsdf_rough.h"
 #include "render/guide.h"
 
 namespace drench {
@@ -51,7 +54,7 @@ struct PathState {
   bool specular_only = true;
   int vertices = 0, diffuse = 0;
   int interfaces = 0;        // since the last diffuse surface
-  bool has_photons = false;  // that surface
+  bool has_photons = false;  // that surface, and nothing but smooth bodies since
   uint32_t branch = 0;
 };
 
@@ -60,6 +63,7 @@ class PathTracer {
   static constexpr bool kMoving = features & kMotionBlur;
   static constexpr bool kWater = features & kDielectric;
   static constexpr bool kLights = features & kSampledLights;
+  static constexpr bool kFacets = features & kGlossy;
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
@@ -120,6 +124,10 @@ class PathTracer {
     record_first(state, surface, hit);
     if constexpr (kLights)
       if (surface.light >= 0) add_own_light(state, surface, hit.distance);
+    if constexpr (kFacets) {
+      if (surface.material->type == MaterialType::metal) return scatter_metal(state, surface);
+      if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
+    }
     return scatter_cloth(state, surface);
   }
 
@@ -234,6 +242,12 @@ class PathTracer {
             lights.mesh_group(surface.light));
   }
 
+  /// Whether lights are sampled from a point in these bodies: light from outside reaches it only
+  /// by refraction, which surface samples find.
+  bool samples_lights(Bodies in) const {
+    return kLights && !(kWater && in && !scene_.lights_in_bodies());
+  }
+
   /// Continues the path along `direction` from the surface.
   void depart(PathState& state, const Surface& surface, const V3f& direction) {
     state.vertex = surface.position;
@@ -244,6 +258,12 @@ class PathTracer {
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
     const float eta = scene_.medium(state.in ^ surface.body).ior / scene_.medium(state.in).ior;
+    if constexpr (kFacets)
+      if (surface.material->alpha > 0) {
+        state.has_photons = false;  // they pass smooth bodies only
+        const AlbedoTable* albedo = scene_.interface_albedo(surface, state.in);
+        if (albedo) return scatter_rough(state, surface, eta, *albedo);
+      }
     const V3f flat = state.in & surface.body ? -surface.geometric_normal : surface.geometric_normal;
     InterfaceSplit split = split_at_interface(
         d, interface_normal(d, surface.geometric_normal, surface.shading_normal), eta);
@@ -270,6 +290,62 @@ class PathTracer {
     return true;
   }
 
+  bool scatter_rough(PathState& state, const Surface& surface, float eta,
+                     const AlbedoTable& albedo) {
+    const RoughBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                         surface.material->alpha, eta, albedo);
+    const Bodies beyond = state.in ^ surface.body;
+    record_albedo(state.survival);
+    add_direct(state, surface, beyond, bsdf);
+    const Scatter next = bsdf.sample(point(state, kScatterDirection), number(state, kScatterSide));
+    return follow(state, surface, next, bsdf.through(next.direction) ? beyond : state.in);
+  }
+
+  bool scatter_metal(PathState& state, const Surface& surface) {
+    const ShadingMaterial& material = *surface.material;
+    const MetalBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                         material.alpha,
+                         MetalFresnel(material.reflectance_at(surface.uv), material.edge),
+                         *material.albedo_outside[0]);
+    state.has_photons = false;
+    add_direct(state, surface, state.in, bsdf);
+    state.survival *= bsdf.albedo();
+    if (material.alpha > 0) record_albedo(state.survival);  // else it shows other things
+    return follow(state, surface, bsdf.sample(point(state, kScatterDirection)), state.in);
+  }
+
+  /// One lobe is followed; lights are sampled for both, and photons gathered by the diffuse one.
+  bool scatter_coated(PathState& state, const Surface& surface) {
+    if (++state.diffuse > settings_.depth) return false;
+    const ShadingMaterial& material = *surface.material;
+    const CoatedBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                          material.alpha, material.ior / scene_.medium(state.in).ior,
+                          material.reflectance_at(surface.uv),
+                          scene_.coat_albedo(material, state.in));
+    const CoatLobe coat = bsdf.coat();
+    const CoatedBase base = bsdf.base();
+    const bool photons = kWater && settings_.photons && !surface.small;
+    if (photons) add_caustics(state, surface, base);
+    add_direct(state, surface, state.in, coat, base);
+    const bool follow_coat = number(state, kScatterSide) < bsdf.coat_share();
+    const V2f u = point(state, kScatterDirection);
+    state.interfaces = 0;
+    state.has_photons = photons && !follow_coat;
+    state.survival *= bsdf.albedo();
+    record_albedo(state.survival);
+    return follow(state, surface, follow_coat ? coat.sample(u) : base.sample(u), state.in);
+  }
+
+  /// Continues along a direction drawn from a surface, in the bodies that are there.
+  bool follow(PathState& state, const Surface& surface, const Scatter& next, Bodies in) {
+    if (!(next.pdf > 0)) return false;
+    state.in = in;
+    depart(state, surface, next.direction);
+    state.throughput *= next.weight;
+    state.bsdf_pdf = samples_lights(in) && std::isfinite(next.pdf) ? next.pdf : 0;
+    return true;
+  }
+
   bool scatter_cloth(PathState& state, const Surface& surface) {
     if (++state.diffuse > settings_.depth) return false;
     const ShadingMaterial& material = *surface.material;
@@ -280,11 +356,9 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = kWater && settings_.photons && !surface.small;
     if (state.has_photons) add_caustics(state, surface, bsdf);
-    // Light from outside reaches a point in a body only by refraction, which surface samples find.
-    const bool sample_lights = kLights && !(kWater && state.in && !scene_.lights_in_bodies());
-    if (sample_lights && settings_.estimator != Estimator::bsdf_only)
-      add_direct(state, surface, bsdf);
-    const ClothScatter next = sample_scatter(state, surface, bsdf);
+    const bool sample_lights = samples_lights(state.in);
+    add_direct(state, surface, state.in, bsdf);
+    const Scatter next = sample_scatter(state, surface, bsdf);
     if (!(next.pdf > 0)) return false;
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
@@ -302,8 +376,8 @@ class PathTracer {
 
   /// The next direction: drawn from the surface, or in water from a mixture with the guide. Its
   /// density is the surface's own in either case: light samples are weighed against that one.
-  ClothScatter sample_scatter(const PathState& state, const Surface& surface,
-                              const ClothBsdf& bsdf) const {
+  Scatter sample_scatter(const PathState& state, const Surface& surface,
+                         const ClothBsdf& bsdf) const {
     const V2f uv = point(state, kScatterDirection);
     if constexpr (!kWater) return bsdf.sample(uv);
     if (state.in != scene_.fluid() || state.in == 0 ||
@@ -316,7 +390,7 @@ class PathTracer {
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(uv);
     const float u = number(state, kScatterSide);
-    ClothScatter out;
+    Scatter out;
     float guide_pdf = 0;
     if (u < share) {
       const DirectionSample aimed = guide.sample(surface.position, u / share, uv);
@@ -334,31 +408,49 @@ class PathTracer {
     return out;
   }
 
-  void add_caustics(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
-    V3f front(0), back(0);
-    settings_.photons->for_each_near(
-        surface.position, surface.geometric_normal, [&](const Photon& photon, float share) {
-          (bsdf.faces(-photon.direction) ? front : back) += photon.power * share;
-        });
-    deposit(state.throughput * bsdf.radiance(front, back), scene_.lights().caustics_group());
+  template <class Bsdf>
+  void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
+    Irradiance light;
+    settings_.photons->for_each_near(surface.position, surface.geometric_normal,
+                                     [&](const Photon& photon, float share) {
+                                       bsdf.receive(light, -photon.direction, photon.power * share);
+                                     });
+    deposit(state.throughput * bsdf.radiance(light), scene_.lights().caustics_group());
   }
 
-  void add_direct(const PathState& state, const Surface& surface, const ClothBsdf& bsdf) {
+  /// Light from a sampled light by way of each lobe. @param beyond  bodies that the surface's other
+  /// side is in
+  template <class... Lobe>
+  void add_direct(const PathState& state, const Surface& surface, Bodies beyond,
+                  const Lobe&... lobe) {
+    if (settings_.estimator == Estimator::bsdf_only) return;
+    if (!samples_lights(state.in) && !samples_lights(beyond)) return;
     const LightSample light = scene_.lights().sample(
         surface.position, state.ray.time, number(state, kLightChoice), point(state, kLightPoint));
     if (!(light.pdf > 0)) return;
-    float bsdf_pdf = 0;
-    const V3f value = bsdf.value(light.direction, bsdf_pdf);
-    if (is_black(value)) return;
+    Bodies in = state.in;
+    if constexpr (kFacets) {
+      const V3f& n = surface.geometric_normal;
+      if (dot(light.direction, n) * dot(state.ray.direction, n) > 0) in = beyond;
+      if (!samples_lights(in)) return;
+    }
+    V3f found(0);
+    const auto add = [&](const auto& bsdf) {
+      float bsdf_pdf = 0;
+      const V3f value = bsdf.value(light.direction, bsdf_pdf);
+      if (is_black(value)) return;
+      const float weight =
+          settings_.estimator == Estimator::light_only ? 1.f : power_heuristic(light.pdf, bsdf_pdf);
+      found += state.throughput * value * light.radiance * (weight / light.pdf);
+    };
+    (add(lobe), ...);
+    if (is_black(found)) return;
     const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
     ++rays_;
     if (scene_.occluded(shadow, light.distance)) return;
-    const float weight =
-        settings_.estimator == Estimator::light_only ? 1.f : power_heuristic(light.pdf, bsdf_pdf);
-    V3f found = state.throughput * value * light.radiance * (weight / light.pdf);
     if constexpr (kWater)
-      if (state.in && light.distance < kInfinity) {
-        const V3f& a = scene_.medium(state.in).absorption;
+      if (in && light.distance < kInfinity) {
+        const V3f& a = scene_.medium(in).absorption;
         for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
       }
     if (finite(found)) deposit(found, light.group);

@@ -14,7 +14,8 @@ enum Feature : unsigned {
   kDielectric = 2,     // water: refraction, absorption, medium on the path
   kSampledLights = 4,  // lights are sampled, with multiple importance sampling
   kThinLens = 8,
-  kFeatureCount = 16,  // combinations
+  kGlossy = 16,        // metal, coats, rough dielectrics
+  kFeatureCount = 32,  // combinations
 };
 
 /// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.

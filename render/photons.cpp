@@ -28,7 +28,7 @@ constexpr float kLongSurvival = 0.8f;
 constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
-/// The bodies' triangles by area; those on sheets let light pass and start none.
+/// The smooth bodies' triangles by area; those on sheets let light pass and start none.
 class InterfacePoints {
  public:
   explicit InterfacePoints(const Scene& scene) : scene_(scene) {
@@ -37,7 +37,8 @@ class InterfacePoints {
       const SceneObject& body = scene.object(index);
       first_.push_back(upto_.size());
       for (size_t t = 0; t < body.triangle.size(); ++t) {
-        if (body.contact.empty() || !body.contact[t]) sum += double(corners(body, t, 0).area());
+        if (!scene.is_rough(body) && (body.contact.empty() || !body.contact[t]))
+          sum += double(corners(body, t, 0).area());
         upto_.push_back(sum);
       }
     }
@@ -107,7 +108,8 @@ class PhotonTracer {
       const Hit hit = next(flight, surface, rays);
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
       if (surface.body) continue;
-      if (surface.small) return false;  // paths bring it what it gets
+      // Paths bring foam and metal what they get.
+      if (surface.small || surface.material->type == MaterialType::metal) return false;
       const float n = scene_.medium(flight.in).ior;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
                 flight.power * (1 / (n * n))};
@@ -152,6 +154,7 @@ class PhotonTracer {
       flight.ray.origin = surface.leave(d);
       return true;
     }
+    if (surface.material->alpha > 0) return false;  // paths keep what rough bodies let through
     const float eta = after.ior / before.ior;
     const V3f flat =
         flight.in & surface.body ? -surface.geometric_normal : surface.geometric_normal;

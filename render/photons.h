@@ -3,10 +3,11 @@
 // from the camera hit a small lamp behind water by luck alone, so they leave that light out,
 // exactly, and find it in a map of photons (Jensen 1996, "Global Illumination using Photon Maps").
 //
-// A photon starts at a point of a body's surface that a lamp reaches unhindered, so that none
-// misses the body, goes on through it and lies where it first meets a diffuse surface. Of N
-// photons the map's radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that
-// both its blur, as N^(-1/2), and its noise, as N^(-1/4), vanish.
+// A photon starts at a point of a smooth body's surface that a lamp reaches unhindered, so that
+// none misses the body, goes on through it and lies where it first meets a diffuse surface; rough
+// bodies and metal end it, and paths keep what they find by way of those. Of N photons the map's
+// radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that both its blur, as
+// N^(-1/2), and its noise, as N^(-1/4), vanish.
 
 #include <immintrin.h>
 

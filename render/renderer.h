@@ -64,8 +64,9 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
 /// equal files.
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
+enum class Primaries { converted, as_they_are };  // to ACEScg; as_they_are: what is no colour
 /// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.
-Film read_exr(const std::filesystem::path& path);
+Film read_exr(const std::filesystem::path& path, Primaries primaries = Primaries::converted);
 
 /// Display-referred 8-bit sRGB of a film through the built-in view transform; 3 x width x height.
 std::vector<uint8_t> view_transform(const Film& film);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include "pipeline/contract/error.h"
 #include "render/path.h"
@@ -20,6 +21,8 @@ constexpr float kRelativeError = 16 * 0x1p-24f;
 constexpr float kSharedError = 2 * 0x1p-24f;
 /// Of foam: froth scatters light many times and absorbs next to none.
 constexpr float kFoamReflectance = 0.9f;
+/// Indices whose ratio is so near 1 have no facets that bend light.
+constexpr float kSameIndex = 1e-3f;
 
 EmbreeDevice make_device() {
   // One instruction set on every machine, so that rays meet the same triangles everywhere.
@@ -150,7 +153,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     if (materials_[ground_material_].type == MaterialType::dielectric)
       throw Error(
           fmt::format("ground: material '{}' is a dielectric, which needs a closed surface; "
-                      "use a diffuse one",
+                      "use a diffuse, metal or coated one",
                       shot.ground.material));
   }
   const bool has_fluid = !geometry.fluid.triangle.empty();
@@ -167,13 +170,14 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     if (materials_[index].type == MaterialType::dielectric)
       throw Error(
           fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
-                      "surface; use a cloth or diffuse one",
+                      "surface; use a cloth, diffuse, metal or coated one",
                       cloth.name, material));
     add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
   find_bodies(has_fluid);
+  find_albedos();
   find_features();
 }
 
@@ -235,6 +239,40 @@ void Scene::find_mesh_lights() {
                           object.position_close.empty() ? nullptr : object.position_close.data()},
                          emission, object.name);
   }
+}
+
+/// One table for each pair of roughness and index that facets of the frame have.
+void Scene::find_albedos() {
+  std::map<std::pair<float, float>, std::shared_ptr<const AlbedoTable>> known;
+  const auto table = [&](float alpha, float eta) {
+    std::shared_ptr<const AlbedoTable>& entry = known[{alpha, eta}];
+    if (!entry)
+      entry = std::make_shared<const AlbedoTable>(eta == 0 ? AlbedoTable::mirrors(alpha)
+                                                           : AlbedoTable::dielectric(alpha, eta));
+    return entry;
+  };
+  for (ShadingMaterial& m : materials_) {
+    if (!m.has_facets()) continue;
+    if (m.type == MaterialType::metal) {
+      m.albedo_outside = {table(m.alpha, 0)};
+      continue;
+    }
+    m.albedo_outside.resize(medium_.size());
+    m.albedo_inside.resize(medium_.size());
+    for (size_t k = 0; k < medium_.size(); ++k) {
+      const float eta = m.ior / medium_[k].ior;
+      if (m.type == MaterialType::coated) m.albedo_outside[k] = table(m.alpha, eta);
+      if (m.type == MaterialType::coated || std::abs(eta - 1) < kSameIndex) continue;
+      m.albedo_outside[k] = table(m.alpha, eta);
+      m.albedo_inside[k] = table(m.alpha, 1 / eta);
+    }
+  }
+}
+
+const AlbedoTable* Scene::interface_albedo(const Surface& surface, Bodies in) const {
+  const size_t outside = size_t(std::bit_width(in & ~surface.body));
+  const ShadingMaterial& m = *surface.material;
+  return (in & surface.body ? m.albedo_inside : m.albedo_outside)[outside].get();
 }
 
 bool Scene::moves_visibly(const TriangleMesh& mesh) const {
@@ -368,8 +406,11 @@ void Scene::build(SceneObject& object) {
 void Scene::find_features() {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
+  const bool facets = std::any_of(materials_.begin(), materials_.end(),
+                                  [](const ShadingMaterial& m) { return m.has_facets(); });
   features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
-              (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u);
+              (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
+              (facets ? kGlossy : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
@@ -435,6 +476,12 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
 }
 
+/// Turns the shading normal as the material's map says, unless that is out of the real surface.
+void map_normal(Surface& s, const V3f& along_u, const V3f& along_v) {
+  const V3f mapped = s.material->normal_at(s.uv, s.shading_normal, along_u, along_v);
+  if (dot(mapped, s.geometric_normal) > 0.01f) s.shading_normal = mapped;
+}
+
 }  // namespace
 
 template <bool moving>
@@ -447,6 +494,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
     s.geometric_normal = s.shading_normal = V3f(0, 1, 0);
     s.uv = {s.position.x, s.position.z};
     s.material = &materials_[ground_material_];
+    if (s.material->normal_map) map_normal(s, V3f(1, 0, 0), V3f(0, 0, 1));
     return s;
   }
   const SceneObject& object = objects_[hit.index];
@@ -476,6 +524,11 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
   s.light = object.light;
   s.triangle = hit.triangle;
+  if (s.material->normal_map && !object.uv.empty()) {
+    const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
+    const float turn = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
+    map_normal(s, ((b - a) * q.y - (c - a) * p.y) * turn, ((c - a) * p.x - (b - a) * q.x) * turn);
+  }
   s.contact = !object.contact.empty() && object.contact[hit.triangle];
   return s;
 }

@@ -84,6 +84,12 @@ class Scene {
   /// The bodies that a point lies in.
   Bodies bodies_at(const V3f& point, float time) const;
   const Medium& medium(Bodies in) const { return medium_[size_t(std::bit_width(in))]; }
+  /// Of a rough body's surface seen from within the bodies `in`; null if it divides equal indices.
+  const AlbedoTable* interface_albedo(const Surface& surface, Bodies in) const;
+  /// Of a coat that lies in the bodies `in`.
+  const AlbedoTable& coat_albedo(const ShadingMaterial& material, Bodies in) const {
+    return *material.albedo_outside[size_t(std::bit_width(in))];
+  }
 
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
@@ -91,6 +97,7 @@ class Scene {
   size_t object_count() const { return objects_.size(); }
   /// m/s, of what was hit; 0 unless the layer of motion is asked for.
   V3f velocity(const Hit& hit) const;
+  bool is_rough(const SceneObject& object) const { return materials_[object.material].alpha > 0; }
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
   Bodies fluid() const { return fluid_; }                          // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
@@ -106,6 +113,7 @@ class Scene {
   void find_bodies(bool has_fluid);
   void find_mesh_lights();
   void find_lights_in(const SceneObject& body);
+  void find_albedos();
   void build(SceneObject& object);
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;

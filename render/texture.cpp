@@ -35,7 +35,9 @@ void check_size(const std::filesystem::path& path, uint64_t width, uint64_t heig
     fail(path, fmt::format("{} x {} pixels (at most {})", width, height, kLargestPixels));
 }
 
-Bytes read_png(const std::filesystem::path& path, const std::vector<std::byte>& file) {
+/// @param flags  of libpng: how 16-bit files are taken
+Bytes read_png(const std::filesystem::path& path, const std::vector<std::byte>& file,
+               uint32_t flags = 0) {
   png_image image;
   std::memset(&image, 0, sizeof image);
   image.version = PNG_IMAGE_VERSION;
@@ -45,6 +47,7 @@ Bytes read_png(const std::filesystem::path& path, const std::vector<std::byte>& 
     png_image_free(&image);
     check_size(path, image.width, image.height);
   }
+  image.flags |= flags;
   image.format = PNG_FORMAT_RGBA;
   Bytes out{int(image.width), int(image.height), {}};
   std::vector<uint8_t> rgba(PNG_IMAGE_SIZE(image));
@@ -122,8 +125,8 @@ Texture from_srgb(const Bytes& bytes) {
   return out;
 }
 
-Texture from_exr(const std::filesystem::path& path) {
-  const Film film = read_exr(path);
+Texture from_exr(const std::filesystem::path& path, Primaries primaries) {
+  const Film film = read_exr(path, primaries);
   Texture out{film.width, film.height, {}};
   out.texel.resize(size_t(film.width) * film.height);
   for (size_t p = 0; p < out.texel.size(); ++p) {
@@ -150,18 +153,54 @@ V3f Texture::at(const V2f& uv) const {
          (texel_at(c, r + 1) * (1 - s) + texel_at(c + 1, r + 1) * s) * t;
 }
 
-Texture read_texture(const std::filesystem::path& path) {
-  const std::vector<std::byte> file = read_file(path, kLargestFile);
+namespace {
+
+enum class Format { png, jpeg, exr };
+
+Format format_of(const std::filesystem::path& path, const std::vector<std::byte>& file) {
   const auto starts_with = [&](std::initializer_list<int> magic) {
     size_t k = 0;
     for (int byte : magic)
       if (k >= file.size() || file[k++] != std::byte(byte)) return false;
     return true;
   };
-  if (starts_with({0x89, 'P', 'N', 'G'})) return from_srgb(read_png(path, file));
-  if (starts_with({0xff, 0xd8, 0xff})) return from_srgb(read_jpeg(path, file));
-  if (starts_with({0x76, 0x2f, 0x31, 0x01})) return from_exr(path);
+  if (starts_with({0x89, 'P', 'N', 'G'})) return Format::png;
+  if (starts_with({0xff, 0xd8, 0xff})) return Format::jpeg;
+  if (starts_with({0x76, 0x2f, 0x31, 0x01})) return Format::exr;
   fail(path, "it is none of the known formats");
+}
+
+}  // namespace
+
+Texture read_texture(const std::filesystem::path& path) {
+  const std::vector<std::byte> file = read_file(path, kLargestFile);
+  switch (format_of(path, file)) {
+    case Format::png:
+      return from_srgb(read_png(path, file));
+    case Format::jpeg:
+      return from_srgb(read_jpeg(path, file));
+    case Format::exr:
+      return from_exr(path, Primaries::converted);
+  }
+  return {};
+}
+
+Texture read_normal_map(const std::filesystem::path& path) {
+  const std::vector<std::byte> file = read_file(path, kLargestFile);
+  const Format format = format_of(path, file);
+  if (format == Format::exr) {
+    Texture out = from_exr(path, Primaries::as_they_are);
+    for (V3f& n : out.texel) n = n * 2.f - V3f(1);
+    return out;
+  }
+  // Taken as sRGB, 16 bits keep their values.
+  const Bytes bytes = format == Format::png ? read_png(path, file, PNG_IMAGE_FLAG_16BIT_sRGB)
+                                            : read_jpeg(path, file);
+  Texture out{bytes.width, bytes.height, {}};
+  out.texel.resize(bytes.rgb.size() / 3);
+  for (size_t p = 0; p < out.texel.size(); ++p)
+    for (int c = 0; c < 3; ++c) out.texel[p][c] = (float(bytes.rgb[3 * p + size_t(c)]) - 128) / 127;
+  return out;
 }
 
 }  // namespace drench

@@ -20,4 +20,9 @@ struct Texture {
 /// @throws Error naming the file and the reason if it cannot be read.
 Texture read_texture(const std::filesystem::path& path);
 
+/// Normals of tangent space, not unit: components -1..1 of a picture's 0..1, as they stand in the
+/// file, without its colour space. A byte of 128 is 0.
+/// @throws Error as above.
+Texture read_normal_map(const std::filesystem::path& path);
+
 }  // namespace drench

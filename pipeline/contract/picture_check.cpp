@@ -148,19 +148,20 @@ class PictureChecker : CheckBase {
 
   void check_material_uses() const {
     check_use("fluid.material", shot_.fluid.material, MaterialType::cloth, "a closed volume",
-              "Use type dielectric or diffuse");
+              "Use type dielectric, diffuse, metal or coated");
     for (size_t i = 0; i < shot_.cloth.size(); ++i) {
       check_use(fmt::format("cloth[{}].material", i), shot_.cloth[i].material,
-                MaterialType::dielectric, "an open sheet", "Use type cloth or diffuse");
+                MaterialType::dielectric, "an open sheet",
+                "Use type cloth, diffuse, metal or coated");
     }
     for (size_t i = 0; i < shot_.obstacle.size(); ++i) {
       if (shot_.obstacle[i].type != ObstacleType::plane) continue;
       check_use(fmt::format("obstacle[{}].material", i), shot_.obstacle[i].material,
                 MaterialType::dielectric, "a plane",
-                "Use type diffuse, or an obstacle of type box");
+                "Use type diffuse, metal or coated, or an obstacle of type box");
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
-              "Use type diffuse");
+              "Use type diffuse, metal or coated");
     check_dark("fluid.material", shot_.fluid.material, "the fluid");
     check_dark("ground.material", shot_.ground.material, "the ground");
     for (size_t i = 0; i < shot_.cloth.size(); ++i)

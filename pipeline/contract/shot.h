@@ -289,19 +289,22 @@ struct Light {
   V3f below{1, 1, 1};    // the same below the horizon
 };
 
-enum class MaterialType { dielectric, cloth, diffuse };
+enum class MaterialType { dielectric, cloth, diffuse, metal, coated };
 
 struct Material {
   std::string name;
   MaterialType type = MaterialType::diffuse;
-  V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth
+  V3f reflectance{0.5f, 0.5f, 0.5f};  // diffuse, cloth, under a coat; of metal facing it
+  V3f edge{1, 1, 1};                  // metal: reflectance at 82 degrees over Schlick's there
+  double roughness = 0;               // dielectric, metal, coat: its square is GGX's alpha
   V3f emission{0, 0, 0};              // diffuse, W/(sr m^2); of obstacles, from their outer side
   V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
-  double ior = 1.333;                 // dielectric
+  double ior = 1.333;                 // dielectric, coat
   int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
-  std::filesystem::path texture;      // diffuse, cloth: PNG, JPEG or EXR, multiplies reflectance
-  bool checker = false;               // diffuse: built-in checker of checker_size
+  std::filesystem::path texture;      // PNG, JPEG or EXR, multiplies reflectance
+  std::filesystem::path normal_map;   // PNG, JPEG or EXR, tangent space, x along u, y along v
+  bool checker = false;               // diffuse, coated: built-in checker of checker_size
   double checker_size = 0.1;          // m
 };
 

@@ -7,7 +7,7 @@ namespace {
 
 // Bits of LightType and of MaterialType.
 constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8, disk = 16;
-constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4;
+constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4, metal = 8, coated = 16;
 
 std::vector<Parameter> camera_rows() {
   return {
@@ -93,19 +93,27 @@ std::vector<Parameter> material_rows() {
           .needed()
           .identity(),
       row<&Material::type>("material", "type", "", none, render, "how light meets it")
-          .one_of({"dielectric", "cloth", "diffuse"})
+          .one_of({"dielectric", "cloth", "diffuse", "metal", "coated"})
           .identity(),
       row<&Material::reflectance>("material", "reflectance", "", share, render,
-                                  "diffuse reflection")
-          .only(cloth_type | diffuse),
+                                  "diffuse reflection, of a coated one under its coat; of metal, "
+                                  "of light that faces it")
+          .only(cloth_type | diffuse | metal | coated),
+      row<&Material::edge>("material", "edge", "", share, render,
+                           "its colour at 82 degrees over that of Schlick's formula there")
+          .only(metal),
+      row<&Material::roughness>("material", "roughness", "", share, render,
+                                "its square is the alpha of GGX facets; below 0.01 smooth")
+          .only(dielectric | metal | coated),
       row<&Material::emission>("material", "emission", "W/(sr m^2)", {0, 1e9}, render,
                                "light of its own, of obstacles only, from their outer side")
           .only(diffuse),
       row<&Material::transmittance>("material", "transmittance", "", share, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(cloth_type),
-      row<&Material::ior>("material", "ior", "", {1, 4}, render, "index of refraction")
-          .only(dielectric),
+      row<&Material::ior>("material", "ior", "", {1, 4}, render,
+                          "index of refraction, of the body or the coat; glass and varnish 1.5")
+          .only(dielectric | coated),
       row<&Material::priority>("material", "priority", "", {-100, 100}, render,
                                "where bodies overlap the highest is; of equals, an obstacle")
           .only(dielectric),
@@ -114,12 +122,15 @@ std::vector<Parameter> material_rows() {
           .only(dielectric),
       row<&Material::texture>("material", "texture", "", none, render,
                               "PNG, JPEG or EXR that multiplies reflectance")
-          .only(cloth_type | diffuse),
+          .only(cloth_type | diffuse | metal | coated),
+      row<&Material::normal_map>("material", "normal_map", "", none, render,
+                                 "PNG, JPEG or EXR of normals, linear: x along u, y along v, on "
+                                 "meshes with uv and the ground"),
       row<&Material::checker>("material", "checker", "", none, render, "built-in checker")
-          .only(diffuse),
+          .only(diffuse | coated),
       row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,
                                    "edge of one of its squares")
-          .only(diffuse),
+          .only(diffuse | coated),
   };
 }
 

@@ -240,7 +240,8 @@ Shot one_of_everything(const std::string& name) {
     shot.light.push_back(light);
   }
   for (const MaterialType type :
-       {MaterialType::dielectric, MaterialType::cloth, MaterialType::diffuse}) {
+       {MaterialType::dielectric, MaterialType::cloth, MaterialType::diffuse, MaterialType::metal,
+        MaterialType::coated}) {
     Material material;
     material.type = type;
     material.name = "material" + std::to_string(shot.material.size() + 1);

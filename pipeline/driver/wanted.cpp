@@ -138,7 +138,8 @@ StageKey render_key(const Shot& shot) {
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first);
   for (const Light& light : shot.light) builder.file(light.map);
-  for (const Material& material : shot.material) builder.file(material.texture);
+  for (const Material& material : shot.material)
+    builder.file(material.texture).file(material.normal_map);
   add_obstacle_meshes(shot, builder);
   return builder.finish();
 }

@@ -122,6 +122,7 @@ TEST_F(ShotDigest, ChangesForExactlyTheStagesOfEachRow) {
     everything.obstacle.emplace_back().type = type;  // beside cloth, as no shot that is read has it
     everything.sink.emplace_back().shape.type = type;
   }
+  everything.material.emplace_back().type = MaterialType::metal;
   size_t seen = 0;
   for (const Parameter& p : shot_table::parameters()) {
     if (p.field == nullptr) continue;

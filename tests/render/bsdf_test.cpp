@@ -68,7 +68,7 @@ TEST(Cloth, SamplesWithTheDensityAndValueItStates) {
   int kept = 0;
   for (int k = 0; k < 20000; ++k) {
     const ClothBsdf bsdf = cloth.bsdf(0.5f);
-    const ClothScatter s = bsdf.sample({cloth.uniform(), cloth.uniform()});
+    const Scatter s = bsdf.sample({cloth.uniform(), cloth.uniform()});
     if (!(s.pdf > 0)) continue;
     ++kept;
     float pdf = 0;
