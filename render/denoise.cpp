@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
 
 namespace drench {
@@ -28,6 +29,10 @@ constexpr float kRidge = 1e-4f;
 constexpr int kMostFeatures = 9;               // with the two of the place in the picture
 constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
 constexpr int kRows = kMostTerms + 3;          // and the colours
+
+/// An outlier is this many times brighter than all but three of the 24 pixels around it, and its
+/// own samples do not know its brightness to this part.
+constexpr float kOutlier = 4, kUnsure = 0.25f;
 
 using TileRow = std::array<float, kTile>;
 
@@ -204,9 +209,61 @@ class TileDenoiser {
   NormalEquations equations_;
 };
 
+/// Calls with each pixel and the pixels within `reach` of it.
+template <class Visit>
+void for_each_window(int width, int height, int reach, const Visit& visit) {
+  std::vector<size_t> window;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      window.clear();
+      for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
+        for (int u = std::max(x - reach, 0); u <= std::min(x + reach, width - 1); ++u)
+          window.push_back(size_t(v) * size_t(width) + size_t(u));
+      visit(size_t(y) * size_t(width) + size_t(x), window);
+    }
+}
+
+void tame_outliers(NoisyPicture& picture) {
+  Plane bright(picture.variance[0].size(), 0.f);
+  for (size_t p = 0; p < bright.size(); ++p)
+    for (const auto& half : picture.half)
+      for (const Plane& colour : half) bright[p] += colour[p] / 6;
+  std::vector<float> around;
+  for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
+    float variance = 0;
+    for (const Plane& v : picture.variance) variance += v[p] / 3;
+    if (variance < kUnsure * kUnsure * bright[p] * bright[p]) return;
+    around.clear();
+    for (const size_t q : window)
+      if (q != p) around.push_back(bright[q]);
+    if (around.size() < 4) return;
+    std::nth_element(around.begin(), around.begin() + 3, around.end(), std::greater<>());
+    const float most = kOutlier * around[3];
+    if (!(bright[p] > most)) return;
+    const float factor = most / bright[p];
+    for (auto& half : picture.half)
+      for (Plane& colour : half) colour[p] *= factor;
+    for (Plane& v : picture.variance) v[p] *= factor * factor;
+  });
+}
+
+/// Mean of the 3 x 3 pixels around each: the few samples of one tell its variance badly.
+void smooth_variance(NoisyPicture& picture) {
+  for (Plane& variance : picture.variance) {
+    const Plane told = variance;
+    for_each_window(picture.width, picture.height, 1, [&](size_t p, const auto& window) {
+      float sum = 0;
+      for (const size_t q : window) sum += told[q];
+      variance[p] = sum / float(window.size());
+    });
+  }
+}
+
 }  // namespace
 
-std::vector<Plane> denoise(const NoisyPicture& picture) {
+std::vector<Plane> denoise(NoisyPicture picture) {
+  tame_outliers(picture);
+  smooth_variance(picture);
   std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
   const int columns = (picture.width + kTile - 1) / kTile;
   const int rows = (picture.height + kTile - 1) / kTile;

@@ -22,8 +22,10 @@ struct NoisyPicture {
 /// by which patches look alike in the other half: Bitterli et al. 2016, "Nonlinearly Weighted
 /// First-order Regression for Denoising Monte Carlo Renderings", equations 3 and 8; the distance of
 /// patches is that of Rousselle et al. 2012, equation 4. One bandwidth, and features that are noisy
-/// weigh less (ridge) in place of being filtered first. The same bits for any thread count.
+/// weigh less (ridge) in place of being filtered first. A lone pixel that far outshines all around
+/// it, by a light that few of its samples found, is brought down to them first: spread over its
+/// window it would be a white square. The same bits for any thread count.
 /// @return the three colours
-std::vector<NoisyPicture::Plane> denoise(const NoisyPicture& picture);
+std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture);
 
 }  // namespace drench

@@ -149,36 +149,18 @@ FilmWindow window_of(const RenderSettings& r) {
   return {r.crop_min.x, r.crop_min.y, r.width, r.height};
 }
 
-/// Mean of the 3 x 3 pixels around each: so few batches tell a pixel's own variance badly.
-NoisyPicture::Plane smoothed(const NoisyPicture::Plane& from, int width, int height) {
-  NoisyPicture::Plane out(from.size());
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      float sum = 0;
-      int count = 0;
-      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height - 1); ++v)
-        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width - 1); ++u, ++count)
-          sum += from[size_t(v) * width + u];
-      out[size_t(y) * width + x] = sum / float(count);
-    }
-  return out;
-}
-
 /// Puts the denoised beauty in the place of the noisy one, which becomes a layer.
 void denoise_film(const Sums& sums, Film& film) {
   NoisyPicture picture;
   picture.width = film.width;
   picture.height = film.height;
-  for (int c = 0; c < 3; ++c) {
-    NoisyPicture::Plane variance;
-    for (const PixelSum& pixel : sums.pixel) {
+  for (const PixelSum& pixel : sums.pixel)
+    for (int c = 0; c < 3; ++c) {
       for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
-      variance.push_back(2 * pixel.variance(c));
+      picture.variance[c].push_back(2 * pixel.variance(c));
     }
-    picture.variance[c] = smoothed(variance, film.width, film.height);
-  }
   sums.layers.add_features(picture, sums.pixel);
-  const std::vector<NoisyPicture::Plane> clean = denoise(picture);
+  const std::vector<NoisyPicture::Plane> clean = denoise(std::move(picture));
   FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
   for (size_t p = 0; p < sums.pixel.size(); ++p)
     for (size_t c = 0; c < 3; ++c) {

@@ -75,6 +75,25 @@ TEST(Denoise, KeepsEdgesAndSlopes) {
   EXPECT_LT(rms(denoise(made(bold, none, kNoise, 5)), bold), 0.35 * kNoise);
 }
 
+/// One sample in a pixel found the sun: no white square is left, and nothing else is changed. A
+/// bright pixel that its samples are sure of stays.
+TEST(Denoise, TakesAwayLoneOutliersOnly) {
+  const auto truth = [](int, int) { return 1.f; };
+  NoisyPicture picture = made(truth, none, kNoise, 9);
+  for (const size_t p : {size_t(20 * kSize + 20), size_t(21 * kSize + 22), size_t(50 * kSize + 7)})
+    for (int c = 0; c < 3; ++c) {
+      picture.half[0][c][p] += 4000;
+      picture.variance[c][p] = 1e7f;
+    }
+  EXPECT_LT(rms(denoise(picture), truth), 0.2 * kNoise);
+
+  NoisyPicture sure = made(truth, none, kNoise, 10);
+  const size_t star = 30 * kSize + 30;
+  for (int c = 0; c < 3; ++c)
+    for (auto& half : sure.half) half[c][star] = 100;
+  EXPECT_NEAR(denoise(sure)[1][star], 100, 1);
+}
+
 /// A guide that is itself noise must not bring it in.
 TEST(Denoise, TrustsNoisyFeaturesLess) {
   const auto truth = [](int, int) { return 1.f; };
