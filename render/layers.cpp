@@ -69,13 +69,16 @@ void LayerFilm::clear(PathRecord& record) const {
   record.shaded = false;
 }
 
-V2f LayerFilm::motion_of(const PathRecord& record) const {
+V3f LayerFilm::motion_of(const PathRecord& record) const {
   const V3f per_frame = scene_.velocity(record.first) * float(1 / fps_);
   const double since_frame = shutter_open_ + record.time * shutter_frames_;
   const V3f now = record.position - per_frame * float(since_frame);
   const V2f from = frame_camera_.project(frame_camera_.open(), now);
   const V2f to = frame_camera_.project(frame_camera_.close(), now + per_frame);
-  return {to.x - from.x, from.y - to.y};  // rows count down, the layer up
+  const CameraPose &eye = frame_camera_.open(), &next = frame_camera_.close();
+  const float depth = dot(now - eye.position, eye.forward);
+  // Rows count down, the layer up.
+  return {to.x - from.x, from.y - to.y, dot(now + per_frame - next.position, next.forward) - depth};
 }
 
 void LayerFilm::add(size_t pixel, const PathRecord& record) {
@@ -92,7 +95,7 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   p.inverse_depth += 1 / depth;
   p.inverse_depth2 += 1 / (depth * depth);
   if (depth < p.nearest.depth) {
-    p.nearest = {depth, record.position, V2f(0)};
+    p.nearest = {depth, record.position, V3f(0)};
     if (want_.motion) p.nearest.motion = motion_of(record);
   }
   if (!want_.cryptomatte) return;
@@ -126,8 +129,7 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels) co
   if (want_.normal) fill("N", xyz, half, [&](size_t p) { return share(pixel_[p].normal, p); });
   if (want_.depth) fill("depth", {"Z"}, full, [&](size_t p) { return &pixel_[p].nearest.depth; });
   if (want_.position) fill("P", xyz, full, [&](size_t p) { return pixel_[p].nearest.position; });
-  if (want_.motion)
-    fill("motion", {"X", "Y"}, full, [&](size_t p) { return pixel_[p].nearest.motion; });
+  if (want_.motion) fill("motion", xyz, full, [&](size_t p) { return pixel_[p].nearest.motion; });
   if (want_.variance)
     fill("variance", rgb, full, [&](size_t p) {
       return V3f(pixels[p].variance(0), pixels[p].variance(1), pixels[p].variance(2));

@@ -49,7 +49,7 @@ class LayerFilm {
   struct Nearest {
     float depth = kNothing;
     V3f position{0, 0, 0};
-    V2f motion{0, 0};
+    V3f motion{0, 0, 0};
   };
   struct Pixel {
     V3f albedo{0, 0, 0}, normal{0, 0, 0};
@@ -60,7 +60,7 @@ class LayerFilm {
   };
   static constexpr float kNothing = 1e10f;
 
-  V2f motion_of(const PathRecord& record) const;
+  V3f motion_of(const PathRecord& record) const;
   FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
                   FilmLayer::Precision precision) const;
   void add_matte(std::vector<FilmLayer>& out, const std::string& name, const NameIndex& things,

@@ -335,7 +335,7 @@ struct LayerSettings {
   bool normal = false;        // N.XYZ of what is met first, unit, of the world
   bool depth = false;         // depth.Z, m along the view; 1e10: nothing
   bool position = false;      // P.XYZ, m, of the world
-  bool motion = false;        // motion.XY, pixels to the next frame, right and up
+  bool motion = false;        // motion.XYZ, to the next frame: pixels right and up, m away
   bool variance = false;      // variance.RGB of the beauty's error
   bool samples = false;       // samples.Y, camera samples that the pixel got
   bool light_groups = false;  // light_GROUP.RGB; they sum to the beauty

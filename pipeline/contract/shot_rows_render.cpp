@@ -181,8 +181,8 @@ std::vector<Parameter> layer_rows() {
       row<&LayerSettings::position>("layers", "position", "", none, render,
                                     "P.XYZ: m in the world, of the nearest in the pixel"),
       row<&LayerSettings::motion>("layers", "motion", "", none, render,
-                                  "motion.XY: pixels to the right and up from this frame to the "
-                                  "next, of the nearest in the pixel"),
+                                  "motion.XYZ: from this frame to the next, pixels to the right "
+                                  "and up and m away, of the nearest in the pixel"),
       row<&LayerSettings::variance>("layers", "variance", "", none, render,
                                     "variance.RGB: of the beauty, as its samples tell"),
       row<&LayerSettings::samples>("layers", "samples", "", none, render,

@@ -206,6 +206,7 @@ TEST(Motion, IsThatOfThingsAndOfTheCamera) {
       ASSERT_LT(at(film, "depth", 16, 16, 0), 1e9);
       EXPECT_NEAR(at(film, "motion", 16, 16, 0), x, 1e-3) << what << blur;
       EXPECT_NEAR(at(film, "motion", 16, 16, 1), y, 1e-3) << what << blur;
+      EXPECT_NEAR(at(film, "motion", 16, 16, 2), 0, 1e-5) << what << blur;
     }
   };
   shot.camera.position = V3d(0, 0, 4);
@@ -216,6 +217,10 @@ TEST(Motion, IsThatOfThingsAndOfTheCamera) {
   expect(0, 0, "both ");
   for (V3f& v : geometry.obstacle[0].mesh.velocity) v = V3f(0);
   expect(-0.1 * pixels_per_m, 0.05 * pixels_per_m, "camera ");
+  shot.camera.position = V3d(0, 0, 4);
+  shot.camera.target = V3d(0, 0, 0);
+  for (V3f& v : geometry.obstacle[0].mesh.velocity) v = V3f(0, 0, -2.4f);
+  EXPECT_NEAR(at(render_frame(shot, 1001, geometry), "motion", 16, 16, 2), 0.1, 1e-5);
 }
 
 // Published values of MurmurHash3_x86_32 with seed 0.

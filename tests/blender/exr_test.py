@@ -1,0 +1,100 @@
+"""Reads a frame with all its layers in Blender's compositor: see run. The frame is the first of
+ball.toml, a ball of water of radius 0.1 m, 2 m before the camera, that flies 4 m/s along x; its
+geometry says what the layers must hold."""
+
+import math
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy
+
+FRAME = Path(sys.argv[sys.argv.index("--") + 1]) / "render/ball.1001.exr"
+WIDTH, HEIGHT, SAMPLES = 96, 64, 16
+PIXELS_PER_RADIAN = WIDTH / (2 * math.tan(math.radians(10)))
+
+
+class Compositor:
+    """The frame as an image node, what is linked from it as a picture."""
+
+    def __init__(self):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        self.scene = bpy.context.scene
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        self.scene.collection.objects.link(camera)
+        self.scene.camera = camera
+        render = self.scene.render
+        render.resolution_x, render.resolution_y = WIDTH, HEIGHT
+        render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+        self.scene.use_nodes = True
+        self.tree = self.scene.node_tree
+        self.tree.nodes.clear()
+        self.output = self.tree.nodes.new("CompositorNodeComposite")
+        self.image = self.tree.nodes.new("CompositorNodeImage")
+        self.image.image = bpy.data.images.load(str(FRAME))
+
+    def picture(self, socket):
+        """height x width x 3, the bottom row first."""
+        self.tree.links.new(socket, self.output.inputs[0])
+        with tempfile.TemporaryDirectory() as folder:
+            self.scene.render.filepath = str(Path(folder) / "a.exr")
+            bpy.ops.render.render(write_still=True)
+            image = bpy.data.images.load(self.scene.render.filepath)
+            return numpy.array(image.pixels).reshape(HEIGHT, WIDTH, 4)[:, :, :3]
+
+    def layer(self, name):
+        return self.picture(self.image.outputs[name])
+
+
+def at_centre(picture):
+    return picture[HEIGHT // 2 - 1:HEIGHT // 2 + 1, WIDTH // 2 - 1:WIDTH // 2 + 1].mean((0, 1))
+
+
+def test_layers_are_those_of_the_ball():
+    compositor = Compositor()
+    numpy.testing.assert_array_equal(compositor.layer("samples"), SAMPLES)
+    depth = compositor.layer("depth")
+    numpy.testing.assert_allclose(at_centre(depth)[0], 1.9, atol=0.01)
+    assert depth[-1, 0, 0] > 1e9, "the sky is at no distance"
+    numpy.testing.assert_allclose(at_centre(compositor.layer("N")), (0, 0, 1), atol=0.1)
+    numpy.testing.assert_allclose(at_centre(compositor.layer("P")), (-0.2, 0.6, 0.1), atol=0.02)
+    motion = at_centre(compositor.layer("motion"))
+    numpy.testing.assert_allclose(motion[0], 4 / 30 / 1.9 * PIXELS_PER_RADIAN, rtol=0.02)
+    numpy.testing.assert_allclose(motion[1:], 0, atol=0.1)
+    numpy.testing.assert_allclose(compositor.layer("albedo")[0, 0], 0.35, rtol=1e-3)  # the ground
+    assert compositor.layer("variance").min() >= 0
+
+
+def test_light_groups_sum_to_the_picture():
+    compositor = Compositor()
+    names = [output.name for output in compositor.image.outputs if output.name.startswith("light_")]
+    assert sorted(names) == ["light_caustics", "light_key", "light_sky"], names
+    total = sum(compositor.layer(name) for name in names)
+    numpy.testing.assert_allclose(total, compositor.layer("Combined"), rtol=3e-3, atol=1e-4)
+
+
+def test_cryptomatte_covers_the_ball():
+    compositor = Compositor()
+    node = compositor.tree.nodes.new("CompositorNodeCryptomatteV2")
+    node.source, node.image = "IMAGE", compositor.image.image
+    for layer, name in (("CryptoObject", "fluid"), ("CryptoMaterial", "water")):
+        node.layer_name, node.matte_id = layer, name
+        area = compositor.picture(node.outputs["Matte"])[:, :, 0].sum()
+        radius = math.tan(math.asin(0.1 / 2)) * PIXELS_PER_RADIAN
+        numpy.testing.assert_allclose(area, math.pi * radius**2, rtol=0.08)
+
+
+failed = 0
+tests = {name: test for name, test in list(globals().items()) if name.startswith("test_")}
+for name, test in tests.items():
+    try:
+        test()
+        print(f"ok      {name}")
+    except Exception:
+        failed += 1
+        traceback.print_exc()
+        print(f"FAILED  {name}")
+print(f"{len(tests) - failed} passed, {failed} failed")
+sys.exit(failed > 0)
