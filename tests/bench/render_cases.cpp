@@ -1,11 +1,12 @@
 // Rendering a sheet of cloth over the ground: camera samples per CPU second, and error against
 // samples measured on one picture, so that both belong to one configuration. Rendering a pool with
-// a small lamp: what photons gain over paths.
+// a small lamp: what photons gain over paths. What the denoiser and samples by a target gain.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <tuple>
 
 #include "tests/bench/render_scenes.h"
 
@@ -123,6 +124,80 @@ void render_caustics(const Emit& emit) {
 const Registration render_caustics_case{
     "render_caustics", "a pool with a small lamp: error and time with photons and without",
     render_caustics};
+
+/// Larger than the others: what lies between edges is what a denoiser lives on.
+Shot larger(Shot shot) {
+  shot.render.width = 192;
+  shot.render.height = 108;
+  return shot;
+}
+
+/// Gain: of 1 / (error x CPU s) over the noisy picture of as many samples.
+void render_denoise(const Emit& emit) {
+  constexpr int kReference = 6400;
+  Shot sky = larger(pool_shot());
+  sky.light.erase(sky.light.begin());
+  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
+  const std::tuple<std::string, Shot, const FrameGeometry*> pictures[] = {
+      {"cloth", larger(cloth_shot()), &cloth}, {"pool under the sky", sky, &pool}};
+  for (const auto& [name, shot, geometry] : pictures) {
+    const Film reference = render(shot, *geometry, kReference, 1000).film;
+    for (const int samples : {16, 64, 256}) {
+      Shot clean = shot;
+      clean.render.denoise = true;
+      const Sampled noisy = sample(shot, *geometry, samples, reference);
+      const Sampled denoised = sample(clean, *geometry, samples, reference);
+      Line line = line_of(denoised);
+      line.method = name + ", denoised";
+      line.resolution = "192 x 108 pixels";
+      line.error = denoised.error;
+      line.error_of = "relMSE against " + std::to_string(kReference) + " samples";
+      line.more["samples"] = samples;
+      line.more["noisy_rel_mse"] = noisy.error;
+      line.more["noisy_cpu_s"] = noisy.median.cost.cpu_s;
+      line.more["gain"] =
+          noisy.error * noisy.median.cost.cpu_s / (denoised.error * denoised.median.cost.cpu_s);
+      emit(line);
+    }
+  }
+}
+
+const Registration render_denoise_case{
+    "render_denoise", "cloth, and a pool under the sky: error and time with the denoiser",
+    render_denoise};
+
+/// The same error with samples spread evenly would take `even_samples` as their errors' line says.
+void render_adaptive(const Emit& emit) {
+  constexpr int kReference = 25600;
+  Shot shot = pool_shot();
+  shot.light.erase(shot.light.begin());
+  const FrameGeometry geometry{wavy_pool(), {}};
+  const Film reference = render(shot, geometry, kReference, 1000).film;
+  std::vector<double> counts, errors;
+  for (const int samples : {32, 64, 128, 256, 512}) {
+    counts.push_back(std::log(double(samples)));
+    errors.push_back(std::log(sample(shot, geometry, samples, reference).error));
+  }
+  for (const double target : {1e-3, 3e-4, 1e-4}) {
+    shot.render.error = target;
+    const Sampled aimed = sample(shot, geometry, 1 << 14, reference);
+    size_t k = 1;
+    while (k + 1 < errors.size() && errors[k] > std::log(aimed.error)) ++k;
+    const double along = (std::log(aimed.error) - errors[k - 1]) / (errors[k] - errors[k - 1]);
+    Line line = line_of(aimed);
+    line.method = "pool under the sky, to an error";
+    line.error = aimed.error / target;
+    line.error_of = "relMSE over its target";
+    line.more["target"] = target;
+    line.more["told_rel_mse"] = aimed.median.stats.relative_mse;
+    line.more["even_samples"] = std::exp(counts[k - 1] + along * (counts[k] - counts[k - 1]));
+    emit(line);
+  }
+}
+
+const Registration render_adaptive_case{
+    "render_adaptive", "a pool under the sky: error reached and samples taken by a target",
+    render_adaptive};
 
 }  // namespace
 
