@@ -111,10 +111,13 @@ class PathTracer {
 
   bool scatter(PathState& state, const Surface& surface, const Hit& hit) {
     if constexpr (kWater) {
-      // The side that was hit says for certain whether the way led through the body.
+      // The side that was hit says for certain where the way leads on from. It led through the body
+      // only if the path had come in, too: a film that the shutter turns inside out is met from
+      // within by rays from far away.
       const bool outwards = dot(state.ray.direction, surface.geometric_normal) > 0;
-      state.in = outwards ? state.in | surface.body : state.in & ~surface.body;
+      if (!outwards) state.in &= ~surface.body;
       absorb(state, hit.distance);
+      if (outwards) state.in |= surface.body;
       if (surface.body) {
         if (inside_higher_body(state, surface)) return true;
         record_first(state, surface, hit);
@@ -164,8 +167,8 @@ class PathTracer {
 
   /// Between water and the sheet it lies on; what little is between counts as water.
   void pass_contact(PathState& state, const Surface& surface, float distance) {
-    state.in |= surface.body;
     if (dot(state.ray.direction, surface.geometric_normal) > 0) absorb(state, distance);
+    state.in |= surface.body;
     pass(state, surface);
   }
 

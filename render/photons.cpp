@@ -195,8 +195,9 @@ class PhotonTracer {
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
       surface = scene_.surface<true>(flight.ray, hit);
       const bool outwards = dot(flight.ray.direction, surface.geometric_normal) > 0;
-      flight.in = outwards ? flight.in | surface.body : flight.in & ~surface.body;
-      absorb(flight, hit.distance);
+      if (!outwards) flight.in &= ~surface.body;
+      absorb(flight, hit.distance);  // as paths do
+      if (outwards) flight.in |= surface.body;
       if (!surface.contact) return hit;
       flight.in |= surface.body;
       flight.ray.origin = surface.leave(flight.ray.direction);

@@ -80,5 +80,18 @@ TEST(WaterOnCloth, HidesInAFurnaceWithItsCloth) {
   }
 }
 
+// Fluid that falls on a sheet has its top below its contact before the shutter closes: no column of
+// water reaches from there to the camera.
+TEST(WaterOnCloth, TurnedInsideOutHasNoDepth) {
+  WetCloth wet(0.5f, 0);
+  wet.shot.render.samples = 256;
+  for (V3f& p : wet.geometry.fluid.position) p.y = p.y > -0.01f ? -0.0508f : -0.05f;
+  wet.shot.material[0].absorption = V3f(2, 1, 0);
+  const Film film = render_frame(wet.shot, 1001, wet.geometry);
+  const double blue = channel_mean(film, 2).value;
+  EXPECT_GT(blue, 0.2);
+  EXPECT_NEAR(channel_mean(film, 0).value, blue, 0.02 * blue);
+}
+
 }  // namespace
 }  // namespace drench::test
