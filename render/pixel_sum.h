@@ -8,51 +8,58 @@
 
 namespace drench {
 
-/// Sums of a pixel in the order of its samples. Every kBatch of them are a stratified set of their
-/// own (a net of the Sobol sequence), so that the scatter of the batches' means tells the error of
-/// stratified sampling; single samples would tell that of random ones, which is larger.
+/// Sums of a pixel in the order of its samples. They are kept in 4 to 7 whole batches too, of 8
+/// samples at first; two become one when there are 8. A batch is a net of the Sobol sequence,
+/// stratified of its own, so that the scatter of the batches' means tells the error of stratified
+/// sampling; single samples would tell that of random ones, which is far larger.
 class PixelSum {
  public:
-  static constexpr int kBatch = 8;
+  static constexpr int kBatch = 8;  // samples of the smallest
 
   void add(const V3f& radiance, float alpha) {
-    for (int c = 0; c < 3; ++c) batch_[c] += radiance[c];
-    alpha_ += alpha;
-    if (++samples_ % kBatch != 0) return;
     for (int c = 0; c < 3; ++c) {
-      sum_[c] += batch_[c];
-      if (samples_ / kBatch % 2 != 0) odd_[c] += batch_[c];
-      squares_[c] += batch_[c] * batch_[c];
-      batch_[c] = 0;
+      sum_[c] += radiance[c];
+      batch_[whole_][c] += radiance[c];
     }
+    alpha_ += alpha;
+    if (++samples_ % size_ == 0 && ++whole_ == kMost) merge();
   }
 
   int samples() const { return samples_; }
-  int batches() const { return samples_ / kBatch; }
   /// Mean of a colour, or for channel 3 of alpha.
-  float mean(int channel) const {
-    return float((channel < 3 ? sum_[channel] + batch_[channel] : alpha_) / samples_);
-  }
+  float mean(int channel) const { return float((channel < 3 ? sum_[channel] : alpha_) / samples_); }
   /// Variance of the mean of a colour; 0 while there are fewer than two batches.
   float variance(int channel) const {
-    const double n = batches();
-    if (n < 2) return 0;
-    const double mean = sum_[channel] / n;
-    const double of_batch = std::max(0., squares_[channel] / n - mean * mean) * n / (n - 1);
-    return float(of_batch / (n * kBatch * kBatch));
+    if (whole_ < 2) return 0;
+    double mean = 0, square = 0;
+    for (int b = 0; b < whole_; ++b) mean += double(batch_[b][channel]) / whole_;
+    for (int b = 0; b < whole_; ++b) {
+      const double off = batch_[b][channel] - mean;
+      square += off * off;
+    }
+    return float(square / (whole_ - 1) / (double(size_) * samples_));
   }
   /// Means of a colour by every second batch: two pictures of independent errors. From two batches
   /// on.
   float half(int which, int channel) const {
-    const int odd = (batches() + 1) / 2;
-    return float(which == 0 ? odd_[channel] / (odd * kBatch)
-                            : (sum_[channel] - odd_[channel]) / ((batches() - odd) * kBatch));
+    double sum = 0;
+    for (int b = which; b < whole_; b += 2) sum += batch_[b][channel];
+    return float(sum / (size_ * ((whole_ + 1 - which) / 2)));
   }
 
  private:
-  double sum_[3] = {0, 0, 0}, batch_[3] = {0, 0, 0}, squares_[3] = {0, 0, 0}, alpha_ = 0;
-  double odd_[3] = {0, 0, 0};  // of the first batch, the third, ...
-  int samples_ = 0;
+  static constexpr int kMost = 8;
+
+  void merge() {
+    for (int b = 0; b < kMost; ++b)
+      batch_[b] = b < kMost / 2 ? batch_[2 * b] + batch_[2 * b + 1] : V3f(0);
+    whole_ = kMost / 2;
+    size_ *= 2;
+  }
+
+  double sum_[3] = {0, 0, 0}, alpha_ = 0;
+  V3f batch_[kMost] = {V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0)};
+  int samples_ = 0, size_ = kBatch, whole_ = 0;
 };
 
 }  // namespace drench

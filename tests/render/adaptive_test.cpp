@@ -60,8 +60,8 @@ TEST(ErrorTarget, IsReachedAndToldAsTheReferenceSays) {
     const double error = relative_mse(render_frame(shot, 1001, ball(), &stats), reference);
     EXPECT_LE(stats.relative_mse, 1.05 * target);
     EXPECT_LE(error, 1.25 * target);
-    // Told from nets of 8 samples, so above the truth, but no lone guess.
-    EXPECT_GT(error, 0.1 * stats.relative_mse);
+    // Told from nets of an eighth of the samples or more, so above the truth, but no lone guess.
+    EXPECT_GT(error, 0.2 * stats.relative_mse);
     EXPECT_LT(stats.camera_samples, uint64_t(32 * 32 * 4096));
   }
 }
@@ -131,11 +131,16 @@ TEST(SamplePlan, GoesByTheScatterOfSamples) {
   }
   double error = 0;
   for (const PixelSum& pixel : pixels) error += relative_error(pixel) / double(pixels.size());
-  EXPECT_NEAR(error, 1e-4, 1e-5);
+  EXPECT_NEAR(error, 1e-4, 1.5e-5);
   EXPECT_EQ(pixels[5].samples(), 32);
   // The least for the target: n = scatter x mean scatter / (1.01 target).
-  EXPECT_NEAR(pixels[24].samples(), 1 * 1 / 1.01e-4, 0.1 * 1 / 1.01e-4);
-  EXPECT_NEAR(pixels[40].samples(), 2 * 1 / 1.01e-4, 0.1 * 2 / 1.01e-4);
+  for (const size_t scatter : {1, 2}) {
+    double samples = 0;
+    for (size_t y = 0; y < kHeight; ++y)
+      for (size_t x = 20; x < 28; ++x)
+        samples += pixels[y * kWidth + x + 16 * (scatter - 1)].samples() / (8. * kHeight);
+    EXPECT_NEAR(samples, double(scatter) / 1.01e-4, 0.1 * double(scatter) / 1.01e-4);
+  }
 }
 
 TEST(Crop, IsAPartOfTheFrameToTheBit) {
