@@ -1,8 +1,6 @@
 #pragma once
 // The layers of a film besides its beauty: what each camera sample met, put together by pixel.
 
-#include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 

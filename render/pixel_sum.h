@@ -1,9 +1,6 @@
 #pragma once
 // What a pixel's camera samples add up to, and how far their mean may be off.
 
-#include <algorithm>
-#include <cstdint>
-
 #include "render/vector.h"
 
 namespace drench {

@@ -5,11 +5,13 @@ geometry says what the layers must hold."""
 import math
 import sys
 import tempfile
-import traceback
 from pathlib import Path
 
 import bpy
 import numpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from run_tests import run_tests  # beside this file
 
 FRAME = Path(sys.argv[sys.argv.index("--") + 1]) / "render/ball.1001.exr"
 WIDTH, HEIGHT, SAMPLES = 96, 64, 16
@@ -86,15 +88,4 @@ def test_cryptomatte_covers_the_ball():
         numpy.testing.assert_allclose(area, math.pi * radius**2, rtol=0.08)
 
 
-failed = 0
-tests = {name: test for name, test in list(globals().items()) if name.startswith("test_")}
-for name, test in tests.items():
-    try:
-        test()
-        print(f"ok      {name}")
-    except Exception:
-        failed += 1
-        traceback.print_exc()
-        print(f"FAILED  {name}")
-print(f"{len(tests) - failed} passed, {failed} failed")
-sys.exit(failed > 0)
+run_tests(globals())

@@ -4,11 +4,13 @@ its OBJ files, read here line by line, say what the PLY files must load as."""
 import struct
 import sys
 import tempfile
-import traceback
 from pathlib import Path
 
 import bpy
 import numpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from run_tests import run_tests  # beside this file
 
 OUT = Path(sys.argv[sys.argv.index("--") + 1])
 SCRIPT = Path(__file__).resolve().parents[2] / "pipeline/blender/load_drench.py"
@@ -234,15 +236,4 @@ def test_blender_reads_obj_and_level_set_itself():
     assert kinds == {"surface": "FLOAT", "v": "VECTOR_FLOAT"}, kinds
 
 
-failed = 0
-tests = {name: test for name, test in list(globals().items()) if name.startswith("test_")}
-for name, test in tests.items():
-    try:
-        test()
-        print(f"ok      {name}")
-    except Exception:
-        failed += 1
-        traceback.print_exc()
-        print(f"FAILED  {name}")
-print(f"{len(tests) - failed} passed, {failed} failed")
-sys.exit(failed > 0)
+run_tests(globals())

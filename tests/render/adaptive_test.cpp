@@ -31,16 +31,6 @@ FrameGeometry ball() {
   return geometry;
 }
 
-double relative_mse(const Film& film, const Film& reference) {
-  double sum = 0;
-  for (size_t p = 0; p < film.rgba.size(); p += 4)
-    for (size_t c = 0; c < 3; ++c) {
-      const double x = film.rgba[p + c], r = reference.rgba[p + c];
-      sum += (x - r) * (x - r) / (r * r + 0.01) / 3;
-    }
-  return sum * 4 / double(film.rgba.size());
-}
-
 /// Of 30 times the samples that the finest target takes.
 const Film& exact_picture() {
   static const Film film = [] {

@@ -132,15 +132,6 @@ Shot checkered_shot(int samples) {
   return shot;
 }
 
-double relative_mse(const Film& film, const Film& reference) {
-  double sum = 0;
-  for (size_t p = 0; p < film.rgba.size(); ++p) {
-    const double r = reference.rgba[p], d = film.rgba[p] - r;
-    sum += d * d / (r * r + 0.01);
-  }
-  return sum / double(film.rgba.size());
-}
-
 TEST(DenoisedFrame, ErrsLessAtThreeNumbersOfSamples) {
   FrameGeometry geometry;
   geometry.fluid = sphere_mesh(4);

@@ -157,19 +157,7 @@ std::filesystem::path write_map(const TemporaryFolder& folder) {
 TEST(Estimators, AgreeOnEveryKindOfLight) {
   const TemporaryFolder folder;
   const EveryLight scene(write_map(folder));
-  const auto mean = [&](Estimator estimator) {
-    RenderOptions options;
-    options.estimator = estimator;
-    return mean_over_seeds(scene.shot, scene.geometry, options, 24);
-  };
-  const Mean mis = mean(Estimator::mis), light = mean(Estimator::light_only),
-             bsdf = mean(Estimator::bsdf_only);
-  // The means' own standard errors must be small enough for the comparison to say something.
-  EXPECT_LT(mis.error, 0.003 * mis.value);
-  EXPECT_LT(light.error, 0.01 * mis.value);
-  EXPECT_LT(bsdf.error, 0.01 * mis.value);
-  EXPECT_NEAR(light.value, mis.value, 4 * std::hypot(light.error, mis.error));
-  EXPECT_NEAR(bsdf.value, mis.value, 4 * std::hypot(bsdf.error, mis.error));
+  expect_estimators_agree(scene.shot, scene.geometry);
 }
 
 TEST(EnvironmentMap, ShowsRotatedColumnsAndUpwardRows) {

@@ -147,18 +147,7 @@ TEST(MeshLight, EstimatorsAgree) {
   geometry.cloth = {{"cloth", sheet_mesh(16, [](float x, float z) {
                        return 0.6f + 0.1f * std::sin(3 * x) * std::cos(2 * z);
                      })}};
-  const auto mean = [&](Estimator estimator) {
-    RenderOptions options;
-    options.estimator = estimator;
-    return mean_over_seeds(shot, geometry, options, 24);
-  };
-  const Mean mis = mean(Estimator::mis), light = mean(Estimator::light_only),
-             bsdf = mean(Estimator::bsdf_only);
-  EXPECT_LT(mis.error, 0.003 * mis.value);
-  EXPECT_LT(light.error, 0.01 * mis.value);
-  EXPECT_LT(bsdf.error, 0.01 * mis.value);
-  EXPECT_NEAR(light.value, mis.value, 4 * std::hypot(light.error, mis.error));
-  EXPECT_NEAR(bsdf.value, mis.value, 4 * std::hypot(bsdf.error, mis.error));
+  expect_estimators_agree(shot, geometry);
 }
 
 /// A wavy pool with a lamp and a ball that shines, above the water or in it.

@@ -57,16 +57,6 @@ TriangleMesh waves() {
   return mesh;
 }
 
-/// Half a percent is for the blur at the rims.
-void expect_the_mean_of_paths(Shot shot, const FrameGeometry& geometry) {
-  const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
-  shot.render.photons = 6;
-  const Mean photons = mean_over_seeds(shot, geometry, {}, 16);
-  EXPECT_LT(paths.error, 0.01 * paths.value);
-  EXPECT_NEAR(photons.value, paths.value,
-              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
-}
-
 // Under level water, E cos(a) (1 - F(a)) e^(-s d / cos(b)) / n^2. A million photons, of which some
 // 20,000 lie in the square: 4 of their standard errors.
 TEST(Photons, LieUnderLevelWaterAsSnellAndFresnelSay) {
@@ -143,7 +133,7 @@ TEST(Photons, GiveThePictureThatPathsGive) {
   shot.camera.target = V3d(0, 0, 0);
   shot.camera.fov_deg = 20.0;
   shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun({1, -2, 0}, 5), sky(0.2f)};
-  expect_the_mean_of_paths(shot, {waves(), {}});
+  expect_photons_as_paths(shot, {waves(), {}});
 }
 
 // And with a disk, which photons start from as from other lamps.
@@ -160,7 +150,7 @@ TEST(Photons, OfADiskGiveThePictureThatPathsGive) {
   disk.radius = 0.2;
   disk.radiance = V3f(40);
   shot.light = {disk, sky(0.1f)};
-  expect_the_mean_of_paths(shot, {waves(), {}});
+  expect_photons_as_paths(shot, {waves(), {}});
 }
 
 // Foam is too small for a density of photons: paths bring its light, and the picture is theirs.
@@ -177,7 +167,7 @@ TEST(Photons, LeaveFoamToPaths) {
     pool.foam.velocity.push_back(V3f(0));
     pool.foam.radius.push_back(0.004f);
   }
-  expect_the_mean_of_paths(shot, pool);
+  expect_photons_as_paths(shot, pool);
 }
 
 // Smooth normals on coarse triangles: no photon far brighter than the others, which would be a

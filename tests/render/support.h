@@ -1,6 +1,8 @@
 #pragma once
 // Small scenes and means with their standard error, for tests against closed forms.
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -211,6 +213,43 @@ inline Mean mean_over_seeds(Shot shot, const FrameGeometry& geometry, const Rend
   }
   const double mean = sum / seeds;
   return {mean, std::sqrt(std::max(0., square / seeds - mean * mean) / (seeds - 1))};
+}
+
+/// mean((x - r)^2 / (r^2 + 0.01)) over pixels and colours.
+inline double relative_mse(const Film& film, const Film& reference) {
+  double sum = 0;
+  for (size_t p = 0; p < film.rgba.size(); p += 4)
+    for (size_t c = 0; c < 3; ++c) {
+      const double r = reference.rgba[p + c], d = film.rgba[p + c] - r;
+      sum += d * d / (r * r + 0.01) / 3;
+    }
+  return sum * 4 / double(film.rgba.size());
+}
+
+/// Photons and paths alone give one mean. Half a percent is for the blur at the rims.
+inline void expect_photons_as_paths(Shot shot, const FrameGeometry& geometry) {
+  const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
+  shot.render.photons = 6;
+  const Mean photons = mean_over_seeds(shot, geometry, {}, 16);
+  EXPECT_LT(paths.error, 0.01 * paths.value);
+  EXPECT_NEAR(photons.value, paths.value,
+              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+}
+
+/// Light sampling, surface sampling and both give one mean, and know it well enough to say so.
+inline void expect_estimators_agree(const Shot& shot, const FrameGeometry& geometry) {
+  const auto mean = [&](Estimator estimator) {
+    RenderOptions options;
+    options.estimator = estimator;
+    return mean_over_seeds(shot, geometry, options, 24);
+  };
+  const Mean mis = mean(Estimator::mis), light = mean(Estimator::light_only),
+             bsdf = mean(Estimator::bsdf_only);
+  EXPECT_LT(mis.error, 0.003 * mis.value);
+  EXPECT_LT(light.error, 0.01 * mis.value);
+  EXPECT_LT(bsdf.error, 0.01 * mis.value);
+  EXPECT_NEAR(light.value, mis.value, 4 * std::hypot(light.error, mis.error));
+  EXPECT_NEAR(bsdf.value, mis.value, 4 * std::hypot(bsdf.error, mis.error));
 }
 
 }  // namespace drench::test
