@@ -39,7 +39,8 @@ void check(const Material& m) {
     fail(fmt::format("ior is {}; it must lie between 1 and 10", m.ior));
   if (!(m.roughness >= 0 && m.roughness <= 1))
     fail(fmt::format("roughness is {}; it must lie between 0 and 1", m.roughness));
-  if (m.checker && !(m.checker_size > 0)) fail("checker_size must be positive");
+  if (!(m.checker_size > 0)) fail("checker_size must be positive");
+  if (!(m.texture_size > 0)) fail("texture_size must be positive");
 }
 
 }  // namespace
@@ -102,6 +103,7 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
     out.normal_map = std::make_shared<const Texture>(read_normal_map(found->normal_map));
   out.checker = found->checker;
   out.inverse_checker_size = float(1 / found->checker_size);
+  out.inverse_texture_size = float(1 / found->texture_size);
   return out;
 }
 

@@ -22,6 +22,7 @@ struct ShadingMaterial {
   std::shared_ptr<const Texture> texture, normal_map;
   bool checker = false;
   float inverse_checker_size = 1;  // 1/m
+  float inverse_texture_size = 1;
 
   /// By the medium outside: seen from there, and for a rough dielectric from within; of metal one.
   /// None where the indices are the same. Scene fills them in, for what has facets.
@@ -37,7 +38,7 @@ struct ShadingMaterial {
   V3f normal_at(const V2f& uv, const V3f& shading, const V3f& along_u, const V3f& along_v) const;
 
  private:
-  V2f picture_uv(const V2f& uv) const { return checker ? uv * inverse_checker_size : uv; }
+  V2f picture_uv(const V2f& uv) const { return uv * inverse_texture_size; }
 };
 
 /// The shot's material of that name, or the built-in "water", "cotton" or "ground".

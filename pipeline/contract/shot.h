@@ -304,6 +304,7 @@ struct Material {
   V3f absorption{0, 0, 0};            // dielectric, 1/m
   std::filesystem::path texture;      // PNG, JPEG or EXR, multiplies reflectance
   std::filesystem::path normal_map;   // PNG, JPEG or EXR, tangent space, x along u, y along v
+  double texture_size = 1;            // edge that both pictures cover, in uv; on the ground m
   bool checker = false;               // diffuse, coated: built-in checker of checker_size
   double checker_size = 0.1;          // m
 };

@@ -126,6 +126,9 @@ std::vector<Parameter> material_rows() {
       row<&Material::normal_map>("material", "normal_map", "", none, render,
                                  "PNG, JPEG or EXR of normals, linear: x along u, y along v, on "
                                  "meshes with uv and the ground"),
+      row<&Material::texture_size>("material", "texture_size", "", {1e-6, 1e6}, render,
+                                   "edge that texture and normal_map cover, in uv; on the ground "
+                                   "in m"),
       row<&Material::checker>("material", "checker", "", none, render, "built-in checker")
           .only(diffuse | coated),
       row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,

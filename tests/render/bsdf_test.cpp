@@ -164,6 +164,10 @@ TEST(Texture, LiesOnTheClothByItsCoordinates) {
   EXPECT_NEAR(red.x, 0.8 * 0.613, 0.01);
   EXPECT_NEAR(green.y, 0.8 * 0.916, 0.01);
   EXPECT_NEAR(blue.z, 0.8 * 0.870, 0.01);
+  shot.material[0].texture_size = 0.5;  // twice along each edge
+  for (const double x : {-0.75, 0.25})
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen(x, -0.75)[c], blue[c], 0.01);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen(-0.25, -0.75)[c], white[c], 0.01);
 }
 
 TEST(Checker, AlternatesInSquaresOfItsSize) {
