@@ -4,19 +4,19 @@
 
 namespace drench::bench {
 
-TriangleMesh pleated_sheet() {
-  constexpr int kCells = 64;
+TriangleMesh pleated_sheet(uint32_t cells) {
   TriangleMesh mesh;
-  for (int j = 0; j <= kCells; ++j)
-    for (int i = 0; i <= kCells; ++i) {
-      const float x = -0.5f + float(i) / kCells, y = 1.05f - float(j) / kCells;
+  const float n = float(cells);
+  for (uint32_t j = 0; j <= cells; ++j)
+    for (uint32_t i = 0; i <= cells; ++i) {
+      const float x = -0.5f + float(i) / n, y = 1.05f - float(j) / n;
       mesh.position.push_back({x, y, 0.05f * std::sin(30 * x + 3 * y) * (1.2f - y)});
       mesh.velocity.push_back({0, 0, 0});
-      mesh.uv.push_back({float(i) / kCells, float(j) / kCells});
+      mesh.uv.push_back({float(i) / n, float(j) / n});
     }
-  for (uint32_t j = 0; j < kCells; ++j)
-    for (uint32_t i = 0; i < kCells; ++i) {
-      const uint32_t a = j * (kCells + 1) + i, c = a + kCells + 1;
+  for (uint32_t j = 0; j < cells; ++j)
+    for (uint32_t i = 0; i < cells; ++i) {
+      const uint32_t a = j * (cells + 1) + i, c = a + cells + 1;
       mesh.triangle.push_back({a, c, a + 1});
       mesh.triangle.push_back({a + 1, c, c + 1});
     }
@@ -41,8 +41,8 @@ Shot cloth_shot() {
   return shot;
 }
 
-TriangleMesh wavy_pool() {
-  constexpr uint32_t n = 128, row = n + 1;
+TriangleMesh wavy_pool(uint32_t n) {
+  const uint32_t row = n + 1, below = row * row;
   TriangleMesh mesh;
   for (const bool top : {true, false})
     for (uint32_t j = 0; j <= n; ++j)
@@ -56,7 +56,6 @@ TriangleMesh wavy_pool() {
     mesh.triangle.push_back({a, b, c});
     mesh.triangle.push_back({a, c, d});
   };
-  constexpr uint32_t below = row * row;
   for (uint32_t j = 0; j < n; ++j)
     for (uint32_t i = 0; i < n; ++i) {
       const uint32_t a = j * row + i;

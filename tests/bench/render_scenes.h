@@ -8,12 +8,13 @@ namespace drench::bench {
 
 inline constexpr int kSmallWidth = 96, kSmallHeight = 54;  // pixels
 
-/// A pleated sheet of 2 x 64 x 64 triangles.
-TriangleMesh pleated_sheet();
+/// A pleated sheet of 2 x cells x cells triangles.
+TriangleMesh pleated_sheet(uint32_t cells = 64);
 /// A sheet over the ground under a lamp of 1 m and a sky, depth 8.
 Shot cloth_shot();
-/// A closed slab of water of 4 m whose top waves, its floor below the ground.
-TriangleMesh wavy_pool();
+/// A closed slab of water of 4 m whose top waves, its floor below the ground, of 4 n (n + 2)
+/// triangles.
+TriangleMesh wavy_pool(uint32_t n = 128);
 /// The slab under a lamp of 0.1 m.
 Shot pool_shot();
 
