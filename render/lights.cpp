@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/error.h"
 #include "render/color.h"
+#include "render/kept_parts.h"
 #include "render/sampling.h"
 
 namespace drench {
@@ -176,7 +177,8 @@ bool SunLight::covers(const V3f& direction) const {
   return dot(direction, toward) > 0 && dot(off, off) <= sin2;
 }
 
-Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment) {
+Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
+               KeptParts& parts) {
   for (const Light& light : lights) {
     check_radiance(light);
     switch (light.type) {
@@ -201,7 +203,7 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         sample_environment_ =
             sample_environment == SampleEnvironment::always ||
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
-        environment_.emplace(
+        environment_ = parts.environment(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
         environment_group_ = group_of(light);
         for (const MapSun& sun : environment_->suns()) {

@@ -2,7 +2,7 @@
 // The lights of a shot: shapes that rays can hit, objects that shine, suns and an environment at
 // infinity, and a draw among them by what each could send to a point.
 
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -42,12 +42,14 @@ struct SunLight {
   bool covers(const V3f& direction) const;
 };
 
+class KeptParts;
+
 class Lights {
  public:
   enum class SampleEnvironment { automatic, always, never };
 
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
-  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment);
+  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment, KeptParts& parts);
 
   /// Adds an object that shines. @return its number among them
   int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {
@@ -114,7 +116,7 @@ class Lights {
 
   /// How many shapes and suns there are.
   size_t lamps() const { return shapes_.size() + suns_.size(); }
-  bool has_environment() const { return environment_.has_value(); }
+  bool has_environment() const { return environment_ != nullptr; }
   bool can_sample() const { return environment_index() > 0 || sample_environment_; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }
@@ -134,7 +136,7 @@ class Lights {
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
   std::vector<MeshLight> meshes_;
-  std::optional<Environment> environment_;
+  std::shared_ptr<const Environment> environment_;
   std::vector<std::string> groups_;
   std::vector<uint32_t> mesh_group_;
   uint32_t environment_group_ = 0;

@@ -26,6 +26,8 @@ enum class WaterGuide {
   off,
 };
 
+class KeptParts;
+
 struct RenderOptions {
   Estimator estimator = Estimator::mis;
   EnvironmentSampling environment = EnvironmentSampling::automatic;
@@ -33,6 +35,7 @@ struct RenderOptions {
   WaterGuide water_guide = WaterGuide::on;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
+  std::shared_ptr<KeptParts> parts{};  // of frames of the same shot before; null: none
 };
 
 /// render_frame with explicit options.

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 
 #include "pipeline/contract/error.h"
+#include "render/kept_parts.h"
 #include "render/path.h"
 
 namespace drench {
@@ -23,13 +23,6 @@ constexpr float kSharedError = 2 * 0x1p-24f;
 constexpr float kFoamReflectance = 0.9f;
 /// Indices whose ratio is so near 1 have no facets that bend light.
 constexpr float kSameIndex = 1e-3f;
-
-EmbreeDevice make_device() {
-  // One instruction set on every machine, so that rays meet the same triangles everywhere.
-  EmbreeDevice device(rtcNewDevice("isa=avx2"));
-  if (!device) throw std::runtime_error("Embree could not be started with isa=avx2");
-  return device;
-}
 
 void check_embree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
@@ -137,12 +130,13 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
       fps_(shot.timeline.fps),
       layers_(shot.layers),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
-      lights_(shot.light, options.environment == EnvironmentSampling::always
-                              ? Lights::SampleEnvironment::always
-                          : options.environment == EnvironmentSampling::never
-                              ? Lights::SampleEnvironment::never
-                              : Lights::SampleEnvironment::automatic),
-      device_(make_device()) {
+      parts_(options.parts ? options.parts : std::make_shared<KeptParts>()),
+      lights_(shot.light,
+              options.environment == EnvironmentSampling::always ? Lights::SampleEnvironment::always
+              : options.environment == EnvironmentSampling::never
+                  ? Lights::SampleEnvironment::never
+                  : Lights::SampleEnvironment::automatic,
+              *parts_) {
   if (!(close_ >= open_)) throw Error("camera: shutter_close lies before shutter_open; swap them");
   if (shot.ground.present) {
     has_ground_ = true;
@@ -181,8 +175,13 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   find_features();
 }
 
+Scene::~Scene() {
+  for (SceneObject& object : objects_)
+    if (object.contents != Digest{}) parts_->give_back(std::move(object));
+}
+
 uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
-  materials_.push_back(find_material(shot, name));
+  materials_.push_back(parts_->material(shot, name));
   material_names_.push_back(name);
   return uint32_t(materials_.size() - 1);
 }
@@ -243,14 +242,7 @@ void Scene::find_mesh_lights() {
 
 /// One table for each pair of roughness and index that facets of the frame have.
 void Scene::find_albedos() {
-  std::map<std::pair<float, float>, std::shared_ptr<const AlbedoTable>> known;
-  const auto table = [&](float alpha, float eta) {
-    std::shared_ptr<const AlbedoTable>& entry = known[{alpha, eta}];
-    if (!entry)
-      entry = std::make_shared<const AlbedoTable>(eta == 0 ? AlbedoTable::mirrors(alpha)
-                                                           : AlbedoTable::dielectric(alpha, eta));
-    return entry;
-  };
+  const auto table = [&](float alpha, float eta) { return parts_->albedo(alpha, eta); };
   for (ShadingMaterial& m : materials_) {
     if (!m.has_facets()) continue;
     if (m.type == MaterialType::metal) {
@@ -293,10 +285,33 @@ bool Scene::moves_visibly(const TriangleMesh& mesh) const {
   return false;
 }
 
+/// Of all that a standing object is built from.
+Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
+                          uint32_t material) const {
+  Hasher hasher;
+  const auto add = [&](const auto& column) {
+    hasher.value(column.size()).bytes(column.data(), column.size() * sizeof(column[0]));
+  };
+  hasher.text(name).text(material_names_[material]);
+  add(mesh.triangle), add(mesh.position), add(mesh.normal), add(mesh.uv), add(mesh.contact);
+  if (layers_.motion) add(mesh.velocity);
+  return hasher.finish();
+}
+
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
                        uint32_t material) {
   check_mesh(mesh, what);
+  const bool moves = moves_visibly(mesh);
+  const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);
+  if (std::optional<SceneObject> kept = moves ? std::nullopt : parts_->take(contents)) {
+    kept->material = material;
+    kept->light = -1;
+    kept->body = 0;
+    objects_.push_back(std::move(*kept));
+    return;
+  }
   SceneObject object;
+  object.contents = contents;
   object.name = name;
   object.material_name = material_names_[material];
   if (layers_.motion) object.velocity = mesh.velocity;
@@ -313,7 +328,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
     moved.push_back(V3f(0));
     return moved;
   };
-  if (moves_visibly(mesh)) {
+  if (moves) {
     object.position = at(open_);
     object.position_close = at(close_);
   } else {
@@ -363,7 +378,7 @@ void Scene::add_foam(const FoamFrame& foam) {
 }
 
 EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -378,7 +393,7 @@ EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
 }
 
 EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
+  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
   unsigned step = 0;
   for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
@@ -389,18 +404,19 @@ EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
 }
 
 void Scene::build(SceneObject& object) {
+  if (object.scene) return;  // it was kept
   object.bounds = bounds_of(object);
   const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
   rtcSetGeometryMask(geometry.get(), 0xffffffffu);
   rtcCommitGeometry(geometry.get());
-  object.scene.reset(rtcNewScene(device_.get()));
+  object.scene.reset(rtcNewScene(parts_->device().get()));
   if (materials_[object.material].type == MaterialType::dielectric)
     rtcSetSceneFlags(object.scene.get(), RTC_SCENE_FLAG_ROBUST);
   // High quality would split triangles differently for different thread counts.
   rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   rtcAttachGeometry(object.scene.get(), geometry.get());
   rtcJoinCommitScene(object.scene.get());
-  check_embree(device_.get());
+  check_embree(parts_->device().get());
 }
 
 void Scene::find_features() {

@@ -8,6 +8,7 @@
 #include <bit>
 
 #include "pipeline/contract/frames.h"
+#include "pipeline/contract/hash.h"
 #include "render/camera.h"
 #include "render/embree.h"
 #include "render/lights.h"
@@ -38,6 +39,7 @@ struct SceneObject {
   uint32_t material = 0;
   int light = -1;       // its number among the meshes that shine
   Bodies body = 0;      // its bit, if it is a dielectric
+  Digest contents;      // of what stands; 0 of what moves
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
@@ -75,6 +77,9 @@ class Scene {
  public:
   /// @throws Error for a mesh, material, light or camera that cannot be rendered.
   Scene(const Shot& shot, int frame, const FrameGeometry& geometry, const RenderOptions& options);
+  ~Scene();
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
 
   Hit intersect(const Ray& ray, Coherence coherence) const;
   /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
@@ -115,6 +120,7 @@ class Scene {
   void find_lights_in(const SceneObject& body);
   void find_albedos();
   void build(SceneObject& object);
+  Digest contents_of(const TriangleMesh& mesh, const std::string& name, uint32_t material) const;
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
   void find_features();
@@ -126,8 +132,8 @@ class Scene {
   double fps_ = 24;
   LayerSettings layers_;
   ShutterCamera camera_;
+  std::shared_ptr<KeptParts> parts_;
   Lights lights_;
-  EmbreeDevice device_;
   std::vector<ShadingMaterial> materials_;
   std::vector<std::string> material_names_;
   std::vector<SceneObject> objects_;

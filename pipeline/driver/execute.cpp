@@ -27,7 +27,15 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr size_t queued_frames = 2;
-constexpr int stage_threads = 3;
+/// Two frames are rendered at once, so that one is read and built while the other has all tiles at
+/// work; and one more for every so many cores, which its ends would leave idle.
+constexpr int cores_a_frame = 32, most_frames_at_once = 4;
+constexpr int most_stage_threads = 2 + most_frames_at_once;
+
+int frames_at_once(int threads) {
+  const int cores = threads > 0 ? threads : tbb::this_task_arena::max_concurrency();
+  return std::min(2 + cores / cores_a_frame, most_frames_at_once);
+}
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -91,7 +99,7 @@ class Executor {
   int next_foam_;  // frame that foam was not looked at yet; foam comes in order
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
   tbb::task_arena simulate_arena_, mesh_arena_, render_arena_;
-  std::counting_semaphore<stage_threads> slots_;
+  std::counting_semaphore<most_stage_threads> slots_;
   std::atomic<bool> failed_{false};
   std::atomic<int> running_{0};
   std::atomic<bool> simulating_{false};
@@ -99,7 +107,9 @@ class Executor {
   std::exception_ptr error_;
 };
 
-int slots(int threads) { return threads > 0 ? std::min(threads, stage_threads) : stage_threads; }
+int slots(int threads) {
+  return threads > 0 ? std::min(threads, most_stage_threads) : most_stage_threads;
+}
 int arena_size(int threads) { return threads > 0 ? threads : tbb::task_arena::automatic; }
 
 Executor::Executor(const Wanted& wanted, const Plan& plan, const fs::path& folder,
@@ -392,7 +402,7 @@ void Executor::make_image(int frame) {
   StageReport report;
   const auto share = [&](double finished) {
     if (stopping()) throw Stopped("stopped while rendering");
-    progress_.share(Step::render, finished);
+    progress_.share(Step::render, frame, finished);
   };
   compute(render_arena_, [&] {
     report = stages_.render(folder_, frame, attributes_of(frame, decision->key), share);
@@ -455,18 +465,21 @@ void Executor::watch() {
 
 void Executor::run() {
   progress_.start(plan_);
-  running_ = stage_threads;
+  const int at_once = frames_at_once(options_.threads);
+  running_ = 2 + at_once;
   simulating_ = true;
   std::thread simulating([this] {
     guard(&Executor::simulate_frames);
     simulating_ = false;
   });
   std::thread meshing([this] { guard(&Executor::mesh_frames); });
-  std::thread rendering([this] { guard(&Executor::render_frames); });
+  std::vector<std::thread> rendering;
+  for (int k = 0; k < at_once; ++k)
+    rendering.emplace_back([this] { guard(&Executor::render_frames); });
   watch();
   simulating.join();
   meshing.join();
-  rendering.join();
+  for (std::thread& thread : rendering) thread.join();
   if (!stopping()) {
     make_dailies(Step::contact_sheet);
     if (!stopping()) make_dailies(Step::movie);

@@ -53,7 +53,7 @@ void Progress::done(Step step, int frame, double seconds, std::string_view line)
     ++count.done;
     ++count.ran;
     count.seconds += seconds;
-    count.share = 0;
+    count.share.erase(frame);
   }
   if (style_ != ProgressStyle::lines) return;
   log_info(log_part(step),
@@ -72,9 +72,9 @@ void Progress::not_needed(Step step, int frame) {
   }
 }
 
-void Progress::share(Step step, double finished) {
+void Progress::share(Step step, int frame, double finished) {
   const std::scoped_lock lock(mutex_);
-  counts_[step].share = finished;
+  counts_[step].share[frame] = finished;
 }
 
 std::string Progress::text() const {
@@ -83,14 +83,17 @@ std::string Progress::text() const {
   double done = 0, planned = 0, left = 0;
   int frames = 0;
   for (const auto& [step, count] : counts_) {
-    const double finished = std::min<double>(count.done + count.share, count.planned);
+    double finished = count.done;
+    for (const auto& [frame, share] : count.share) finished += share;
+    finished = std::min<double>(finished, count.planned);
     text += fmt::format("{} {}/{}  ", log_part(step), count.done, count.planned);
     done += finished;
     planned += count.planned;
     // Stages overlap: the slowest one says when all is done. Its mean time is measured while the
     // others run beside it.
     if (count.ran > 0) {
-      left = std::max(left, (count.planned - finished) * count.seconds / count.ran);
+      const double at_once = std::max<double>(1, double(count.share.size()));
+      left = std::max(left, (count.planned - finished) * count.seconds / (count.ran * at_once));
     }
     if (count.ran > 0 && is_framed(step)) frames = count.ran;  // of the last stage at work
   }

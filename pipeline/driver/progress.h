@@ -31,8 +31,8 @@ class Progress {
   /// A task ran in `seconds`, or turned out not to be needed.
   void done(Step step, int frame, double seconds, std::string_view line);
   void not_needed(Step step, int frame);
-  /// Share of the frame in work that is finished, 0..1.
-  void share(Step step, double finished);
+  /// Share of a frame in work that is finished, 0..1.
+  void share(Step step, int frame, double finished);
   /// Takes the bar away.
   void finish();
 
@@ -43,8 +43,8 @@ class Progress {
   struct Count {
     int planned = 0, done = 0;
     int ran = 0;
-    double seconds = 0;  // of those that ran
-    double share = 0;
+    double seconds = 0;           // of those that ran
+    std::map<int, double> share;  // by frame
   };
   void draw_until_finished();
 

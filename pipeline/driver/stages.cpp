@@ -13,6 +13,7 @@
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "render/kept_parts.h"
 #include "render/renderer.h"
 #include "surfacing/foam.h"
 #include "surfacing/surface.h"
@@ -184,7 +185,9 @@ class ShotStages final : public Stages {
         geometry.obstacle.push_back({obstacle.name, obstacle_surface(shot_, obstacle, frame)});
     }
     RenderStats stats;
-    const Film film = render_frame(shot_, frame, geometry, &stats, progress);
+    RenderOptions options;
+    options.parts = parts_;
+    const Film film = render_frame(shot_, frame, geometry, options, &stats, progress);
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
     all.emplace_back("samples", std::to_string(shot_.render.samples));
@@ -231,6 +234,7 @@ class ShotStages final : public Stages {
   Shot shot_;
   fs::path folder_;
   StageOptions options_;
+  const std::shared_ptr<KeptParts> parts_ = std::make_shared<KeptParts>();
 };
 
 }  // namespace

@@ -80,6 +80,24 @@ TEST(Execute, MeshesAndRendersWhileItSimulates) {
   EXPECT_TRUE(overlapped);
 }
 
+// The image of frame 1 waits until frame 2 is in work, too.
+TEST(Execute, BeginsTheNextImageWhileOneIsMade) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  std::atomic<bool> overlapped{false};
+  stages.hook = [&](Step step, int frame) {
+    if (step != Step::render || frame != 1) return;
+    for (int k = 0; k < 2000 && !overlapped; ++k) {
+      const std::vector<Event> events = stages.events();
+      overlapped = position(events, Step::render, 2, true) < events.size();
+      std::this_thread::sleep_for(10ms);
+    }
+  };
+  make_toy(settings, stages, folder.path());
+  EXPECT_TRUE(overlapped);
+}
+
 // Two frames in the queue, one in work, one waiting to be queued, one being simulated; the log of a
 // begin may lag behind the queue by one.
 TEST(Execute, NeverRunsMoreThanTwoQueuedFramesAhead) {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "render/guide.h"
+#include "render/kept_parts.h"
 #include "render/scene.h"
 #include "tests/render/support.h"
 
@@ -176,7 +177,9 @@ TEST(WaterGuide, LeavesTheMeanAsItIs) {
 TEST(WaterGuide, HasTheDensityItClaims) {
   // The density integrates to 1 over the directions that reach the surface below the critical
   // angle, less what the cones hold beyond the horizon: none here.
-  const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6)}, Lights::SampleEnvironment::automatic);
+  KeptParts parts;
+  const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6)}, Lights::SampleEnvironment::automatic,
+                      parts);
   const RefractedLightGuide guide(lights, float(kIndex));
   const V3f point(0.1f, 0, 0);
   double integral = 0, drawn = 0;

@@ -9,6 +9,7 @@
 
 #include "render/environment.h"
 #include "render/filter.h"
+#include "render/kept_parts.h"
 #include "render/lights.h"
 #include "render/sampler.h"
 #include "render/sampling.h"
@@ -160,7 +161,8 @@ double shape_density(const Lights& lights, const V3f& from, const V3f& d) {
 }
 
 void expect_shape_density(const std::vector<Light>& list, const V3f& from) {
-  const Lights lights(list, Lights::SampleEnvironment::automatic);
+  KeptParts parts;
+  const Lights lights(list, Lights::SampleEnvironment::automatic, parts);
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) {
                   const float u = uniform2(r).x;
