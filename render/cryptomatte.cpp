@@ -58,6 +58,13 @@ void CryptomattePixel::add(int thing) {
   counts_.emplace_back(thing, 1);
 }
 
+void CryptomattePixel::archive(CheckpointArchive& file) {
+  uint16_t things = uint16_t(counts_.size());
+  file.value(things);
+  counts_.resize(things);
+  for (auto& [thing, count] : counts_) file.value(thing), file.value(count);
+}
+
 std::array<float, 2 * CryptomattePixel::kRanks> CryptomattePixel::ranked(
     const std::vector<float>& ids, int samples) const {
   std::vector<std::pair<int, int>> sorted = counts_;

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "render/checkpoint_archive.h"
+
 namespace drench {
 
 /// MurmurHash3, 32 bits, x86 variant, seed 0, of a name's UTF-8 bytes.
@@ -30,6 +32,7 @@ class CryptomattePixel {
 
   /// @param thing  index of a name, negative: nothing
   void add(int thing);
+  void archive(CheckpointArchive& file);
   /// Pairs of id and share, the largest first, of equals the lower index; zeros after the last.
   std::array<float, 2 * kRanks> ranked(const std::vector<float>& ids, int samples) const;
 

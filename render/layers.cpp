@@ -24,7 +24,7 @@ void NameIndex::add(const std::string& next) {
 }
 
 LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width, int height)
-    : scene_(scene),
+    : scene_(&scene),
       want_(shot.layers),
       features_(shot.render.denoise),
       width_(width),
@@ -69,8 +69,17 @@ void LayerFilm::clear(PathRecord& record) const {
   record.shaded = false;
 }
 
+void LayerFilm::archive(CheckpointArchive& file) {
+  file.column(light_);
+  for (Pixel& p : pixel_) {
+    for (V3f* sum : {&p.albedo, &p.normal, &p.albedo2, &p.normal2}) file.value(*sum);
+    file.value(p.inverse_depth), file.value(p.inverse_depth2), file.value(p.nearest);
+    p.object.archive(file), p.material.archive(file);
+  }
+}
+
 V3f LayerFilm::motion_of(const PathRecord& record) const {
-  const V3f per_frame = scene_.velocity(record.first) * float(1 / fps_);
+  const V3f per_frame = scene_->velocity(record.first) * float(1 / fps_);
   const double since_frame = shutter_open_ + record.time * shutter_frames_;
   const V3f now = record.position - per_frame * float(since_frame);
   const V2f from = frame_camera_.project(frame_camera_.open(), now);
@@ -100,7 +109,7 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   }
   if (!want_.cryptomatte) return;
   const size_t object =
-      record.first.kind == Hit::Kind::ground ? scene_.object_count() : size_t(record.first.index);
+      record.first.kind == Hit::Kind::ground ? scene_->object_count() : size_t(record.first.index);
   p.object.add(objects_.index[object]);
   p.material.add(materials_.index[object]);
 }

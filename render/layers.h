@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "render/checkpoint_archive.h"
 #include "render/cryptomatte.h"
 #include "render/denoise.h"
 #include "render/path.h"
@@ -35,6 +36,7 @@ class LayerFilm {
   void clear(PathRecord& record) const;
   /// Adds a sample to a pixel, row by row from the top left.
   void add(size_t pixel, const PathRecord& record);
+  void archive(CheckpointArchive& file);
   /// The finished layers, those that were asked for.
   std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels) const;
   /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
@@ -64,7 +66,7 @@ class LayerFilm {
   void add_matte(std::vector<FilmLayer>& out, const std::string& name, const NameIndex& things,
                  CryptomattePixel Pixel::*which, const std::vector<PixelSum>& pixels) const;
 
-  const Scene& scene_;
+  const Scene* scene_;
   LayerSettings want_;
   bool features_;
   std::vector<std::string> groups_;  // of light, the last is photons'

@@ -1,6 +1,7 @@
 #pragma once
 // How an image is estimated, for tests and measurements: every choice gives the same mean.
 
+#include "pipeline/contract/hash.h"
 #include "render/renderer.h"
 #include "render/sampler.h"
 
@@ -26,6 +27,13 @@ enum class WaterGuide {
   off,
 };
 
+/// Where a frame's samples are kept until it is finished, so that a stopped one goes on.
+struct FrameCheckpoint {
+  std::filesystem::path file;  // empty: none is kept
+  Digest inputs;               // of all that the frame is made from
+  double every_s = 300;        // wall seconds between two; one is written on a stop, too
+};
+
 class KeptParts;
 
 struct RenderOptions {
@@ -35,6 +43,7 @@ struct RenderOptions {
   WaterGuide water_guide = WaterGuide::on;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
+  FrameCheckpoint checkpoint{};
   std::shared_ptr<KeptParts> parts{};  // of frames of the same shot before; null: none
 };
 

@@ -6,17 +6,16 @@
 
 #include <atomic>
 #include <bit>
+#include <chrono>
 #include <ctime>
 #include <mutex>
 
 #include "pipeline/contract/error.h"
 #include "render/filter.h"
-#include "render/layers.h"
+#include "render/frame_checkpoint.h"
 #include "render/options.h"
 #include "render/path.h"
 #include "render/photons.h"
-#include "render/pixel_sum.h"
-#include "render/sample_plan.h"
 
 namespace drench {
 
@@ -67,12 +66,6 @@ struct Job {
   int rows() const { return (height + kTile - 1) / kTile; }
 };
 
-/// What the samples of a picture have added up to.
-struct Sums {
-  std::vector<PixelSum> pixel;
-  LayerFilm layers;
-};
-
 /// One more camera sample of a pixel, the next in its order.
 void add_sample(const Job& job, int x, int y, PixelSum& sum, uint64_t& rays, PathRecord* record) {
   const Sampler sampler(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2,
@@ -88,6 +81,10 @@ class Progress {
  public:
   explicit Progress(const std::function<void(double)>& report) : report_(report) {}
   void expect(double samples) { expected_ = samples; }
+  /// Samples that were there before.
+  void had(const std::vector<PixelSum>& pixels) {
+    for (const PixelSum& pixel : pixels) done_ += uint64_t(pixel.samples());
+  }
   void done(uint64_t samples) {
     const std::lock_guard lock(mutex_);
     done_ += samples;
@@ -105,7 +102,7 @@ class Progress {
 };
 
 /// Brings the pixels of a tile to the numbers of samples that are planned. @return those added
-uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sums, uint64_t& rays) {
+uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
   PathRecord record = sums.layers.blank();
   PathRecord* const recorded = sums.layers.records() ? &record : nullptr;
@@ -114,7 +111,7 @@ uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sum
   for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
     for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
-      for (int s = sums.pixel[pixel].samples(); s < plan.wanted(pixel); ++s, ++added) {
+      for (int s = sums.pixel[pixel].samples(); s < sums.plan.wanted(pixel); ++s, ++added) {
         add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
         if (!recorded) continue;
         sums.layers.add(pixel, record);
@@ -124,18 +121,52 @@ uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sum
   return added;
 }
 
-uint64_t render_tiles(const Job& job, const SamplePlan& plan, Sums& sums, Progress& progress) {
-  std::atomic<uint64_t> rays{0};
+using Clock = std::chrono::steady_clock;
+
+/// One pass over the tiles, which breaks off between two of them at `until`. Samples are whole
+/// then, and the same call goes on. @return whether the pass is through
+bool render_tiles(const Job& job, Sums& sums, Clock::time_point until, uint64_t& rays,
+                  Progress& progress) {
+  std::atomic<uint64_t> traced{0};
+  std::atomic<bool> through{true};
   tbb::parallel_for(
       tbb::blocked_range<int>(0, job.columns() * job.rows(), 1),
       [&](const tbb::blocked_range<int>& range) {
-        uint64_t traced = 0;
+        if (Clock::now() >= until) {
+          through = false;
+          return;
+        }
+        uint64_t here = 0;
         for (int tile = range.begin(); tile < range.end(); ++tile)
-          progress.done(render_tile(job, plan, tile, sums, traced));
-        rays += traced;
+          progress.done(render_tile(job, tile, sums, here));
+        traced += here;
       },
       tbb::simple_partitioner{});
-  return rays;
+  rays += traced;
+  return through;
+}
+
+/// All passes, with checkpoints in between and when `progress` throws.
+void render_passes(const Job& job, const FrameCheckpoint& checkpoint, Sums& sums, uint64_t& rays,
+                   Progress& progress) {
+  const bool keeps = !checkpoint.file.empty();
+  const auto every = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(std::min(checkpoint.every_s, 1e6)));
+  bool more = read_checkpoint(checkpoint, sums) || sums.plan.next(sums.pixel);
+  progress.had(sums.pixel);
+  try {
+    while (more) {
+      progress.expect(sums.plan.expected());
+      const Clock::time_point until = keeps ? Clock::now() + every : Clock::time_point::max();
+      if (render_tiles(job, sums, until, rays, progress))
+        more = sums.plan.next(sums.pixel);
+      else
+        write_checkpoint(checkpoint, sums);
+    }
+  } catch (...) {
+    if (keeps) write_checkpoint(checkpoint, sums);
+    throw;
+  }
 }
 
 double picture_error(const std::vector<PixelSum>& pixels) {
@@ -230,14 +261,11 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                 whole ? shot.render.width : shot.render.crop_max.x - window.x,
                 whole ? shot.render.height : shot.render.crop_max.y - window.y};
   Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
-            LayerFilm(shot, frame, scene, job.width, job.height)};
-  SamplePlan plan(job.width, job.height, shot.render.samples, shot.render.error);
+            LayerFilm(shot, frame, scene, job.width, job.height),
+            SamplePlan(job.width, job.height, shot.render.samples, shot.render.error)};
   Progress report(progress);
   uint64_t rays = photon_rays;
-  while (plan.next(sums.pixel)) {
-    report.expect(plan.expected());
-    rays += render_tiles(job, plan, sums, report);
-  }
+  render_passes(job, options.checkpoint, sums, rays, report);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, film);
   if (stats) {

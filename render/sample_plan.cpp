@@ -44,6 +44,14 @@ std::vector<float> SamplePlan::deviations(const std::vector<PixelSum>& pixels) c
   return out;
 }
 
+void SamplePlan::archive(CheckpointArchive& file) {
+  file.value(passes_), file.value(expected_);
+  uint64_t planned = wanted_.size();
+  file.value(planned);
+  wanted_.resize(planned == 0 ? 0 : size_t(width_) * height_);
+  file.column(wanted_);
+}
+
 bool SamplePlan::next(const std::vector<PixelSum>& pixels) {
   if (passes_++ == 0) {
     if (target_ > 0 && most_ > kFirst) wanted_.assign(pixels.size(), kFirst);

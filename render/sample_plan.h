@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "render/checkpoint_archive.h"
 #include "render/pixel_sum.h"
 
 namespace drench {
@@ -25,6 +26,7 @@ class SamplePlan {
   bool next(const std::vector<PixelSum>& pixels);
   /// Samples that a pixel shall have after this pass.
   int wanted(size_t pixel) const { return wanted_.empty() ? most_ : wanted_[pixel]; }
+  void archive(CheckpointArchive& file);
   /// How many all pixels are expected to have at the end.
   double expected() const { return expected_; }
 

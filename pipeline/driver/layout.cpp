@@ -17,6 +17,10 @@ std::string foam(int frame) { return fmt::format("mesh/foam.{:04d}.vdb", frame);
 std::string image(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.exr", shot, frame);
 }
+std::string frame_samples(const std::string& shot, int frame) {
+  return fmt::format("render/{}.{:04d}.samples", shot, frame);
+}
+bool is_frame_samples(std::string_view file) { return file.ends_with(".samples"); }
 std::string movie(const std::string& shot) { return shot + ".mp4"; }
 
 }  // namespace drench::layout

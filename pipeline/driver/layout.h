@@ -13,15 +13,17 @@ inline constexpr std::string_view shot_lock = "shot.lock.toml";
 inline constexpr std::string_view contact_sheet = "contact_sheet.png";
 inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
 
-std::string particles(int frame);                       // sim/particles.1001.vdb
-std::string cloth(const std::string& name, int frame);  // sim/cloth.flag.1001.ply
-std::string probe(const std::string& name);             // sim/probe.gauge.csv
-std::string checkpoint(int frame);                      // sim/checkpoint/frame.1011.ckpt
-std::string fluid_mesh(int frame);                      // mesh/fluid.1001.ply
-std::string fluid_obj(int frame);                       // mesh/fluid.1001.obj
-std::string level_set(int frame);                       // mesh/fluid.1001.vdb
-std::string foam(int frame);                            // mesh/foam.1001.vdb
-std::string image(const std::string& shot, int frame);  // render/pour.1001.exr
-std::string movie(const std::string& shot);             // pour.mp4
+std::string particles(int frame);                               // sim/particles.1001.vdb
+std::string cloth(const std::string& name, int frame);          // sim/cloth.flag.1001.ply
+std::string probe(const std::string& name);                     // sim/probe.gauge.csv
+std::string checkpoint(int frame);                              // sim/checkpoint/frame.1011.ckpt
+std::string fluid_mesh(int frame);                              // mesh/fluid.1001.ply
+std::string fluid_obj(int frame);                               // mesh/fluid.1001.obj
+std::string level_set(int frame);                               // mesh/fluid.1001.vdb
+std::string foam(int frame);                                    // mesh/foam.1001.vdb
+std::string image(const std::string& shot, int frame);          // render/pour.1001.exr
+std::string frame_samples(const std::string& shot, int frame);  // render/pour.1001.samples
+bool is_frame_samples(std::string_view file);
+std::string movie(const std::string& shot);  // pour.mp4
 
 }  // namespace drench::layout

@@ -65,6 +65,13 @@ StageReport report_of(const StepReport& step, const std::string& device) {
   return report;
 }
 
+/// Of the keys of all that a frame is made from.
+Digest digest_of(const Attributes& attributes) {
+  Hasher hasher;
+  for (const auto& [name, value] : attributes) hasher.text(name).text(value);
+  return hasher.finish();
+}
+
 class ShotSimulation final : public Simulation {
  public:
   ShotSimulation(const Shot& shot, const SimulatorOptions& options)
@@ -187,6 +194,8 @@ class ShotStages final : public Stages {
     RenderStats stats;
     RenderOptions options;
     options.parts = parts_;
+    options.checkpoint.file = folder / layout::frame_samples(shot_.name, frame);
+    options.checkpoint.inputs = digest_of(attributes);
     const Film film = render_frame(shot_, frame, geometry, options, &stats, progress);
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
@@ -196,6 +205,7 @@ class ShotStages final : public Stages {
     all.emplace_back("photons", fmt::format("{}", shot_.render.photons));
     StageReport report;
     report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, all));
+    fs::remove(options.checkpoint.file);
     report.json = json{
         {"camera_samples", stats.camera_samples},
         {"rays", stats.rays},

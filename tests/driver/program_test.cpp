@@ -355,6 +355,27 @@ TEST(Program, StopsOnRequestWithinTenSecondsAndContinues) {
   }
 }
 
+// Stopped within a frame, it keeps the frame's samples; continuing gives the same bits.
+TEST(Program, ContinuesWithinAFrame) {
+  const std::vector<std::string> long_frame{"--frames",  "1003", "--set", "render.samples=2048",
+                                            "--threads", "1"};
+  const TinyShot undisturbed, shot;
+  ASSERT_EQ(undisturbed.run("run", long_frame).code, done);
+  Child child(DRENCH_PROGRAM, shot.words("run", long_frame), shot.folder());
+  while (child.running() && !fs::exists(shot.out() / layout::fluid_mesh(1003))) {
+    std::this_thread::sleep_for(1ms);
+  }
+  std::this_thread::sleep_for(500ms);
+  child.send(SIGTERM);
+  const Ended ended = child.wait();
+  EXPECT_EQ(ended.code, stopped) << ended.err;
+  EXPECT_TRUE(fs::exists(shot.out() / layout::frame_samples("tiny", 1003))) << ended.err;
+  EXPECT_EQ(shot.run("run", long_frame).code, done);
+  EXPECT_FALSE(fs::exists(shot.out() / layout::frame_samples("tiny", 1003)));
+  EXPECT_EQ(hash_file(shot.out() / layout::image("tiny", 1003)),
+            hash_file(undisturbed.out() / layout::image("tiny", 1003)));
+}
+
 // A pre-roll of 1000 s is stopped like any frame: nothing is written of the first one.
 TEST(Program, StopsInThePreroll) {
   const TinyShot shot;

@@ -1,0 +1,38 @@
+#pragma once
+// Memory to a file or back: what a class says once holds for both ways.
+
+#include <filesystem>
+#include <fstream>
+#include <type_traits>
+#include <vector>
+
+#include "pipeline/contract/hash.h"
+
+namespace drench {
+
+class CheckpointArchive {
+ public:
+  enum class Way { write, read };
+
+  /// @throws Error if the file cannot be opened.
+  CheckpointArchive(const std::filesystem::path& file, Way way);
+
+  void bytes(void* data, size_t size);
+  /// Plain numbers, though Imath's vectors do not say so of themselves.
+  template <class T>
+  requires std::is_trivially_destructible_v<T>
+  void value(T& value) { bytes(&value, sizeof value); }
+  /// A vector whose length both sides know.
+  template <class T>
+  requires std::is_trivially_destructible_v<T>
+  void column(std::vector<T>& column) { bytes(column.data(), column.size() * sizeof(T)); }
+  /// Ends the file with its digest, or compares it. @return whether all is well
+  bool finish();
+
+ private:
+  Way way_;
+  std::fstream stream_;
+  Hasher hasher_;
+};
+
+}  // namespace drench

@@ -1,0 +1,115 @@
+// A frame that was stopped goes on from its samples, to the same bits as one that was not.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "render/options.h"
+#include "tests/render/support.h"
+#include "tests/temporary_folder.h"
+
+namespace drench::test {
+namespace {
+
+struct Stopped {};
+
+/// Water and a sheet with every layer, the denoiser and samples by a target.
+struct Frame {
+  TemporaryFolder folder;
+  Shot shot = plain_shot(64, 64);
+  FrameGeometry geometry;
+  RenderOptions options;
+  RenderStats stats;
+
+  Frame() {
+    add_ground(shot, 0.5f);
+    shot.material.push_back(dielectric("water", 1.333, V3f(1, 0.2f, 0.1f)));
+    shot.camera.position = V3d(0, 2.5, 5);
+    shot.camera.target = V3d(0, 0.5, 0);
+    shot.light = {panel({-1, 4, 0}, 0.6, 0.5, 3), sky(0.5f)};
+    shot.render.error = 1e-3;
+    shot.render.denoise = true;
+    LayerSettings& layers = shot.layers;
+    layers.albedo = layers.normal = layers.depth = layers.position = layers.motion = true;
+    layers.variance = layers.samples = layers.light_groups = layers.cryptomatte = true;
+    geometry.fluid = sphere_mesh(3);
+    options.checkpoint.file = folder / "frame.samples";
+    options.checkpoint.inputs = {1, 2};
+  }
+  const std::filesystem::path& file() const { return options.checkpoint.file; }
+  Film whole() {
+    RenderOptions without = options;
+    without.checkpoint = {};
+    return render_frame(shot, 1001, geometry, without);
+  }
+  /// Renders until that share of the samples is there.
+  void stop_at(double share) {
+    EXPECT_THROW(render_frame(shot, 1001, geometry, options, nullptr,
+                              [&](double done) {
+                                if (done >= share) throw Stopped{};
+                              }),
+                 Stopped);
+    EXPECT_TRUE(std::filesystem::is_regular_file(file()));
+  }
+  /// Samples that the frame needed in this call.
+  Film go_on(double& first_share) {
+    first_share = -1;
+    return render_frame(shot, 1001, geometry, options, &stats, [&](double share) {
+      if (first_share < 0) first_share = share;
+    });
+  }
+};
+
+void expect_equal(const Film& a, const Film& b) {
+  EXPECT_EQ(a.rgba, b.rgba);
+  ASSERT_EQ(a.layer.size(), b.layer.size());
+  for (size_t k = 0; k < a.layer.size(); ++k)
+    EXPECT_EQ(a.layer[k].value, b.layer[k].value) << a.layer[k].name;
+}
+
+TEST(FrameCheckpoint, GoesOnToTheSameBits) {
+  Frame frame;
+  const Film whole = frame.whole();
+  double first = 0;
+  for (const double share : {0.05, 0.4, 0.7}) frame.stop_at(share);  // each goes on from the last
+  expect_equal(frame.go_on(first), whole);
+  EXPECT_GE(first, 0.6);
+}
+
+TEST(FrameCheckpoint, IsWrittenNowAndThen) {
+  Frame frame;
+  const Film whole = frame.whole();
+  frame.options.checkpoint.every_s = 0.02;
+  double first = 0;
+  expect_equal(frame.go_on(first), whole);
+  ASSERT_TRUE(std::filesystem::is_regular_file(frame.file()));
+  expect_equal(frame.go_on(first), whole);  // from the last one on
+  EXPECT_GT(first, 0.05);
+}
+
+TEST(FrameCheckpoint, OfOtherInputsOrDamagedCountsForNothing) {
+  Frame frame;
+  const Film whole = frame.whole();
+  double first = 0;
+  frame.stop_at(0.5);
+  frame.options.checkpoint.inputs = {1, 3};
+  expect_equal(frame.go_on(first), whole);
+  EXPECT_LT(first, 0.1);
+  frame.stop_at(0.5);
+  const auto size = std::filesystem::file_size(frame.file());
+  {
+    std::fstream file(frame.file(), std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(std::streamoff(size / 2));
+    file.put('\x55').put('\x2a').put('\x55');
+  }
+  expect_equal(frame.go_on(first), whole);
+  EXPECT_LT(first, 0.1);
+  frame.stop_at(0.5);
+  std::filesystem::resize_file(frame.file(), size / 3);
+  expect_equal(frame.go_on(first), whole);
+  EXPECT_LT(first, 0.1);
+}
+
+}  // namespace
+}  // namespace drench::test
