@@ -34,11 +34,14 @@ void check(const Material& m) {
   for (int c = 0; c < 3; ++c)
     if (!(m.emission[c] >= 0) || !std::isfinite(m.emission[c]))
       fail("emission must not be negative");
-  const bool refracts = m.type == MaterialType::dielectric || m.type == MaterialType::coated;
+  const bool refracts = m.type == MaterialType::dielectric || m.type == MaterialType::coated ||
+                        m.type == MaterialType::cloth;
   if (refracts && !(m.ior >= 1 && m.ior <= 10))
     fail(fmt::format("ior is {}; it must lie between 1 and 10", m.ior));
   if (!(m.roughness >= 0 && m.roughness <= 1))
     fail(fmt::format("roughness is {}; it must lie between 0 and 1", m.roughness));
+  if (m.type == MaterialType::cloth && !(m.film_roughness >= 0.05 && m.film_roughness <= 1))
+    fail(fmt::format("film_roughness is {}; it must lie between 0.05 and 1", m.film_roughness));
   if (m.checker && !(m.checker_size > 0)) fail("checker_size must be positive");
 }
 
@@ -83,10 +86,12 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
   ShadingMaterial out;
   out.type = found->type;
   out.reflectance = found->reflectance;
-  if (found->type == MaterialType::cloth)
+  if (found->type == MaterialType::cloth) {
     out.transmittance = found->transmittance;
-  else
+    out.film_alpha = float(found->film_roughness * found->film_roughness);
+  } else {
     out.transmittance = V3f(0);
+  }
   if (found->type == MaterialType::diffuse) out.emission = found->emission;
   const bool facets = found->type == MaterialType::dielectric ||
                       found->type == MaterialType::metal || found->type == MaterialType::coated;

@@ -8,13 +8,16 @@
 #include "pipeline/contract/shot.h"
 #include "render/albedo_table.h"
 #include "render/texture.h"
+#include "render/wet_cloth.h"
 
 namespace drench {
 
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
   V3f reflectance, transmittance, edge{1, 1, 1};
-  float alpha = 0;        // of GGX facets; 0: smooth
+  float alpha = 0;        // of GGX facets, of a film on cloth; 0: smooth, dry cloth
+  float film_alpha = 0;   // of cloth where it is wet; Scene makes it alpha of sheets that may be
+  WetFibres fibres;       // of such sheets
   V3f emission{0, 0, 0};  // W/(sr m^2)
   float ior = 1;
   int priority = 0;

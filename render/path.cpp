@@ -16,6 +16,7 @@
 #include "render/bsdf_dielectric.h"
 #include "render/bsdf_metal.h"
 #include "render/bsdf_rough.h"
+#include "render/fabric.h"
 #include "render/guide.h"
 
 namespace drench {
@@ -130,6 +131,10 @@ class PathTracer {
     if constexpr (kFacets) {
       if (surface.material->type == MaterialType::metal) return scatter_metal(state, surface);
       if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
+      if (surface.material->type == MaterialType::cloth) {
+        const float wetness = scene_.wetness(hit);
+        if (wetness > 0) return scatter_fabric(state, surface, wetness);
+      }
     }
     return scatter_cloth(state, surface);
   }
@@ -359,10 +364,34 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = kWater && settings_.photons && !surface.small;
     if (state.has_photons) add_caustics(state, surface, bsdf);
-    const bool sample_lights = samples_lights(state.in);
     add_direct(state, surface, state.in, bsdf);
     const Scatter next = sample_scatter(state, surface, bsdf);
+    state.survival *= bsdf.albedo();
+    return follow_from_sheet(state, surface, next);
+  }
+
+  /// As coats: one lobe is followed, lights are sampled for both, photons gathered by the soft one.
+  bool scatter_fabric(PathState& state, const Surface& surface, float wetness) {
+    if (++state.diffuse > settings_.depth) return false;
+    const FabricBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                          fabric_at(scene_, surface, wetness, state.in));
+    record_albedo(state.survival * bsdf.albedo());
+    const bool photons = kWater && settings_.photons && !surface.small;
+    if (photons) add_caustics(state, surface, bsdf.soft());
+    add_direct(state, surface, state.in, bsdf.soft(), bsdf.glints());
+    const bool glint = number(state, kScatterSide) < bsdf.glint_share();
+    const V2f u = point(state, kScatterDirection);
+    state.interfaces = 0;
+    state.has_photons = photons && !glint;
+    state.survival *= bsdf.albedo();
+    return follow_from_sheet(state, surface,
+                             glint ? bsdf.glints().sample(u) : bsdf.soft().sample(u));
+  }
+
+  /// Continues on either side of a sheet.
+  bool follow_from_sheet(PathState& state, const Surface& surface, const Scatter& next) {
     if (!(next.pdf > 0)) return false;
+    const bool sample_lights = samples_lights(state.in);
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
     if constexpr (kWater)
@@ -372,7 +401,6 @@ class PathTracer {
         state.in &= ~scene_.fluid();
     depart(state, surface, next.direction);
     state.throughput *= next.weight;
-    state.survival *= bsdf.albedo();
     state.bsdf_pdf = sample_lights ? next.pdf : 0;
     return true;
   }

@@ -261,8 +261,9 @@ void Scene::find_albedos() {
     m.albedo_inside.resize(medium_.size());
     for (size_t k = 0; k < medium_.size(); ++k) {
       const float eta = m.ior / medium_[k].ior;
-      if (m.type == MaterialType::coated) m.albedo_outside[k] = table(m.alpha, eta);
-      if (m.type == MaterialType::coated || std::abs(eta - 1) < kSameIndex) continue;
+      const bool coat = m.type == MaterialType::coated || m.type == MaterialType::cloth;
+      if (coat) m.albedo_outside[k] = table(m.alpha, eta);
+      if (coat || std::abs(eta - 1) < kSameIndex) continue;
       m.albedo_outside[k] = table(m.alpha, eta);
       m.albedo_inside[k] = table(m.alpha, 1 / eta);
     }
@@ -305,6 +306,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
   object.uv = mesh.uv;
   object.contact = mesh.contact;
   object.material = material;
+  add_wetness(object, mesh, what);
   const auto at = [&](double frames) {
     std::vector<V3f> moved = mesh.position;
     const float dt = float(frames / fps_);

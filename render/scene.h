@@ -35,6 +35,7 @@ struct SceneObject {
   std::vector<V2f> uv;                           // may be empty
   std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
+  std::vector<float> wetness;                    // of cloth, 0 to 1; may be empty
   uint32_t material = 0;
   int light = -1;       // its number among the meshes that shine
   Bodies body = 0;      // its bit, if it is a dielectric
@@ -81,6 +82,8 @@ class Scene {
   bool occluded(const Ray& ray, float distance) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
+  /// Of cloth: the share that is wet, 0 to 1.
+  float wetness(const Hit& hit) const;
   /// The bodies that a point lies in.
   Bodies bodies_at(const V3f& point, float time) const;
   const Medium& medium(Bodies in) const { return medium_[size_t(std::bit_width(in))]; }
@@ -109,6 +112,7 @@ class Scene {
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
                   uint32_t material);
+  void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
   void find_mesh_lights();

@@ -111,9 +111,14 @@ std::vector<Parameter> material_rows() {
       row<&Material::transmittance>("material", "transmittance", "", share, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(cloth_type),
+      row<&Material::film_roughness>("material", "film_roughness", "", {0.05, 1}, render,
+                                     "of the water on it where its vertices have wetness; as "
+                                     "roughness, 1 follows every thread")
+          .only(cloth_type),
       row<&Material::ior>("material", "ior", "", {1, 4}, render,
-                          "index of refraction, of the body or the coat; glass and varnish 1.5")
-          .only(dielectric | coated),
+                          "index of refraction, of the body, the coat, or what wets the cloth; "
+                          "glass and varnish 1.5")
+          .only(dielectric | coated | cloth_type),
       row<&Material::priority>("material", "priority", "", {-100, 100}, render,
                                "where bodies overlap the highest is; of equals, an obstacle")
           .only(dielectric),
