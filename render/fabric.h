@@ -7,6 +7,7 @@
 namespace drench {
 
 /// What light meets at a point of cloth. @param in  bodies that it arrives in
-FabricPoint fabric_at(const Scene& scene, const Surface& surface, float wetness, Bodies in);
+FabricPoint fabric_at(const Scene& scene, const Surface& surface, const Hit& hit, float time,
+                      float wetness, Bodies in);
 
 }  // namespace drench

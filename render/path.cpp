@@ -133,7 +133,8 @@ class PathTracer {
       if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
       if (surface.material->type == MaterialType::cloth) {
         const float wetness = scene_.wetness(hit);
-        if (wetness > 0) return scatter_fabric(state, surface, wetness);
+        if (surface.material->is_fabric() || wetness > 0)
+          return scatter_fabric(state, surface, hit, wetness);
       }
     }
     return scatter_cloth(state, surface);
@@ -371,10 +372,10 @@ class PathTracer {
   }
 
   /// As coats: one lobe is followed, lights are sampled for both, photons gathered by the soft one.
-  bool scatter_fabric(PathState& state, const Surface& surface, float wetness) {
+  bool scatter_fabric(PathState& state, const Surface& surface, const Hit& hit, float wetness) {
     if (++state.diffuse > settings_.depth) return false;
     const FabricBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
-                          fabric_at(scene_, surface, wetness, state.in));
+                          fabric_at(scene_, surface, hit, state.ray.time, wetness, state.in));
     record_albedo(state.survival * bsdf.albedo());
     const bool photons = kWater && settings_.photons && !surface.small;
     if (photons) add_caustics(state, surface, bsdf.soft());

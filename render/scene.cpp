@@ -178,6 +178,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   find_mesh_lights();
   find_bodies(has_fluid);
   find_albedos();
+  find_fabrics();
   find_features();
 }
 
@@ -306,6 +307,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
   object.uv = mesh.uv;
   object.contact = mesh.contact;
   object.material = material;
+  check_yarns(object, what);
   add_wetness(object, mesh, what);
   const auto at = [&](double frames) {
     std::vector<V3f> moved = mesh.position;
@@ -408,8 +410,9 @@ void Scene::build(SceneObject& object) {
 void Scene::find_features() {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
-  const bool facets = std::any_of(materials_.begin(), materials_.end(),
-                                  [](const ShadingMaterial& m) { return m.has_facets(); });
+  const bool facets =
+      std::any_of(materials_.begin(), materials_.end(),
+                  [](const ShadingMaterial& m) { return m.has_facets() || m.is_fabric(); });
   features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
               (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
               (facets ? kGlossy : 0u);

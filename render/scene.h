@@ -82,6 +82,8 @@ class Scene {
   bool occluded(const Ray& ray, float distance) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
+  /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
+  std::pair<V3f, V3f> yarns_along(const Hit& hit, float time) const;
   /// Of cloth: the share that is wet, 0 to 1.
   float wetness(const Hit& hit) const;
   /// The bodies that a point lies in.
@@ -112,6 +114,8 @@ class Scene {
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
                   uint32_t material);
+  void check_yarns(const SceneObject& object, const std::string& what) const;
+  void find_fabrics();
   void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);

@@ -127,6 +127,20 @@ class PictureChecker : CheckBase {
                                   : "blue"));
       }
     }
+    for (int c = 0; c < 3; ++c) {
+      const double sum = double(material.sheen[c]) + material.yarn_specular[c];
+      if (sum > 1 + 1e-5) {
+        fail(fmt::format("material[{}].{}", i,
+                         material.yarn_specular[c] > 0 ? "yarn_specular" : "sheen"),
+             fmt::format(
+                 "material \"{}\" has a sheen of {:.4g} and a yarn_specular of {:.4g} in {}; "
+                 "together more light than arrives. Keep the sum at most 1",
+                 material.name, material.sheen[c], material.yarn_specular[c],
+                 c == 0   ? "red"
+                 : c == 1 ? "green"
+                          : "blue"));
+      }
+    }
   }
 
   void check_use(const std::string& key, const std::string& name, MaterialType refused,

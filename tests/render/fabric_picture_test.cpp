@@ -116,14 +116,58 @@ TEST(WetSheet, ThatCannotBeIsRefused) {
   EXPECT_NE(error().find("values of wetness"), std::string::npos) << error();
 }
 
+/// With fuzz, yarns and, from one side to the other, water.
+Material everything(float reflectance, float transmittance) {
+  Material m = fabric(reflectance, transmittance);
+  m.sheen = V3f(0.4f, 0.3f, 0.2f);
+  m.yarn_specular = V3f(0.2f, 0.3f, 0.4f);
+  return m;
+}
+
 TEST(FabricLight, IsTheSameByAllEstimators) {
-  expect_estimators_agree(Draped(fabric(0.5f, 0.3f)).shot, Draped(fabric(0.5f, 0.3f)).geometry);
+  for (const Material& material : {fabric(0.5f, 0.3f), everything(0.5f, 0.3f)}) {
+    const Draped scene(material);
+    expect_estimators_agree(scene.shot, scene.geometry);
+  }
+}
+
+// Yarns have no direction without uv.
+TEST(FabricYarns, NeedTextureCoordinates) {
+  Draped scene(everything(0.5f, 0.3f));
+  scene.geometry.cloth[0].mesh.uv.clear();
+  try {
+    render_frame(scene.shot, 1001, scene.geometry);
+    FAIL() << "no error";
+  } catch (const Error& e) {
+    for (const char* word : {"cloth 'cloth'", "'cotton'", "yarn_specular", "u and v"})
+      EXPECT_NE(std::string(e.what()).find(word), std::string::npos) << e.what();
+  }
+}
+
+// Satin shows a lamp as a cross, a line across each family of yarns, which turns with the weave.
+TEST(FabricYarns, RunAlongTheClothsCoordinates) {
+  Material satin = fabric(0, 0);
+  satin.yarn_specular = V3f(1);
+  satin.yarn_roughness = 0.2;
+  Shot shot = plain_shot(64, 8);
+  shot.material = {satin};
+  TriangleMesh sheet = flat_sheet();
+  const auto seen = [&](const V3d& lamp) {
+    shot.light = {panel(lamp, 0.1, 0.1, 1)};
+    aim_narrow(shot, {0, 5, 0}, {0, 0, 0});
+    return channel_mean(render_frame(shot, 1001, {{}, {{"cloth", sheet}}}), 0).value;
+  };
+  const V3d along_x(1.5, 2, 0), along_z(0, 2, 1.5), between(1.06, 2, 1.06);
+  EXPECT_GT(seen(along_x), 20 * seen(between));
+  EXPECT_GT(seen(along_z), 20 * seen(between));
+  for (V2f& uv : sheet.uv) uv = {uv.x + uv.y, uv.x - uv.y};
+  EXPECT_GT(seen(between), 20 * seen(along_x));
 }
 
 // Nothing is seen of white sheets in uniform light, however wet, in air and in water.
 TEST(FabricFurnace, HidesASheet) {
   for (const bool in_water : {false, true}) {
-    Draped scene(fabric(0.6f, 0.4f));
+    Draped scene(everything(0.6f, 0.4f));
     scene.shot.ground.present = false;
     scene.shot.light = {sky(1)};
     scene.shot.render.depth = 200;
@@ -134,6 +178,7 @@ TEST(FabricFurnace, HidesASheet) {
     // Flat triangles: smooth normals lose what they would send through the real surface.
     TriangleMesh& sheet = scene.geometry.cloth[0].mesh;
     sheet = flat_mesh(sheet);
+    for (const V3f& p : sheet.position) sheet.uv.push_back({p.x, p.z});
     soak_along_x(sheet);
     const Mean mean = channel_mean(render_frame(scene.shot, 1001, scene.geometry), 1);
     EXPECT_NEAR(mean.value, 1, bound(mean) + 0.005) << in_water;
@@ -143,7 +188,7 @@ TEST(FabricFurnace, HidesASheet) {
 /// A wet sheet under a pane that all light of the lamp passes: photons bring what lies on the
 /// sheet.
 TEST(FabricPhotons, GiveThePictureThatPathsGive) {
-  Draped scene(fabric(0.5f, 0.3f));
+  Draped scene(everything(0.5f, 0.3f));
   scene.shot.render.width = scene.shot.render.height = 8;
   scene.shot.render.samples = 512;
   scene.shot.light = {panel({1.2, 3, 0}, 0.5, 0.5, 15), sky(0.2f)};
@@ -158,7 +203,7 @@ TEST(FabricPhotons, GiveThePictureThatPathsGive) {
 }
 
 TEST(FabricBits, AreTheSameForAnyNumberOfThreads) {
-  Draped scene(fabric(0.5f, 0.3f));
+  Draped scene(everything(0.5f, 0.3f));
   scene.shot.render.width = scene.shot.render.height = 48;
   scene.shot.render.samples = 8;
   const auto on_threads = [&](int threads) {
