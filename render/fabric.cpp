@@ -1,4 +1,4 @@
-// What the scene knows of cloth at a point of it: its fuzz, its yarns, how wet it is.
+// What the scene knows of cloth at a point of it: its fuzz, its yarns, its gaps, how wet it is.
 
 #include "render/fabric.h"
 
@@ -89,6 +89,35 @@ void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std
   object.wetness = mesh.wetness;
   material.alpha = material.film_alpha;
   material.fibres = WetFibres(double(material.ior));
+}
+
+float Scene::transmitted(const Ray& ray, float distance) const {
+  if (!has_gaps_) return occluded(ray, distance) ? 0.f : 1.f;
+  if (occluded(ray, distance, Gaps::open)) return 0;
+  float share = 1;
+  for (uint32_t k = 0; k < objects_.size(); ++k) {
+    const float gap = materials_[objects_[k].material].gap;
+    if (!(gap > 0)) continue;
+    // Layer by layer, as paths go through them.
+    Ray rest = ray;
+    float reach = distance * (1 - 1e-4f);
+    for (Hit hit = meet(k, rest, reach); hit.kind != Hit::Kind::nothing && share > 0;
+         hit = meet(k, rest, reach)) {
+      share *= gap;
+      reach -= hit.distance;
+      rest.origin = surface<true>(rest, hit).leave(ray.direction);
+    }
+  }
+  return share;
+}
+
+bool Scene::fluid_beyond(const Ray& ray) const {
+  const Hit hit = intersect(ray, Coherence::incoherent);
+  if (hit.kind == Hit::Kind::object && objects_[hit.index].body == fluid_) {
+    const Surface s = surface<true>(ray, hit);
+    return s.contact || dot(ray.direction, s.geometric_normal) > 0;
+  }
+  return bodies_at(ray.origin, ray.time) & fluid_;
 }
 
 float Scene::wetness(const Hit& hit) const {

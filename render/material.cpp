@@ -32,6 +32,8 @@ void check_fabric(const Material& m, const Fail& fail) {
   };
   within("sheen_roughness", m.sheen_roughness, 0.1);
   within("yarn_roughness", m.yarn_roughness, 0.1);
+  if (!(m.gap >= 0 && m.gap < 1))
+    fail(fmt::format("gap is {}; it must be at least 0 and below 1", m.gap));
   within("film_roughness", m.film_roughness, 0.05);
 }
 
@@ -106,6 +108,7 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
     out.sheen_roughness = float(found->sheen_roughness);
     out.yarn = found->yarn_specular;
     out.yarn_alpha = float(found->yarn_roughness * found->yarn_roughness);
+    out.gap = float(found->gap);
     out.film_alpha = float(found->film_roughness * found->film_roughness);
   } else {
     out.transmittance = V3f(0);

@@ -78,8 +78,15 @@ class Scene {
   Scene(const Shot& shot, int frame, const FrameGeometry& geometry, const RenderOptions& options);
 
   Hit intersect(const Ray& ray, Coherence coherence) const;
+  enum class Gaps { closed, open };  // open: what has gaps is not there
   /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
-  bool occluded(const Ray& ray, float distance) const;
+  bool occluded(const Ray& ray, float distance, Gaps gaps = Gaps::closed) const;
+  /// The share of light that comes along the ray: 0, 1, or what gaps of cloth let through.
+  float transmitted(const Ray& ray, float distance) const;
+  /// Whether the fluid fills a place in these bodies.
+  bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
+  /// Whether the fluid is where a ray starts that came through a gap of cloth.
+  bool fluid_beyond(const Ray& ray) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
@@ -104,7 +111,8 @@ class Scene {
   V3f velocity(const Hit& hit) const;
   bool is_rough(const SceneObject& object) const { return materials_[object.material].alpha > 0; }
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
-  Bodies fluid() const { return fluid_; }                          // 0: no dielectric
+  const ShadingMaterial& fluid_material() const { return materials_[objects_[0].material]; }
+  Bodies fluid() const { return fluid_; }  // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
   bool lamps_in_bodies() const { return lamps_in_bodies_; }
   unsigned features() const { return features_; }
@@ -128,6 +136,8 @@ class Scene {
   void find_features();
   bool moves_visibly(const TriangleMesh& mesh) const;
   bool moves_visibly(const FoamFrame& foam) const;
+  /// The nearest point of one object.
+  Hit meet(uint32_t object, const Ray& ray, float reach) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
   double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
@@ -147,6 +157,7 @@ class Scene {
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;
   bool lights_in_bodies_ = false, lamps_in_bodies_ = false;
+  bool has_gaps_ = false;
   unsigned features_ = 0;
 };
 

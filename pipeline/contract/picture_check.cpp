@@ -176,6 +176,12 @@ class PictureChecker : CheckBase {
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse, metal or coated");
+    for (const Material& m : shot_.material)
+      if (m.name == shot_.ground.material && m.gap > 0)
+        fail("ground.material",
+             fmt::format("ground.material is \"{}\", which has a gap of {}, but there is nothing "
+                         "below the ground. Use a material without, or a sheet of cloth",
+                         m.name, m.gap));
     check_dark("fluid.material", shot_.fluid.material, "the fluid");
     check_dark("ground.material", shot_.ground.material, "the ground");
     for (size_t i = 0; i < shot_.cloth.size(); ++i)

@@ -126,6 +126,10 @@ std::vector<Parameter> material_rows() {
                                      "its square is the slope of the fibres along a yarn: 0.3 "
                                      "is satin, 0.6 wool")
           .only(cloth_type),
+      row<&Material::gap>("material", "gap", "", {0, 0.99}, render,
+                          "share of its area that is open between yarns: light goes straight on. "
+                          "The other values are those of the rest. Not of the ground")
+          .only(cloth_type),
       row<&Material::film_roughness>("material", "film_roughness", "", {0.05, 1}, render,
                                      "of the water on it where its vertices have wetness; as "
                                      "roughness, 1 follows every thread")

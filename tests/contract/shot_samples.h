@@ -149,6 +149,7 @@ sheen = [0.2, 0.2, 0.3]
 sheen_roughness = 0.25
 yarn_specular = [0.1, 0.1, 0.05]
 yarn_roughness = 0.5
+gap = 0.05
 film_roughness = 0.4
 
 [ground]
