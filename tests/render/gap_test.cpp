@@ -95,6 +95,22 @@ TEST(Gap, AddsUpInAFurnace) {
   EXPECT_NEAR(white.value, 1, bound(white));
 }
 
+// Layers show yarns and what is behind them in the same shares: albedo of 0.7 before one of 0.5.
+TEST(Gap, IsInTheLayers) {
+  Shot shot = shot_with(gauze(0.5f, 0.2f, 0.4), 1024);
+  add_ground(shot, 0.5f);
+  shot.light = {sky(1)};
+  shot.layers.albedo = true;
+  aim_narrow(shot, {0, 5, 0}, {0.1, 0, 0.1});
+  Film film = render_frame(shot, 1001, layers(1));
+  ASSERT_EQ(film.layer.size(), 1u);
+  double mean = 0;
+  const std::vector<float>& albedo = film.layer[0].value;
+  for (const float value : albedo) mean += double(value) / double(albedo.size());
+  // 64 pixels of 1024 samples: a share of 0.4 errs by 0.002.
+  EXPECT_NEAR(mean, 0.6 * 0.7 + 0.4 * 0.5, 4 * 0.2 * 0.002 + 1e-4);
+}
+
 TEST(Gap, IsTheSameByAllEstimators) {
   Shot shot = shot_with(gauze(0.5f, 0.2f, 0.4), 64);
   shot.render.width = shot.render.height = 12;
