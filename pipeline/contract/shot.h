@@ -304,7 +304,7 @@ struct Material {
   V3f yarn_specular{0, 0, 0};         // cloth: of its yarns, along u and v; sheen + it <= 1
   double yarn_roughness = 0.4;        // cloth: its square is the slope of fibres along yarns
   double gap = 0;                     // cloth: share that is open between yarns
-  double film_roughness = 0.3;        // cloth: of the water's surface where it is wet
+  double film_roughness = 0.4;        // cloth: of the water's surface where it is wet
   double ior = 1.333;                 // dielectric, coat, what wets cloth
   int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m

@@ -130,7 +130,7 @@ TEST_F(ShotFile, ReadsColoursAsAcesOrSrgb) {
   EXPECT_EQ(shot.material[3].yarn_specular, V3f(0.1f, 0.1f, 0.05f));
   EXPECT_EQ(shot.material[3].yarn_roughness, 0.5);
   EXPECT_EQ(shot.material[3].gap, 0.05);
-  EXPECT_EQ(shot.material[3].film_roughness, 0.4);
+  EXPECT_EQ(shot.material[3].film_roughness, 0.35);
   const Shot hex =
       parse(full_shot(), {.quality = "final", .set = {"material.canvas.reflectance=\"#c8b428\""}});
   EXPECT_EQ(hex.material.at(3).reflectance, canvas);

@@ -150,7 +150,7 @@ sheen_roughness = 0.25
 yarn_specular = [0.1, 0.1, 0.05]
 yarn_roughness = 0.5
 gap = 0.05
-film_roughness = 0.4
+film_roughness = 0.35
 
 [ground]
 height = -0.01

@@ -54,6 +54,7 @@ TEST(WetSheet, IsAsBrightAsItsShareOfWater) {
   Shot shot = plain_shot(256, 8);
   shot.light = {sky(1)};
   shot.material = {fabric(0.55f, 0.2f)};
+  shot.material[0].film_roughness = 0.3;
   TriangleMesh sheet = flat_sheet(3);
   soak_along_x(sheet);
   const AlbedoTable film = AlbedoTable::dielectric(0.09f, 1.333f);
