@@ -76,6 +76,7 @@ std::pair<V3f, V3f> Scene::yarns_along(const Hit& hit, float time) const {
 
 void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what) {
   ShadingMaterial& material = materials_[object.material];
+  object.wetness.clear();
   if (mesh.wetness.empty() || material.type != MaterialType::cloth) return;
   if (mesh.wetness.size() != mesh.position.size())
     throw Error(fmt::format("{}: {} values of wetness for {} vertices; make the mesh anew", what,

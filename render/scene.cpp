@@ -172,7 +172,10 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
           fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
                       "surface; use a cloth, diffuse, metal or coated one",
                       cloth.name, material));
-    add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
+    const std::string what = fmt::format("cloth '{}'", cloth.name);
+    add_object(cloth.mesh, cloth.name, what, index);
+    check_yarns(objects_.back(), what);
+    add_wetness(objects_.back(), cloth.mesh, what);
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
@@ -192,8 +195,10 @@ void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) material = o.material;
-  add_object(obstacle.mesh, obstacle.name, fmt::format("obstacle '{}'", obstacle.name),
-             add_material(shot, material));
+  const std::string what = fmt::format("obstacle '{}'", obstacle.name);
+  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material));
+  check_yarns(objects_.back(), what);
+  add_wetness(objects_.back(), obstacle.mesh, what);
 }
 
 /// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
@@ -307,8 +312,6 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
   object.uv = mesh.uv;
   object.contact = mesh.contact;
   object.material = material;
-  check_yarns(object, what);
-  add_wetness(object, mesh, what);
   const auto at = [&](double frames) {
     std::vector<V3f> moved = mesh.position;
     const float dt = float(frames / fps_);
