@@ -7,6 +7,9 @@
 //   reflectance' = (1 - k2) reflectance / (1 - k2 reflectance),  1 - k2 = (1 - <R>) / eta^2
 // the last two being Saunderson's correction and reciprocity (Saunderson 1942; Kelemen and
 // Szirmay-Kalos 2001 for the product). A white base returns 1 - R(o), so all with the coat's R(o).
+// A sheet that lets light through has the coat on both sides, and what either reflects back goes
+// through again: with s the formula above of reflectance + transmittance and d that of reflectance
+// - transmittance, its two are (s + d) / 2 and (s - d) / 2.
 
 #include "render/albedo_table.h"
 #include "render/bsdf_cloth.h"
@@ -65,7 +68,7 @@ class CoatedBase {
 
  private:
   float through(const V3f& incoming) const {
-    const AlbedoTable::Share coat = coat_.at(dot(incoming, normal_));
+    const AlbedoTable::Share coat = coat_.at(std::abs(dot(incoming, normal_)));
     return entering_ * (1 - coat.reflected / coat.total);
   }
 
@@ -79,8 +82,9 @@ class CoatedBsdf {
  public:
   /// @param eta   index of the coat over that of what lies on it
   /// @param coat  of the same alpha and eta
+  /// @param transmittance  of the base, a sheet with a coat on either side
   CoatedBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, float alpha, float eta,
-             const V3f& reflectance, const AlbedoTable& coat)
+             const V3f& reflectance, const AlbedoTable& coat, const V3f& transmittance = V3f(0))
       : outgoing_(outgoing),
         geometric_(geometric * (dot(outgoing, geometric) < 0 ? -1.f : 1.f)),
         facets_(outgoing, geometric, shading, alpha),
@@ -91,28 +95,39 @@ class CoatedBsdf {
     const float reflected = share.reflected * gain_;
     const float out = std::min((1 - coat.mean_reflected()) / (eta * eta), 1.f);  // 1 - k2
     entering_ = (1 - reflected) / (1 - coat.mean_reflected());
-    V3f base;
-    for (int k = 0; k < 3; ++k) base[k] = reflectance[k] * out / (1 - (1 - out) * reflectance[k]);
+    const auto leaving = [out](float share) { return share * out / (1 - (1 - out) * share); };
+    for (int k = 0; k < 3; ++k) {
+      const float sum = leaving(reflectance[k] + transmittance[k]),
+                  difference = leaving(reflectance[k] - transmittance[k]);
+      base_reflectance_[k] = 0.5f * (sum + difference);
+      base_transmittance_[k] = 0.5f * (sum - difference);
+    }
+    const V3f base = base_reflectance_ + base_transmittance_;
     albedo_ = V3f(reflected) + base * (1 - reflected);
     // A coat reflects little, but what it shows are lamps: it is looked at a quarter of the time.
     const float diffuse = largest(base) * (1 - reflected);
     coat_share_ = diffuse > 0 ? std::max(reflected / (reflected + diffuse), 0.25f) : 1;
-    base_reflectance_ = base;
+    reflected_ = reflected;
   }
 
   V3f albedo() const { return albedo_; }
   float coat_share() const { return coat_share_; }
-  CoatLobe coat() const { return {facets_, eta_, gain_, coat_share_}; }
-  CoatedBase base() const {
-    const ClothBsdf diffuse(outgoing_, geometric_, facets_.normal(), base_reflectance_, V3f(0));
-    return {diffuse, facets_.normal(), coat_, entering_, 1 - coat_share_};
+  float reflected() const { return reflected_; }  // by the coat
+  CoatLobe coat() const { return coat(coat_share_); }
+  CoatedBase base() const { return base(1 - coat_share_); }
+  /// With another chance that the loop samples the lobe.
+  CoatLobe coat(float share) const { return {facets_, eta_, gain_, share}; }
+  CoatedBase base(float share) const {
+    const ClothBsdf diffuse(outgoing_, geometric_, facets_.normal(), base_reflectance_,
+                            base_transmittance_);
+    return {diffuse, facets_.normal(), coat_, entering_, share};
   }
 
  private:
   V3f outgoing_, geometric_;
   GgxReflection facets_;
-  float eta_, gain_ = 1, entering_ = 1, coat_share_ = 1;
-  V3f albedo_, base_reflectance_;
+  float eta_, gain_ = 1, entering_ = 1, reflected_ = 0, coat_share_ = 1;
+  V3f albedo_, base_reflectance_, base_transmittance_;
   const AlbedoTable& coat_;
 };
 

@@ -20,6 +20,23 @@ const Material* named(const std::vector<Material>& materials, const std::string&
   return nullptr;
 }
 
+template <class Fail>
+void check_fabric(const Material& m, const Fail& fail) {
+  for (int c = 0; c < 3; ++c)
+    if (!(m.sheen[c] >= 0 && m.yarn_specular[c] >= 0 &&
+          m.sheen[c] + m.yarn_specular[c] <= 1 + 1e-6f))
+      fail("sheen and yarn_specular must not be negative and their sum must not exceed 1");
+  const auto within = [&](const char* key, double value, double lowest) {
+    if (!(value >= lowest && value <= 1))
+      fail(fmt::format("{} is {}; it must lie between {} and 1", key, value, lowest));
+  };
+  within("sheen_roughness", m.sheen_roughness, 0.1);
+  within("yarn_roughness", m.yarn_roughness, 0.1);
+  if (!(m.gap >= 0 && m.gap < 1))
+    fail(fmt::format("gap is {}; it must be at least 0 and below 1", m.gap));
+  within("film_roughness", m.film_roughness, 0.05);
+}
+
 void check(const Material& m) {
   const auto fail = [&](const std::string& what) {
     throw Error(fmt::format("material '{}': {}", m.name, what));
@@ -34,13 +51,15 @@ void check(const Material& m) {
   for (int c = 0; c < 3; ++c)
     if (!(m.emission[c] >= 0) || !std::isfinite(m.emission[c]))
       fail("emission must not be negative");
-  const bool refracts = m.type == MaterialType::dielectric || m.type == MaterialType::coated;
+  const bool refracts = m.type == MaterialType::dielectric || m.type == MaterialType::coated ||
+                        m.type == MaterialType::cloth;
   if (refracts && !(m.ior >= 1 && m.ior <= 10))
     fail(fmt::format("ior is {}; it must lie between 1 and 10", m.ior));
   if (!(m.roughness >= 0 && m.roughness <= 1))
     fail(fmt::format("roughness is {}; it must lie between 0 and 1", m.roughness));
   if (!(m.checker_size > 0)) fail("checker_size must be positive");
   if (!(m.texture_size > 0)) fail("texture_size must be positive");
+  if (m.type == MaterialType::cloth) check_fabric(m, fail);
 }
 
 }  // namespace
@@ -84,10 +103,17 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
   ShadingMaterial out;
   out.type = found->type;
   out.reflectance = found->reflectance;
-  if (found->type == MaterialType::cloth)
+  if (found->type == MaterialType::cloth) {
     out.transmittance = found->transmittance;
-  else
+    out.sheen = found->sheen;
+    out.sheen_roughness = float(found->sheen_roughness);
+    out.yarn = found->yarn_specular;
+    out.yarn_alpha = float(found->yarn_roughness * found->yarn_roughness);
+    out.gap = float(found->gap);
+    out.film_alpha = float(found->film_roughness * found->film_roughness);
+  } else {
     out.transmittance = V3f(0);
+  }
   if (found->type == MaterialType::diffuse) out.emission = found->emission;
   const bool facets = found->type == MaterialType::dielectric ||
                       found->type == MaterialType::metal || found->type == MaterialType::coated;

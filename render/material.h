@@ -7,15 +7,24 @@
 
 #include "pipeline/contract/shot.h"
 #include "render/albedo_table.h"
+#include "render/sheen.h"
 #include "render/texture.h"
+#include "render/wet_cloth.h"
+#include "render/yarn.h"
 
 namespace drench {
 
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
   V3f reflectance, transmittance, edge{1, 1, 1};
-  float alpha = 0;        // of GGX facets; 0: smooth
-  V3f emission{0, 0, 0};  // W/(sr m^2)
+  float alpha = 0;                    // of GGX facets, of a film on cloth; 0: smooth, dry cloth
+  V3f sheen{0, 0, 0}, yarn{0, 0, 0};  // of cloth
+  float sheen_roughness = 0.3f;
+  float yarn_alpha = 0.16f;  // slope of fibres along yarns
+  float gap = 0;             // of cloth: share that is open
+  float film_alpha = 0;      // of cloth where it is wet; Scene makes it alpha of sheets that may be
+  WetFibres fibres;          // of such sheets
+  V3f emission{0, 0, 0};     // W/(sr m^2)
   float ior = 1;
   int priority = 0;
   V3f absorption;  // 1/m
@@ -24,6 +33,10 @@ struct ShadingMaterial {
   float inverse_checker_size = 1;  // 1/m
   float inverse_texture_size = 1;
 
+  /// Scene fills them in, for cloth that has fuzz or yarns.
+  std::shared_ptr<const SheenTable> fuzz;
+  std::shared_ptr<const YarnTable> yarns;
+
   /// By the medium outside: seen from there, and for a rough dielectric from within; of metal one.
   /// None where the indices are the same. Scene fills them in, for what has facets.
   std::vector<std::shared_ptr<const AlbedoTable>> albedo_outside, albedo_inside;
@@ -31,6 +44,8 @@ struct ShadingMaterial {
   bool has_facets() const {
     return type == MaterialType::metal || type == MaterialType::coated || alpha > 0;
   }
+  /// Whether light meets more than a diffuse sheet where it is dry.
+  bool is_fabric() const { return !is_black(sheen) || !is_black(yarn); }
   /// Diffuse reflectance at a surface point; with the transmittance never above 1.
   V3f reflectance_at(const V2f& uv) const;
   /// The mapped normal. @param shading  unit  @param along_u, along_v  of growing u and v, any

@@ -16,7 +16,9 @@
 #include "render/bsdf_dielectric.h"
 #include "render/bsdf_metal.h"
 #include "render/bsdf_rough.h"
+#include "render/fabric.h"
 #include "render/guide.h"
+#include "render/path_state.h"
 
 namespace drench {
 
@@ -29,34 +31,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// high because the few that last would otherwise come out of a glass as bright dots.
 constexpr int kRouletteStart = 10, kLongPath = 64;
 constexpr float kLongSurvival = 0.99f;
-
-/// Sampling dimensions after those of the camera: a block for every vertex of a branch.
-enum VertexDimension : uint32_t {
-  kLightChoice,
-  kLightPoint,
-  kScatterSide,
-  kScatterDirection,
-  kRoulette,
-  kVertexDimensions
-};
-constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
-
-/// Where a path stands: the ray about to be traced and what it carries.
-struct PathState {
-  Ray ray;
-  V3f throughput{1, 1, 1};
-  // What surfaces and water left of the light, whatever the densities of the directions: roulette
-  // plays for it. A ray aimed at a lamp has a small throughput because it will find much light.
-  V3f survival{1, 1, 1};
-  V3f vertex;          // where the ray comes from, before its offset
-  float bsdf_pdf = 0;  // density of its direction; 0: lights ahead have not been sampled from here
-  Bodies in = 0;
-  bool specular_only = true;
-  int vertices = 0, diffuse = 0;
-  int interfaces = 0;        // since the last diffuse surface
-  bool has_photons = false;  // that surface, and nothing but smooth bodies since
-  uint32_t branch = 0;
-};
 
 template <unsigned features>
 class PathTracer {
@@ -101,8 +75,12 @@ class PathTracer {
         return;
       }
       const Surface surface = scene_.surface<kMoving>(state.ray, hit);
-      if (kWater && surface.contact) {
+      if (kWater && surface.contact && !enters_by_gap(state, surface)) {
         pass_contact(state, surface, hit.distance);
+        continue;
+      }
+      if (kFacets && surface.material->gap > 0 && meets_gap(state, surface)) {
+        going = pass_gap(state, surface, hit);
         continue;
       }
       going = scatter(state, surface, hit) && survives(state);
@@ -130,6 +108,11 @@ class PathTracer {
     if constexpr (kFacets) {
       if (surface.material->type == MaterialType::metal) return scatter_metal(state, surface);
       if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
+      if (surface.material->type == MaterialType::cloth) {
+        const float wetness = scene_.wetness(hit);
+        if (surface.material->is_fabric() || wetness > 0)
+          return scatter_fabric(state, surface, hit, wetness);
+      }
     }
     return scatter_cloth(state, surface);
   }
@@ -170,6 +153,50 @@ class PathTracer {
     if (dot(state.ray.direction, surface.geometric_normal) > 0) absorb(state, distance);
     state.in |= surface.body;
     pass(state, surface);
+  }
+
+  bool meets_gap(PathState& state, const Surface& surface) const {
+    const uint32_t dimension = kFirstGapDimension + state.branch * kBranchStride + state.sheets++;
+    return sampler_.one(dimension) < surface.material->gap;
+  }
+
+  /// Whether water that lies on a sheet is met through a gap: there it has a surface.
+  static bool enters_by_gap(PathState& state, const Surface& surface) {
+    if (!kFacets || !state.dry_gap) return false;
+    if (!(dot(state.ray.direction, surface.geometric_normal) < 0)) return false;
+    state.has_photons = false;  // no photon goes there
+    return true;
+  }
+
+  /// Straight on between yarns. Light samples come through there, so that the vertex and the
+  /// density of the direction stay. Where water ends at the sheet it has its surface in the gap.
+  bool pass_gap(PathState& state, const Surface& surface, const Hit& hit) {
+    const V3f& d = state.ray.direction;
+    if constexpr (kWater) {
+      absorb(state, hit.distance);
+      const bool in_fluid = scene_.in_fluid(state.in);
+      if (in_fluid && !scene_.fluid_beyond({surface.leave(d), d, state.ray.time})) {
+        Surface film = surface;
+        film.body = scene_.fluid();
+        film.material = &scene_.fluid_material();
+        if (dot(d, film.geometric_normal) < 0) {
+          film.geometric_normal = -film.geometric_normal;
+          film.shading_normal = -film.shading_normal;
+        }
+        state.has_photons = false;
+        return scatter_interface(state, film) && survives(state);
+      }
+      state.dry_gap = !in_fluid;
+    }
+    state.before += hit.distance;
+    state.ray.origin = surface.leave(d);
+    --state.vertices;
+    return true;
+  }
+
+  /// From the vertex that a light would be sampled at.
+  static float flown(const PathState& state, float distance) {
+    return kFacets ? state.before + distance : distance;
   }
 
   /// Straight on through a surface that is no vertex of the path. Light samples do not come through
@@ -214,10 +241,10 @@ class PathTracer {
     if (state.vertices > 0 || hit.kind == Hit::Kind::light) record_albedo(state.survival);
     if (hit.kind == Hit::Kind::light) {
       if (left_to_photons(state)) return;
-      const float pdf =
-          kLights && state.bsdf_pdf > 0
-              ? lights.shape_pdf(int(hit.index), state.vertex, direction, hit.distance)
-              : 0.f;
+      const float pdf = kLights && state.bsdf_pdf > 0
+                            ? lights.shape_pdf(int(hit.index), state.vertex, direction,
+                                               flown(state, hit.distance))
+                            : 0.f;
       deposit(
           state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf),
           lights.shape_group(hit.index));
@@ -239,7 +266,7 @@ class PathTracer {
     const Lights& lights = scene_.lights();
     const float pdf = state.bsdf_pdf > 0
                           ? lights.mesh_pdf(surface.light, surface.triangle, state.vertex,
-                                            state.ray.time, distance, facing)
+                                            state.ray.time, flown(state, distance), facing)
                           : 0.f;
     deposit(state.throughput * surface.material->emission * emission_weight(state, pdf),
             lights.mesh_group(surface.light));
@@ -256,6 +283,8 @@ class PathTracer {
     state.vertex = surface.position;
     state.ray.origin = surface.leave(direction);
     state.ray.direction = direction;
+    state.before = 0;
+    state.dry_gap = false;
   }
 
   bool scatter_interface(PathState& state, const Surface& surface) {
@@ -359,10 +388,34 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = kWater && settings_.photons && !surface.small;
     if (state.has_photons) add_caustics(state, surface, bsdf);
-    const bool sample_lights = samples_lights(state.in);
     add_direct(state, surface, state.in, bsdf);
     const Scatter next = sample_scatter(state, surface, bsdf);
+    state.survival *= bsdf.albedo();
+    return follow_from_sheet(state, surface, next);
+  }
+
+  /// As coats: one lobe is followed, lights are sampled for both, photons gathered by the soft one.
+  bool scatter_fabric(PathState& state, const Surface& surface, const Hit& hit, float wetness) {
+    if (++state.diffuse > settings_.depth) return false;
+    const FabricBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+                          fabric_at(scene_, surface, hit, state.ray.time, wetness, state.in));
+    record_albedo(state.survival * bsdf.albedo());
+    const bool photons = kWater && settings_.photons && !surface.small;
+    if (photons) add_caustics(state, surface, bsdf.soft());
+    add_direct(state, surface, state.in, bsdf.soft(), bsdf.glints());
+    const bool glint = number(state, kScatterSide) < bsdf.glint_share();
+    const V2f u = point(state, kScatterDirection);
+    state.interfaces = 0;
+    state.has_photons = photons && !glint;
+    state.survival *= bsdf.albedo();
+    return follow_from_sheet(state, surface,
+                             glint ? bsdf.glints().sample(u) : bsdf.soft().sample(u));
+  }
+
+  /// Continues on either side of a sheet.
+  bool follow_from_sheet(PathState& state, const Surface& surface, const Scatter& next) {
     if (!(next.pdf > 0)) return false;
+    const bool sample_lights = samples_lights(state.in);
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
     if constexpr (kWater)
@@ -372,7 +425,6 @@ class PathTracer {
         state.in &= ~scene_.fluid();
     depart(state, surface, next.direction);
     state.throughput *= next.weight;
-    state.survival *= bsdf.albedo();
     state.bsdf_pdf = sample_lights ? next.pdf : 0;
     return true;
   }
@@ -450,7 +502,12 @@ class PathTracer {
     if (is_black(found)) return;
     const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
     ++rays_;
-    if (scene_.occluded(shadow, light.distance)) return;
+    if constexpr (kFacets) {
+      found *= scene_.transmitted(shadow, light.distance);
+      if (is_black(found)) return;
+    } else if (scene_.occluded(shadow, light.distance)) {
+      return;
+    }
     if constexpr (kWater)
       if (in && light.distance < kInfinity) {
         const V3f& a = scene_.medium(in).absorption;

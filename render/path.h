@@ -14,7 +14,7 @@ enum Feature : unsigned {
   kDielectric = 2,     // water: refraction, absorption, medium on the path
   kSampledLights = 4,  // lights are sampled, with multiple importance sampling
   kThinLens = 8,
-  kGlossy = 16,        // metal, coats, rough dielectrics
+  kGlossy = 16,        // metal, coats, rough dielectrics, fabric
   kFeatureCount = 32,  // combinations
 };
 

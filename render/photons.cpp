@@ -21,7 +21,8 @@ enum PhotonDimension : uint32_t {
   kLampPoint,
   kTime,
   kInterfaces,
-  kRow = kInterfaces  // free: interfaces count from 1
+  kRow = kInterfaces,  // free: interfaces count from 1
+  kFirstGap = 1u << 16
 };
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
@@ -92,6 +93,7 @@ struct Flight {
   V3f power;
   Bodies in = 0;
   int interfaces = 0;
+  uint32_t sheets = 0;  // with gaps, that it met
 };
 
 class PhotonTracer {
@@ -105,14 +107,16 @@ class PhotonTracer {
     Surface surface;
     if (!start(sampler, flight, surface, rays)) return false;
     while (cross_interface(sampler, flight, surface)) {
-      const Hit hit = next(flight, surface, rays);
+      const Hit hit = next(sampler, flight, surface, rays);
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
       if (surface.body) continue;
       // Paths bring foam and metal what they get.
       if (surface.small || surface.material->type == MaterialType::metal) return false;
       const float n = scene_.medium(flight.in).ior;
+      // Those that fell through gaps are missing on the yarns, which get what others do.
+      const float yarns = 1 - surface.material->gap;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
-                flight.power * (1 / (n * n))};
+                flight.power * (1 / (n * n * yarns))};
       return finite(photon.power);
     }
     return false;
@@ -131,12 +135,12 @@ class PhotonTracer {
     const float facing = dot(light.direction, surface.geometric_normal);
     if (!(light.pdf > 0) || !(facing > 0)) return false;
     ++rays;
-    if (scene_.occluded({surface.leave(light.direction), light.direction, flight.ray.time},
-                        light.distance))
-      return false;
+    const float share = scene_.transmitted(
+        {surface.leave(light.direction), light.direction, flight.ray.time}, light.distance);
+    if (share == 0) return false;
     flight.ray.direction = -light.direction;
-    flight.power =
-        light.radiance * (facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
+    flight.power = light.radiance *
+                   (share * facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
     return true;
   }
 
@@ -187,8 +191,10 @@ class PhotonTracer {
     return finite(out) && finite(flight.power);
   }
 
-  /// The next surface but for contact of water with sheets, which light passes.
-  Hit next(Flight& flight, Surface& surface, uint64_t& rays) const {
+  /// The next surface but for contact of water with sheets, which light passes, and sheets that
+  /// it falls through. Where water has a surface in their gaps paths keep what comes through.
+  Hit next(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
+    bool dry_gap = false;
     while (true) {
       const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
       ++rays;
@@ -198,7 +204,15 @@ class PhotonTracer {
       if (!outwards) flight.in &= ~surface.body;
       absorb(flight, hit.distance);  // as paths do
       if (outwards) flight.in |= surface.body;
+      const float gap = surface.material->gap;
+      if (gap > 0 && sampler.one(kFirstGap + flight.sheets++) < gap) {
+        flight.ray.origin = surface.leave(flight.ray.direction);
+        dry_gap = !scene_.in_fluid(flight.in);
+        if (!dry_gap && !scene_.fluid_beyond(flight.ray)) return {};
+        continue;
+      }
       if (!surface.contact) return hit;
+      if (dry_gap && !outwards) return {};
       flight.in |= surface.body;
       flight.ray.origin = surface.leave(flight.ray.direction);
     }

@@ -166,12 +166,16 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
           fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
                       "surface; use a cloth, diffuse, metal or coated one",
                       cloth.name, material));
-    add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
+    const std::string what = fmt::format("cloth '{}'", cloth.name);
+    add_object(cloth.mesh, cloth.name, what, index);
+    check_yarns(objects_.back(), what);
+    add_wetness(objects_.back(), cloth.mesh, what);
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
   find_bodies(has_fluid);
   find_albedos();
+  find_fabrics();
   find_features();
 }
 
@@ -190,8 +194,10 @@ void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) material = o.material;
-  add_object(obstacle.mesh, obstacle.name, fmt::format("obstacle '{}'", obstacle.name),
-             add_material(shot, material));
+  const std::string what = fmt::format("obstacle '{}'", obstacle.name);
+  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material));
+  check_yarns(objects_.back(), what);
+  add_wetness(objects_.back(), obstacle.mesh, what);
 }
 
 /// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
@@ -253,8 +259,9 @@ void Scene::find_albedos() {
     m.albedo_inside.resize(medium_.size());
     for (size_t k = 0; k < medium_.size(); ++k) {
       const float eta = m.ior / medium_[k].ior;
-      if (m.type == MaterialType::coated) m.albedo_outside[k] = table(m.alpha, eta);
-      if (m.type == MaterialType::coated || std::abs(eta - 1) < kSameIndex) continue;
+      const bool coat = m.type == MaterialType::coated || m.type == MaterialType::cloth;
+      if (coat) m.albedo_outside[k] = table(m.alpha, eta);
+      if (coat || std::abs(eta - 1) < kSameIndex) continue;
       m.albedo_outside[k] = table(m.alpha, eta);
       m.albedo_inside[k] = table(m.alpha, 1 / eta);
     }
@@ -422,11 +429,14 @@ void Scene::build(SceneObject& object) {
 void Scene::find_features() {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
-  const bool facets = std::any_of(materials_.begin(), materials_.end(),
-                                  [](const ShadingMaterial& m) { return m.has_facets(); });
+  const bool facets =
+      std::any_of(materials_.begin(), materials_.end(),
+                  [](const ShadingMaterial& m) { return m.has_facets() || m.is_fabric(); });
+  has_gaps_ = std::any_of(materials_.begin(), materials_.end(),
+                          [](const ShadingMaterial& m) { return m.gap > 0; });
   features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
               (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
-              (facets ? kGlossy : 0u);
+              (facets || has_gaps_ ? kGlossy : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
@@ -459,7 +469,7 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   return hit;
 }
 
-bool Scene::occluded(const Ray& ray, float distance) const {
+bool Scene::occluded(const Ray& ray, float distance, Gaps gaps) const {
   const float reach = distance * (1 - 1e-4f);
   if (has_ground_ && ground_distance(ray.origin, ray.direction) < reach) return true;
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
@@ -468,6 +478,7 @@ bool Scene::occluded(const Ray& ray, float distance) const {
   const InverseDirection inverse(ray.direction);
   for (const SceneObject& object : objects_) {
     if (!inverse.meets(object.bounds, ray.origin, reach)) continue;
+    if (gaps == Gaps::open && materials_[object.material].gap > 0) continue;
     embree_occluded(object.scene.get(), query);
     if (query.tfar < 0) return true;
   }
@@ -562,16 +573,21 @@ V3f Scene::velocity(const Hit& hit) const {
          object.velocity[t.z] * hit.v;
 }
 
+Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
+  RTCRayHit query{embree_ray(ray, reach), {}};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  embree_intersect(objects_[object].scene.get(), query, Coherence::incoherent);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {Hit::Kind::object, query.ray.tfar, object, query.hit.primID, query.hit.u, query.hit.v};
+}
+
 Bodies Scene::bodies_at(const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};
   Bodies in = 0;
   for (const uint32_t k : bodies_) {
     // The mesh is closed and outward: a point is inside if the first side met is an inner one.
-    RTCRayHit query{embree_ray(up, kInfinity), {}};
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree_intersect(objects_[k].scene.get(), query, Coherence::incoherent);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-    const Hit hit{Hit::Kind::object, query.ray.tfar, k, query.hit.primID, query.hit.u, query.hit.v};
+    const Hit hit = meet(k, up, kInfinity);
+    if (hit.kind == Hit::Kind::nothing) continue;
     if (surface<true>(up, hit).geometric_normal.y > 0) in |= objects_[k].body;
   }
   return in;

@@ -36,6 +36,7 @@ struct SceneObject {
   std::vector<V2f> uv;                           // may be empty
   std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
+  std::vector<float> wetness;                    // of cloth, 0 to 1; may be empty
   uint32_t material = 0;
   int light = -1;       // its number among the meshes that shine
   Bodies body = 0;      // its bit, if it is a dielectric
@@ -82,10 +83,21 @@ class Scene {
   Scene& operator=(const Scene&) = delete;
 
   Hit intersect(const Ray& ray, Coherence coherence) const;
+  enum class Gaps { closed, open };  // open: what has gaps is not there
   /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
-  bool occluded(const Ray& ray, float distance) const;
+  bool occluded(const Ray& ray, float distance, Gaps gaps = Gaps::closed) const;
+  /// The share of light that comes along the ray: 0, 1, or what gaps of cloth let through.
+  float transmitted(const Ray& ray, float distance) const;
+  /// Whether the fluid fills a place in these bodies.
+  bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
+  /// Whether the fluid is where a ray starts that came through a gap of cloth.
+  bool fluid_beyond(const Ray& ray) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
+  /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
+  std::pair<V3f, V3f> yarns_along(const Hit& hit, float time) const;
+  /// Of cloth: the share that is wet, 0 to 1.
+  float wetness(const Hit& hit) const;
   /// The bodies that a point lies in.
   Bodies bodies_at(const V3f& point, float time) const;
   const Medium& medium(Bodies in) const { return medium_[size_t(std::bit_width(in))]; }
@@ -104,7 +116,8 @@ class Scene {
   V3f velocity(const Hit& hit) const;
   bool is_rough(const SceneObject& object) const { return materials_[object.material].alpha > 0; }
   const std::vector<uint32_t>& bodies() const { return bodies_; }  // objects, by bit
-  Bodies fluid() const { return fluid_; }                          // 0: no dielectric
+  const ShadingMaterial& fluid_material() const { return materials_[objects_[0].material]; }
+  Bodies fluid() const { return fluid_; }  // 0: no dielectric
   bool lights_in_bodies() const { return lights_in_bodies_; }
   bool lamps_in_bodies() const { return lamps_in_bodies_; }
   unsigned features() const { return features_; }
@@ -114,6 +127,9 @@ class Scene {
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
                   uint32_t material);
+  void check_yarns(const SceneObject& object, const std::string& what) const;
+  void find_fabrics();
+  void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
   void find_mesh_lights();
@@ -126,6 +142,8 @@ class Scene {
   void find_features();
   bool moves_visibly(const TriangleMesh& mesh) const;
   bool moves_visibly(const FoamFrame& foam) const;
+  /// The nearest point of one object.
+  Hit meet(uint32_t object, const Ray& ray, float reach) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
   double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
@@ -145,6 +163,7 @@ class Scene {
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;
   bool lights_in_bodies_ = false, lamps_in_bodies_ = false;
+  bool has_gaps_ = false;
   unsigned features_ = 0;
 };
 

@@ -40,13 +40,14 @@ struct FoamFrame {
 /// A triangle mesh: the fluid's surface (closed, outward) or a sheet of cloth (open).
 /// Vertex columns have the length of `position`, or are empty where noted.
 struct TriangleMesh {
-  std::vector<Imath::V3f> position;             // m, world
-  std::vector<Imath::V3f> velocity;             // m/s
-  std::vector<Imath::V3f> normal;               // unit, or empty
-  std::vector<Imath::V2f> uv;                   // cloth: texture and rest plane, or empty
-  std::vector<Imath::V3f> rest_position;        // cloth: m, at rest, or empty
-  std::vector<float> source;                    // fluid: of the nearest particle, or empty
-  std::vector<float> age, wetness;              // fluid: as of its particles, or empty
+  std::vector<Imath::V3f> position;       // m, world
+  std::vector<Imath::V3f> velocity;       // m/s
+  std::vector<Imath::V3f> normal;         // unit, or empty
+  std::vector<Imath::V2f> uv;             // cloth: texture and rest plane, or empty
+  std::vector<Imath::V3f> rest_position;  // cloth: m, at rest, or empty
+  std::vector<float> source;              // fluid: of the nearest particle, or empty
+  std::vector<float> age;                 // fluid: as of its particles, or empty
+  std::vector<float> wetness;             // as age; cloth: share that is wet, 0 to 1; or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
   std::vector<uint8_t> contact;                 // by triangle, 1: lies on a sheet; or empty
 };

@@ -127,6 +127,20 @@ class PictureChecker : CheckBase {
                                   : "blue"));
       }
     }
+    for (int c = 0; c < 3; ++c) {
+      const double sum = double(material.sheen[c]) + material.yarn_specular[c];
+      if (sum > 1 + 1e-5) {
+        fail(fmt::format("material[{}].{}", i,
+                         material.yarn_specular[c] > 0 ? "yarn_specular" : "sheen"),
+             fmt::format(
+                 "material \"{}\" has a sheen of {:.4g} and a yarn_specular of {:.4g} in {}; "
+                 "together more light than arrives. Keep the sum at most 1",
+                 material.name, material.sheen[c], material.yarn_specular[c],
+                 c == 0   ? "red"
+                 : c == 1 ? "green"
+                          : "blue"));
+      }
+    }
   }
 
   void check_use(const std::string& key, const std::string& name, MaterialType refused,
@@ -162,6 +176,12 @@ class PictureChecker : CheckBase {
     }
     check_use("ground.material", shot_.ground.material, MaterialType::dielectric, "the ground",
               "Use type diffuse, metal or coated");
+    for (const Material& m : shot_.material)
+      if (m.name == shot_.ground.material && m.gap > 0)
+        fail("ground.material",
+             fmt::format("ground.material is \"{}\", which has a gap of {}, but there is nothing "
+                         "below the ground. Use a material without, or a sheet of cloth",
+                         m.name, m.gap));
     check_dark("fluid.material", shot_.fluid.material, "the fluid");
     check_dark("ground.material", shot_.ground.material, "the ground");
     for (size_t i = 0; i < shot_.cloth.size(); ++i)

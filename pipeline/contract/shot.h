@@ -299,7 +299,13 @@ struct Material {
   double roughness = 0;               // dielectric, metal, coat: its square is GGX's alpha
   V3f emission{0, 0, 0};              // diffuse, W/(sr m^2); of obstacles, from their outer side
   V3f transmittance{0, 0, 0};         // cloth: diffuse transmission; reflectance + it <= 1
-  double ior = 1.333;                 // dielectric, coat
+  V3f sheen{0, 0, 0};                 // cloth: of its fuzz
+  double sheen_roughness = 0.3;       // cloth: 1 over the power of the fuzz's sine
+  V3f yarn_specular{0, 0, 0};         // cloth: of its yarns, along u and v; sheen + it <= 1
+  double yarn_roughness = 0.4;        // cloth: its square is the slope of fibres along yarns
+  double gap = 0;                     // cloth: share that is open between yarns
+  double film_roughness = 0.4;        // cloth: of the water's surface where it is wet
+  double ior = 1.333;                 // dielectric, coat, what wets cloth
   int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
   std::filesystem::path texture;      // PNG, JPEG or EXR, multiplies reflectance

@@ -111,9 +111,33 @@ std::vector<Parameter> material_rows() {
       row<&Material::transmittance>("material", "transmittance", "", share, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(cloth_type),
+      row<&Material::sheen>("material", "sheen", "", share, render,
+                            "of light that fuzz on both faces returns, most along the surface; "
+                            "the rest falls on the cloth")
+          .only(cloth_type),
+      row<&Material::sheen_roughness>("material", "sheen_roughness", "", {0.1, 1}, render,
+                                      "0.1 shines at the very rim, 1 is dusty all over")
+          .only(cloth_type),
+      row<&Material::yarn_specular>("material", "yarn_specular", "", share, render,
+                                    "of light that yarns along u and v mirror, on meshes with "
+                                    "uv and the ground; with sheen at most 1")
+          .only(cloth_type),
+      row<&Material::yarn_roughness>("material", "yarn_roughness", "", {0.1, 1}, render,
+                                     "its square is the slope of the fibres along a yarn: 0.3 "
+                                     "is satin, 0.6 wool")
+          .only(cloth_type),
+      row<&Material::gap>("material", "gap", "", {0, 0.99}, render,
+                          "share of its area that is open between yarns: light goes straight on. "
+                          "The other values are those of the rest. Not of the ground")
+          .only(cloth_type),
+      row<&Material::film_roughness>("material", "film_roughness", "", {0.05, 1}, render,
+                                     "of the water on it where its vertices have wetness; as "
+                                     "roughness, 1 follows every thread")
+          .only(cloth_type),
       row<&Material::ior>("material", "ior", "", {1, 4}, render,
-                          "index of refraction, of the body or the coat; glass and varnish 1.5")
-          .only(dielectric | coated),
+                          "index of refraction, of the body, the coat, or what wets the cloth; "
+                          "glass and varnish 1.5")
+          .only(dielectric | coated | cloth_type),
       row<&Material::priority>("material", "priority", "", {-100, 100}, render,
                                "where bodies overlap the highest is; of equals, an obstacle")
           .only(dielectric),

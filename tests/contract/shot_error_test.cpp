@@ -244,6 +244,14 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
       {"[[cloth]]\nmaterial = \"water\"\n", {"scene.toml:5", "open sheet"}},
       {"[[material]]\nname = \"cotton\"\nreflectance = [0.9, 0.5, 0.5]\n",
        {"scene.toml:6", "0.9", "0.2", "at most 1", "red"}},
+      {"[[material]]\nname = \"silk\"\ntype = \"cloth\"\nsheen = [0.5, 0.2, 0.2]\n"
+       "yarn_specular = [0.2, 0.2, 0.9]\n",
+       {"scene.toml:8", "\"silk\"", "0.2", "0.9", "at most 1", "blue"}},
+      {"[[material]]\nname = \"silk\"\nsheen = [0.5, 0.2, 0.2]\n", {"scene.toml:6", "type cloth"}},
+      {"[[material]]\nname = \"net\"\ntype = \"cloth\"\ngap = 1\n", {"scene.toml:7", "0.99"}},
+      {"[[material]]\nname = \"net\"\ntype = \"cloth\"\ngap = 0.5\n[ground]\n"
+       "material = \"net\"\n",
+       {"scene.toml:9", "0.5", "below the ground"}},
       {"[[material]]\nname = \"silk\"\n[[material]]\nname = \"silk\"\n",
        {"scene.toml:6", "scene.toml:4"}},
       {"[camera]\nposition = [0, 0.5, 0]\ntarget = [0, 0.5, 0]\n",

@@ -125,6 +125,12 @@ TEST_F(ShotFile, ReadsColoursAsAcesOrSrgb) {
   const Shot shot = parse(full_shot());
   const V3f canvas = acescg_from_srgb(V3d(200, 180, 40) / 255.0);
   EXPECT_EQ(shot.material.at(3).reflectance, canvas);
+  EXPECT_EQ(shot.material[3].sheen, V3f(0.2f, 0.2f, 0.3f));
+  EXPECT_EQ(shot.material[3].sheen_roughness, 0.25);
+  EXPECT_EQ(shot.material[3].yarn_specular, V3f(0.1f, 0.1f, 0.05f));
+  EXPECT_EQ(shot.material[3].yarn_roughness, 0.5);
+  EXPECT_EQ(shot.material[3].gap, 0.05);
+  EXPECT_EQ(shot.material[3].film_roughness, 0.35);
   const Shot hex =
       parse(full_shot(), {.quality = "final", .set = {"material.canvas.reflectance=\"#c8b428\""}});
   EXPECT_EQ(hex.material.at(3).reflectance, canvas);

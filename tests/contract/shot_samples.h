@@ -145,6 +145,12 @@ name = "canvas"
 type = "cloth"
 reflectance = "srgb(200, 180, 40)"
 texture = "weave.png"
+sheen = [0.2, 0.2, 0.3]
+sheen_roughness = 0.25
+yarn_specular = [0.1, 0.1, 0.05]
+yarn_roughness = 0.5
+gap = 0.05
+film_roughness = 0.35
 
 [ground]
 height = -0.01

@@ -2,29 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "render/bsdf_coated.h"
 #include "render/bsdf_metal.h"
 #include "render/bsdf_rough.h"
-#include "tests/render/chi_square.h"
+#include "tests/render/lobes.h"
 
 namespace drench::test {
 namespace {
-
-constexpr double kPi64 = std::numbers::pi;
-const V3f kUp(0, 0, 1);
-
-struct Uniform {
-  std::mt19937& random;
-  float one() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
-  V2f two() {
-    const float x = one();
-    return {x, one()};
-  }
-};
-
-V3f leaving(float cos) { return {std::sqrt(1 - cos * cos), 0, cos}; }
 
 RoughBsdf rough(float cos, float alpha, float eta, const AlbedoTable& albedo) {
   return {leaving(cos), kUp, kUp, alpha, eta, albedo};
@@ -40,39 +24,15 @@ CoatedBsdf coated(float cos, float alpha, float eta, float reflectance, const Al
 
 const MetalFresnel kMirror(V3f(1), V3f(1));
 
-/// Numbers for one sample.
-struct Draw {
-  V2f point;
-  float side;
-};
-
-Draw numbers(Uniform u) {
-  const V2f point = u.two();
-  return {point, u.one()};
-}
-
 Scatter sample(const RoughBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point, u.side); }
 Scatter sample(const MetalBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point); }
 Scatter sample(const CoatedBsdf& bsdf, const Draw& u) {
   return u.side < bsdf.coat_share() ? bsdf.coat().sample(u.point) : bsdf.base().sample(u.point);
 }
 
-/// What uniform light of radiance 1 becomes: the mean weight over a lattice of samples, which errs
-/// by 2e-3 at most. (Multiples of powers of the root of
-/// x^4 = x + 1 are spread evenly in three dimensions: Roberts 2018.)
 template <class Bsdf>
 double furnace(const Bsdf& bsdf) {
-  constexpr int kPoints = 1 << 18;
-  constexpr double root = 1.2207440846057596;
-  const auto part = [](double x) { return std::min(float(x - std::floor(x)), kOneMinusEpsilon); };
-  double sum = 0;
-  for (int k = 0; k < kPoints; ++k) {
-    const double x = k + 0.5;
-    const Draw u{{part(x / root), part(x / root / root)}, part(x / root / root / root)};
-    const Scatter s = sample(bsdf, u);
-    if (s.pdf > 0) sum += double(s.weight.x) / kPoints;
-  }
-  return sum;
+  return furnace_of([&](const Draw& u) { return sample(bsdf, u); });
 }
 
 double density(const RoughBsdf& bsdf, const V3f& d) {
@@ -157,9 +117,6 @@ TEST(Facets, ReturnNoMoreThanArrivesBeforeWhatIsGivenBack) {
     }
 }
 
-/// Each of n tests may fail by chance once in 100 runs of all of them. Sidak.
-double least_p(int n) { return 1 - std::pow(0.99, 1. / n); }
-
 TEST(RoughDielectric, DrawsWithTheDensityItStates) {
   uint32_t seed = 1;
   for (const float alpha : {0.15f, 0.4f, 1.f})
@@ -202,30 +159,6 @@ TEST(Coated, DrawsWithTheDensityItStates) {
       EXPECT_GT(fit.p_value, least_p(6)) << alpha << ' ' << cos;
       EXPECT_NEAR(fit.integral, fit.drawn, 0.005) << alpha << ' ' << cos;
     }
-}
-
-/// A random surface with a bent normal, seen from either side.
-struct Tilted {
-  std::mt19937 random{11};
-  Uniform uniform{random};
-  V3f geometric, shading, outgoing;
-
-  void next() {
-    const auto direction = [&] { return sample_cone(uniform.two(), 2); };
-    geometric = direction();
-    shading = normalized(geometric + direction() * 0.5f);
-    if (dot(shading, geometric) < 0.05f) shading = geometric;
-    outgoing = direction();
-  }
-};
-
-/// Value and density of what was sampled; a sample's own to the rounding of the facet's normal.
-template <class Lobe>
-int disagreements(const Lobe& lobe, const Scatter& s) {
-  float pdf = 0;
-  const V3f value = lobe.value(s.direction, pdf);
-  const auto differ = [](float a, float b) { return !(std::abs(a - b) <= 2e-3f * std::abs(a)); };
-  return differ(s.pdf, pdf) || differ(s.weight.x * s.pdf, value.x);
 }
 
 TEST(Facets, SampleTheValueTheyState) {
