@@ -36,7 +36,8 @@ class LayerFilm {
   /// Adds a sample to a pixel, row by row from the top left.
   void add(size_t pixel, const PathRecord& record);
   /// The finished layers, those that were asked for.
-  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels) const;
+  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels,
+                                const CatcherFilm& catchers) const;
   /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
   void add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const;
   /// Header entries that belong to them.
@@ -58,6 +59,13 @@ class LayerFilm {
   };
   static constexpr float kNothing = 1e10f;
 
+  /// Sums of a pixel's shares of light from the plate.
+  struct Plate {
+    Imath::V3d background{0, 0, 0}, catcher{0, 0, 0};
+  };
+
+  void add_light(size_t pixel, const PathRecord& record);
+  Imath::V3d light(size_t pixel, size_t group, int samples, const CatcherFilm& catchers) const;
   V3f motion_of(const PathRecord& record) const;
   FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
                   FilmLayer::Precision precision) const;
@@ -74,7 +82,10 @@ class LayerFilm {
   ShutterCamera frame_camera_;  // at this frame and the next
   NameIndex objects_, materials_;
   std::vector<Pixel> pixel_;
-  std::vector<Imath::V3d> light_;  // by pixel, then group
+  std::vector<Imath::V3d> light_;   // by pixel, then group
+  std::vector<Imath::V3d> caught_;  // that of shadow catchers in it; empty without any
+  std::vector<Plate> plate_;
+  bool catchers_;
 };
 
 }  // namespace drench

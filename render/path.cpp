@@ -17,53 +17,20 @@
 #include "render/bsdf_metal.h"
 #include "render/bsdf_rough.h"
 #include "render/guide.h"
+#include "render/path_state.h"
 
 namespace drench {
 
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Vertices before roulette may end a path: few are worth ending that may still leave the water for
-/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
-/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
-/// high because the few that last would otherwise come out of a glass as bright dots.
-constexpr int kRouletteStart = 10, kLongPath = 64;
-constexpr float kLongSurvival = 0.99f;
-
-/// Sampling dimensions after those of the camera: a block for every vertex of a branch.
-enum VertexDimension : uint32_t {
-  kLightChoice,
-  kLightPoint,
-  kScatterSide,
-  kScatterDirection,
-  kRoulette,
-  kVertexDimensions
-};
-constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
-
-/// Where a path stands: the ray about to be traced and what it carries.
-struct PathState {
-  Ray ray;
-  V3f throughput{1, 1, 1};
-  // What surfaces and water left of the light, whatever the densities of the directions: roulette
-  // plays for it. A ray aimed at a lamp has a small throughput because it will find much light.
-  V3f survival{1, 1, 1};
-  V3f vertex;          // where the ray comes from, before its offset
-  float bsdf_pdf = 0;  // density of its direction; 0: lights ahead have not been sampled from here
-  Bodies in = 0;
-  bool specular_only = true;
-  int vertices = 0, diffuse = 0;
-  int interfaces = 0;        // since the last diffuse surface
-  bool has_photons = false;  // that surface, and nothing but smooth bodies since
-  uint32_t branch = 0;
-};
-
 template <unsigned features>
 class PathTracer {
   static constexpr bool kMoving = features & kMotionBlur;
   static constexpr bool kWater = features & kDielectric;
   static constexpr bool kLights = features & kSampledLights;
   static constexpr bool kFacets = features & kGlossy;
+  static constexpr bool kPlate = features & kMattes;
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
@@ -78,12 +45,19 @@ class PathTracer {
         scene_.camera().template ray<kMoving, (features & kThinLens) != 0>(film, lens, time);
     state.vertex = state.ray.origin;
     if (kWater) state.in = settings_.camera_in;
+    if constexpr (kPlate) {
+      state.clear = true;
+      view_ = state.ray.direction;
+    }
     walk(state);
     while (kWater && has_pending_) {
       has_pending_ = false;
       PathState next = pending_;
+      on_catcher_ = false;
       walk(next);
     }
+    if constexpr (kPlate)
+      if (has_plate_) walk_plate();
     return {radiance_, alpha_};
   }
 
@@ -92,7 +66,7 @@ class PathTracer {
     for (bool going = true; going; ++state.vertices) {
       if (!finite(state.ray.direction) || !finite(state.ray.origin)) return;
       const Hit hit = scene_.intersect(
-          state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent);
+          state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent, world());
       ++rays_;
       if (hit.kind == Hit::Kind::nothing || hit.kind == Hit::Kind::light) {
         if constexpr (kWater)
@@ -118,21 +92,71 @@ class PathTracer {
       if (!outwards) state.in &= ~surface.body;
       absorb(state, hit.distance);
       if (outwards) state.in |= surface.body;
+    }
+    if constexpr (kPlate)
+      if (sees_plate(state)) {
+        const Matte matte = scene_.matte(hit);
+        if (matte == Matte::holdout) return show_plate(state);
+        if (matte == Matte::shadow_catcher && record_) start_catching(state, surface);
+      }
+    if constexpr (kWater) {
       if (surface.body) {
         if (inside_higher_body(state, surface)) return true;
         record_first(state, surface, hit);
         return scatter_interface(state, surface);
       }
     }
+    if constexpr (kPlate) state.clear = false;
     record_first(state, surface, hit);
+    return scatter_surface(state, surface, hit.distance);
+  }
+
+  bool scatter_surface(PathState& state, const Surface& surface, float distance) {
     if constexpr (kLights)
-      if (surface.light >= 0) add_own_light(state, surface, hit.distance);
+      if (surface.light >= 0) add_own_light(state, surface, distance);
     if constexpr (kFacets) {
       if (surface.material->type == MaterialType::metal) return scatter_metal(state, surface);
       if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
     }
     return scatter_cloth(state, surface);
   }
+
+  /// Whether a plate stands for what this path meets: it goes on from the camera much as the view
+  /// does, not back from within a drop.
+  bool sees_plate(const PathState& state) const {
+    return state.clear && dot(state.ray.direction, view_) > 0;
+  }
+
+  /// Ends the path on the plate.
+  bool show_plate(const PathState& state) {
+    const V3f& share = state.throughput;
+    alpha_ -= (share.x + share.y + share.z) / 3;
+    if (!record_) return false;
+    record_->matte.background += share;
+    record_->shaded = true;
+    return false;
+  }
+
+  /// What is found from here on comes from a shadow catcher; kept for the plate's world.
+  void start_catching(PathState& state, const Surface& surface) {
+    state.clear = false;
+    on_catcher_ = has_plate_ = true;
+    plate_ = state;
+    plate_.in &= scene_.plate_bodies();
+    plate_surface_ = surface;
+    record_->matte.catcher = state.throughput;
+    record_->shaded = true;
+  }
+
+  /// From the catcher on by the same numbers, in the plate's world.
+  void walk_plate() {
+    in_plate_ = true;
+    if (!scatter_surface(plate_, plate_surface_, 0) || !survives(plate_)) return;
+    ++plate_.vertices;
+    walk(plate_);
+  }
+
+  World world() const { return kPlate && in_plate_ ? World::plate : World::whole; }
 
   /// Goes on through a surface that divides nothing, because a body of higher priority is there.
   bool inside_higher_body(PathState& state, const Surface& surface) {
@@ -144,7 +168,7 @@ class PathTracer {
   }
 
   void record_first(const PathState& state, const Surface& surface, const Hit& hit) {
-    if (!record_ || state.vertices > 0) return;
+    if (!record_ || state.vertices > 0 || (kPlate && on_catcher_)) return;
     record_->first = hit;
     record_->position = surface.position;
     record_->normal = dot(state.ray.direction, surface.geometric_normal) < 0
@@ -161,6 +185,16 @@ class PathTracer {
 
   /// Adds light to the picture.
   void deposit(const V3f& found, uint32_t group) {
+    if constexpr (kPlate) {
+      if (in_plate_) {
+        record_->matte.without += found;
+        return;
+      }
+      if (on_catcher_) {
+        record_->matte.with += found;
+        if (!record_->light.empty()) record_->matte.light[group] += found;
+      }
+    }
     radiance_ += found;
     if (record_ && !record_->light.empty()) record_->light[group] += found;
   }
@@ -210,6 +244,12 @@ class PathTracer {
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
+    if constexpr (kPlate)
+      if (settings_.background == Background::clear && hit.kind == Hit::Kind::nothing &&
+          sees_plate(state)) {
+        show_plate(state);
+        return;
+      }
     // What mirrors show of the sky and of lamps counts as white, the sky itself as black.
     if (state.vertices > 0 || hit.kind == Hit::Kind::light) record_albedo(state.survival);
     if (hit.kind == Hit::Kind::light) {
@@ -222,7 +262,7 @@ class PathTracer {
           state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf),
           lights.shape_group(hit.index));
     } else {
-      if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
+      if (state.vertices == 0 && !lights.has_environment()) show_nothing();
       lights.for_each_infinite(state.vertex, direction, state.bsdf_pdf > 0,
                                left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
                                [&](const V3f& radiance, float pdf, uint32_t group) {
@@ -230,6 +270,11 @@ class PathTracer {
                                          group);
                                });
     }
+  }
+
+  void show_nothing() {
+    alpha_ = 0;
+    if (record_) record_->matte.background = V3f(1);
   }
 
   /// Light of a surface's own, from its outer side.
@@ -260,10 +305,11 @@ class PathTracer {
 
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
+    if constexpr (kPlate) state.clear &= settings_.refraction_alpha == RefractionAlpha::transparent;
     const float eta = scene_.medium(state.in ^ surface.body).ior / scene_.medium(state.in).ior;
     if constexpr (kFacets)
       if (surface.material->alpha > 0) {
-        state.has_photons = false;  // they pass smooth bodies only
+        state.has_photons = state.clear = false;  // photons pass smooth bodies only
         const AlbedoTable* albedo = scene_.interface_albedo(surface, state.in);
         if (albedo) return scatter_rough(state, surface, eta, *albedo);
       }
@@ -274,12 +320,16 @@ class PathTracer {
       split = split_at_interface(d, flat, eta);
     state.bsdf_pdf = 0;
     ++state.interfaces;
+    // Only mirrors that are within a body which the path has entered.
+    const bool clear_mirror =
+        kPlate && state.clear && (state.in & ~settings_.camera_in & surface.body) != 0;
     bool reflect = split.reflectance >= 1;
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
       pending_ = state;
       pending_.throughput *= split.reflectance;
       pending_.survival *= split.reflectance;
       pending_.branch = 1;
+      pending_.clear = clear_mirror;
       ++pending_.vertices;
       depart(pending_, surface, split.reflected);
       has_pending_ = true;
@@ -289,6 +339,7 @@ class PathTracer {
       reflect = number(state, kScatterSide) < split.reflectance;
     }
     depart(state, surface, reflect ? split.reflected : split.refracted);
+    if (reflect) state.clear = clear_mirror;
     if (!reflect) state.in ^= surface.body;
     return true;
   }
@@ -327,7 +378,7 @@ class PathTracer {
                           scene_.coat_albedo(material, state.in));
     const CoatLobe coat = bsdf.coat();
     const CoatedBase base = bsdf.base();
-    const bool photons = kWater && settings_.photons && !surface.small;
+    const bool photons = gathers_photons(surface);
     if (photons) add_caustics(state, surface, base);
     add_direct(state, surface, state.in, coat, base);
     const bool follow_coat = number(state, kScatterSide) < bsdf.coat_share();
@@ -357,7 +408,7 @@ class PathTracer {
     record_albedo(state.survival * bsdf.albedo());
     if (bsdf.black()) return false;
     state.interfaces = 0;
-    state.has_photons = kWater && settings_.photons && !surface.small;
+    state.has_photons = gathers_photons(surface);
     if (state.has_photons) add_caustics(state, surface, bsdf);
     const bool sample_lights = samples_lights(state.in);
     add_direct(state, surface, state.in, bsdf);
@@ -411,6 +462,10 @@ class PathTracer {
     return out;
   }
 
+  bool gathers_photons(const Surface& surface) const {
+    return kWater && settings_.photons && !surface.small && world() == World::whole;
+  }
+
   template <class Bsdf>
   void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
     Irradiance light;
@@ -431,6 +486,7 @@ class PathTracer {
     const LightSample light = scene_.lights().sample(
         surface.position, state.ray.time, number(state, kLightChoice), point(state, kLightPoint));
     if (!(light.pdf > 0)) return;
+    if (world() == World::plate && !scene_.in_plate(light)) return;
     Bodies in = state.in;
     if constexpr (kFacets) {
       const V3f& n = surface.geometric_normal;
@@ -450,7 +506,7 @@ class PathTracer {
     if (is_black(found)) return;
     const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
     ++rays_;
-    if (scene_.occluded(shadow, light.distance)) return;
+    if (scene_.occluded(shadow, light.distance, world())) return;
     if constexpr (kWater)
       if (in && light.distance < kInfinity) {
         const V3f& a = scene_.medium(in).absorption;
@@ -490,15 +546,27 @@ class PathTracer {
   float alpha_ = 1;
   PathState pending_;
   bool has_pending_ = false;
+  V3f view_;                 // where the camera looks along this sample
+  bool on_catcher_ = false;  // what is found comes from a shadow catcher
+  bool in_plate_ = false;    // the world is the plate's
+  PathState plate_;          // where a path met a catcher
+  Surface plate_surface_;
+  bool has_plate_ = false;
 };
+
+void clear_light(PathRecord& record) {
+  for (std::vector<V3f>* light : {&record.light, &record.matte.light})
+    std::fill(light->begin(), light->end(), V3f(0));
+  record.matte.with = record.matte.without = V3f(0);
+}
 
 template <unsigned features>
 PathSample trace(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
                  const V2f& film, uint64_t& rays, PathRecord* record) {
   PathSample sample = PathTracer<features>(scene, settings, sampler, rays, record).run(film);
-  if (!finite(sample.radiance)) {
+  if (!finite(sample.radiance) || (record && !finite(record->matte.without))) {
     sample.radiance = V3f(0);
-    if (record) std::fill(record->light.begin(), record->light.end(), V3f(0));
+    if (record) clear_light(*record);
   }
   return sample;
 }
@@ -512,6 +580,7 @@ constexpr std::array<PathFunction, sizeof...(features)> table(std::index_sequenc
 
 PathFunction path_function(unsigned features) {
   static constexpr auto functions = table(std::make_index_sequence<kFeatureCount>{});
+  if (features & kMattes) return &trace<kMattes | (kFeatureCount - 1)>;
   return functions[features % kFeatureCount];
 }
 

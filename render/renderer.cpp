@@ -71,6 +71,15 @@ struct Job {
 struct Sums {
   std::vector<PixelSum> pixel;
   LayerFilm layers;
+  CatcherFilm catchers;
+  std::vector<PixelSum> without_plate{};  // with catchers, once settled
+
+  /// Takes what shadow catchers leave to the plate out of the picture.
+  void settle() {
+    if (!catchers.empty()) without_plate = catchers.beauty(pixel);
+  }
+  /// Sums of the beauty.
+  const std::vector<PixelSum>& beauty() const { return catchers.empty() ? pixel : without_plate; }
 };
 
 /// One more camera sample of a pixel, the next in its order.
@@ -118,6 +127,7 @@ uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sum
         add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
         if (!recorded) continue;
         sums.layers.add(pixel, record);
+        if (!sums.catchers.empty()) sums.catchers.add(pixel, record.matte);
         sums.layers.clear(record);
       }
     }
@@ -154,7 +164,7 @@ void denoise_film(const Sums& sums, Film& film) {
   NoisyPicture picture;
   picture.width = film.width;
   picture.height = film.height;
-  for (const PixelSum& pixel : sums.pixel)
+  for (const PixelSum& pixel : sums.beauty())
     for (int c = 0; c < 3; ++c) {
       for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
       picture.variance[c].push_back(2 * pixel.variance(c));
@@ -170,11 +180,22 @@ void denoise_film(const Sums& sums, Film& film) {
   film.layer.push_back(std::move(noisy));
 }
 
+/// The same for the shadows that catchers have, before anything is made of them.
+void denoise_shadows(const Job& job, Sums& sums) {
+  NoisyPicture picture = sums.catchers.shadows(job.width, job.height);
+  sums.layers.add_features(picture, sums.pixel);
+  sums.catchers.smooth(denoise(std::move(picture)).front());
+  sums.settle();
+}
+
 Film developed(const Job& job, const Sums& sums) {
+  const std::vector<PixelSum>& pixels = sums.beauty();
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
-  for (size_t p = 0; p < sums.pixel.size(); ++p)
-    for (int c = 0; c < 4; ++c) film.rgba[4 * p + size_t(c)] = sums.pixel[p].mean(c);
-  film.layer = sums.layers.finish(sums.pixel);
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
+    film.rgba[4 * p + 3] = std::clamp(pixels[p].mean(3), 0.f, 1.f);
+  }
+  film.layer = sums.layers.finish(pixels, sums.catchers);
   film.header = sums.layers.header();
   return film;
 }
@@ -209,6 +230,8 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;
+  path.background = shot.render.background;
+  path.refraction_alpha = shot.render.refraction_alpha;
   path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
   uint64_t photon_rays = 0;
@@ -230,18 +253,23 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                 whole ? shot.render.width : shot.render.crop_max.x - window.x,
                 whole ? shot.render.height : shot.render.crop_max.y - window.y};
   Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
-            LayerFilm(shot, frame, scene, job.width, job.height)};
+            LayerFilm(shot, frame, scene, job.width, job.height),
+            CatcherFilm(scene.has_catchers() ? size_t(job.width) * job.height : 0)};
   SamplePlan plan(job.width, job.height, shot.render.samples, shot.render.error);
   Progress report(progress);
   uint64_t rays = photon_rays;
-  while (plan.next(sums.pixel)) {
+  sums.settle();
+  while (plan.next(sums.beauty())) {
     report.expect(plan.expected());
     rays += render_tiles(job, plan, sums, report);
+    sums.settle();
   }
+  if (shot.render.denoise && !sums.catchers.empty()) denoise_shadows(job, sums);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, film);
   if (stats) {
-    *stats = {report.samples(), rays, picture_error(sums.pixel), process_cpu_seconds() - cpu_start};
+    *stats = {report.samples(), rays, picture_error(sums.beauty()),
+              process_cpu_seconds() - cpu_start};
   }
   return film;
 }

@@ -149,6 +149,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     ground_center_ =
         V3f(float(shot.ground.center.x), float(shot.ground.height), float(shot.ground.center.z));
     ground_half_size_ = float(shot.ground.half_size);
+    ground_matte_ = shot.ground.matte;
     ground_material_ = add_material(shot, shot.ground.material);
     if (materials_[ground_material_].type == MaterialType::dielectric)
       throw Error(
@@ -158,27 +159,29 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   }
   const bool has_fluid = !geometry.fluid.triangle.empty();
   if (has_fluid)
-    add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material));
+    add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material),
+               Matte::none);
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
     if (cloth.mesh.triangle.empty()) continue;
     std::string material = "cotton";
+    Matte matte = Matte::none;
     for (const Cloth& c : shot.cloth)
-      if (c.name == cloth.name) material = c.material;
+      if (c.name == cloth.name) material = c.material, matte = c.matte;
     const uint32_t index = add_material(shot, material);
     if (materials_[index].type == MaterialType::dielectric)
       throw Error(
           fmt::format("cloth '{}': material '{}' is a dielectric, which needs a closed "
                       "surface; use a cloth, diffuse, metal or coated one",
                       cloth.name, material));
-    add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index);
+    add_object(cloth.mesh, cloth.name, fmt::format("cloth '{}'", cloth.name), index, matte);
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
   find_bodies(has_fluid);
   find_albedos();
-  find_features();
+  find_features(shot.render.background);
 }
 
 uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
@@ -189,10 +192,11 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
 
 void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
+  Matte matte = Matte::none;
   for (const Obstacle& o : shot.obstacle)
-    if (o.name == obstacle.name) material = o.material;
+    if (o.name == obstacle.name) material = o.material, matte = o.matte;
   add_object(obstacle.mesh, obstacle.name, fmt::format("obstacle '{}'", obstacle.name),
-             add_material(shot, material));
+             add_material(shot, material), matte);
 }
 
 /// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
@@ -294,7 +298,7 @@ bool Scene::moves_visibly(const TriangleMesh& mesh) const {
 }
 
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                       uint32_t material) {
+                       uint32_t material, Matte matte) {
   check_mesh(mesh, what);
   SceneObject object;
   object.name = name;
@@ -305,6 +309,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
   object.uv = mesh.uv;
   object.contact = mesh.contact;
   object.material = material;
+  object.matte = matte;
   const auto at = [&](double frames) {
     std::vector<V3f> moved = mesh.position;
     const float dt = float(frames / fps_);
@@ -403,14 +408,15 @@ void Scene::build(SceneObject& object) {
   check_embree(device_.get());
 }
 
-void Scene::find_features() {
+void Scene::find_features(Background background) {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
   const bool facets = std::any_of(materials_.begin(), materials_.end(),
                                   [](const ShadingMaterial& m) { return m.has_facets(); });
   features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
               (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
-              (facets ? kGlossy : 0u);
+              (facets ? kGlossy : 0u) |
+              (background == Background::clear || has_mattes() ? kMattes : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
@@ -420,10 +426,10 @@ float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
 }
 
-Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
+Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   Hit hit;
   hit.distance = kInfinity;
-  if (has_ground_) {
+  if (has_ground_ && (world == World::whole || ground_matte_ != Matte::none)) {
     hit.distance = ground_distance(ray.origin, ray.direction);
     if (hit.distance < kInfinity) hit.kind = Hit::Kind::ground;
   }
@@ -434,6 +440,7 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   const InverseDirection inverse(ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {
     if (!inverse.meets(objects_[k].bounds, ray.origin, query.ray.tfar)) continue;
+    if (world == World::plate && objects_[k].matte == Matte::none) continue;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree_intersect(objects_[k].scene.get(), query, coherence);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
@@ -443,15 +450,17 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   return hit;
 }
 
-bool Scene::occluded(const Ray& ray, float distance) const {
+bool Scene::occluded(const Ray& ray, float distance, World world) const {
   const float reach = distance * (1 - 1e-4f);
-  if (has_ground_ && ground_distance(ray.origin, ray.direction) < reach) return true;
+  const bool ground = has_ground_ && (world == World::whole || ground_matte_ != Matte::none);
+  if (ground && ground_distance(ray.origin, ray.direction) < reach) return true;
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
   if (objects_.empty()) return false;
   RTCRay query = embree_ray(ray, reach);
   const InverseDirection inverse(ray.direction);
   for (const SceneObject& object : objects_) {
     if (!inverse.meets(object.bounds, ray.origin, reach)) continue;
+    if (world == World::plate && object.matte == Matte::none) continue;
     embree_occluded(object.scene.get(), query);
     if (query.tfar < 0) return true;
   }

@@ -36,8 +36,9 @@ struct SceneObject {
   std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   uint32_t material = 0;
-  int light = -1;       // its number among the meshes that shine
-  Bodies body = 0;      // its bit, if it is a dielectric
+  int light = -1;   // its number among the meshes that shine
+  Bodies body = 0;  // its bit, if it is a dielectric
+  Matte matte = Matte::none;
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
@@ -53,6 +54,9 @@ struct Hit {
   uint32_t triangle = 0;  // or sphere
   float u = 0, v = 0;     // barycentric weights of vertices 1 and 2
 };
+
+/// What rays meet: all there is, or what the plate shows, holdouts and shadow catchers alone.
+enum class World { whole, plate };
 
 /// A point of a surface.
 struct Surface {
@@ -76,9 +80,9 @@ class Scene {
   /// @throws Error for a mesh, material, light or camera that cannot be rendered.
   Scene(const Shot& shot, int frame, const FrameGeometry& geometry, const RenderOptions& options);
 
-  Hit intersect(const Ray& ray, Coherence coherence) const;
+  Hit intersect(const Ray& ray, Coherence coherence, World world = World::whole) const;
   /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
-  bool occluded(const Ray& ray, float distance) const;
+  bool occluded(const Ray& ray, float distance, World world = World::whole) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// The bodies that a point lies in.
@@ -90,6 +94,15 @@ class Scene {
   const AlbedoTable& coat_albedo(const ShadingMaterial& material, Bodies in) const {
     return *material.albedo_outside[size_t(std::bit_width(in))];
   }
+
+  Matte matte(const Hit& hit) const {
+    return hit.kind == Hit::Kind::object ? objects_[hit.index].matte : ground_matte_;
+  }
+  bool has_catchers() const;
+  /// Bodies of the plate's world.
+  Bodies plate_bodies() const;
+  /// Whether a drawn light is there in the plate's world, too.
+  bool in_plate(const LightSample& light) const;
 
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
@@ -108,7 +121,7 @@ class Scene {
   void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                  uint32_t material);
+                  uint32_t material, Matte matte);
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
   void find_mesh_lights();
@@ -117,7 +130,8 @@ class Scene {
   void build(SceneObject& object);
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
-  void find_features();
+  void find_features(Background background);
+  bool has_mattes() const;
   bool moves_visibly(const TriangleMesh& mesh) const;
   bool moves_visibly(const FoamFrame& foam) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
@@ -135,6 +149,7 @@ class Scene {
   V3f ground_center_;
   float ground_half_size_ = 0;
   uint32_t ground_material_ = 0;
+  Matte ground_matte_ = Matte::none;
   std::vector<uint32_t> bodies_;
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;

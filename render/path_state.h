@@ -1,0 +1,44 @@
+#pragma once
+// A path on its way, for path.cpp.
+
+#include "render/scene.h"
+
+namespace drench {
+
+/// Vertices before roulette may end a path: few are worth ending that may still leave the water for
+/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
+/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
+/// high because the few that last would otherwise come out of a glass as bright dots.
+inline constexpr int kRouletteStart = 10, kLongPath = 64;
+inline constexpr float kLongSurvival = 0.99f;
+
+/// Sampling dimensions after those of the camera: a block for every vertex of a branch.
+enum VertexDimension : uint32_t {
+  kLightChoice,
+  kLightPoint,
+  kScatterSide,
+  kScatterDirection,
+  kRoulette,
+  kVertexDimensions
+};
+inline constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
+
+/// Where a path stands: the ray about to be traced and what it carries.
+struct PathState {
+  Ray ray;
+  V3f throughput{1, 1, 1};
+  // What surfaces and water left of the light, whatever the densities of the directions: roulette
+  // plays for it. A ray aimed at a lamp has a small throughput because it will find much light.
+  V3f survival{1, 1, 1};
+  V3f vertex;          // where the ray comes from, before its offset
+  float bsdf_pdf = 0;  // density of its direction; 0: lights ahead have not been sampled from here
+  Bodies in = 0;
+  bool specular_only = true;
+  int vertices = 0, diffuse = 0;
+  int interfaces = 0;        // since the last diffuse surface
+  bool has_photons = false;  // that surface, and nothing but smooth bodies since
+  bool clear = false;        // nothing but smooth bodies on the way, none of them a mirror
+  uint32_t branch = 0;
+};
+
+}  // namespace drench
