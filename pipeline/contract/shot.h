@@ -361,6 +361,12 @@ struct LayerSettings {
   bool opacity = false;       // opacity.RGB, alpha by colour
 };
 
+/// How PNGs and movies show a frame; nothing given: by the built-in transform.
+struct ViewSettings {
+  std::filesystem::path ocio_config;  // empty, with a display or view: $OCIO
+  std::string display, view;          // names in the config; empty: its default
+};
+
 /// A whole shot.
 struct Shot {
   std::string name;            // file stem
@@ -386,6 +392,7 @@ struct Shot {
   Ground ground;
   RenderSettings render;
   LayerSettings layers;
+  ViewSettings view;
 };
 
 /// What `automatic` and 0 stand for.

@@ -210,12 +210,25 @@ std::vector<Parameter> layer_rows() {
   };
 }
 
+std::vector<Parameter> view_rows() {
+  return {
+      row<&ViewSettings::ocio_config>("view", "ocio_config", "", none, no_stage,
+                                      "OpenColorIO's config; with a display or view alone $OCIO"),
+      row<&ViewSettings::display>("view", "display", "", none, no_stage,
+                                  "of the config; its default if empty")
+          .as(Kind::label),
+      row<&ViewSettings::view>("view", "view", "", none, no_stage,
+                               "of the display; its default if empty")
+          .as(Kind::label),
+  };
+}
+
 }  // namespace
 
 std::vector<Parameter> picture_rows() {
   std::vector<Parameter> all;
   for (const auto& part :
-       {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows()})
+       {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows(), view_rows()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

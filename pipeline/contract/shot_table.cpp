@@ -416,6 +416,9 @@ const std::vector<Section>& sections() {
       single<&Shot::ground>("ground", "A plane under the scene; the simulation does not know it."),
       single<&Shot::render>("render", "The picture."),
       single<&Shot::layers>("layers", "What else a frame's EXR holds, for compositing."),
+      single<&Shot::view>("view",
+                          "How PNGs and movies show frames: by the built-in transform, or with any "
+                          "of these keys by OpenColorIO."),
   };
   return table;
 }

@@ -14,6 +14,7 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "render/renderer.h"
+#include "render/view_transform.h"
 #include "surfacing/foam.h"
 #include "surfacing/surface.h"
 
@@ -206,8 +207,8 @@ class ShotStages final : public Stages {
 
   StageReport contact_sheet(const fs::path& folder, const std::vector<int>& frames) override {
     StageReport report;
-    report.files.push_back(
-        write_contact_sheet(folder / layout::contact_sheet, images(folder, frames)));
+    report.files.push_back(write_contact_sheet(folder / layout::contact_sheet,
+                                               images(folder, frames), ViewTransform(shot_.view)));
     return report;
   }
 
@@ -215,7 +216,7 @@ class ShotStages final : public Stages {
                     const std::function<bool()>& keep_going) override {
     StageReport report;
     report.files.push_back(write_movie(folder / layout::movie(shot_.name), images(folder, frames),
-                                       shot_.timeline.fps, keep_going));
+                                       shot_.timeline.fps, keep_going, ViewTransform(shot_.view)));
     return report;
   }
 
