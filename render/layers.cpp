@@ -96,12 +96,11 @@ void LayerFilm::add_light(size_t pixel, const PathRecord& record) {
 }
 
 /// A group's part of the beauty: of what catchers have of it the share that the beauty has of all.
-Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples,
-                            const CatcherFilm& catchers) const {
+Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const {
   const size_t k = pixel * groups_.size() + group;
   Imath::V3d sum = light_[k];
   if (caught_.empty()) return sum / samples;
-  const V3f with = catchers.with(pixel), added = catchers.added(pixel);
+  const V3f with = plate.with(pixel), added = plate.added(pixel);
   for (int c = 0; c < 3; ++c)
     if (with[c] > 0) sum[c] -= caught_[k][c] * (1 - double(added[c]) / with[c]);
   return sum / samples;
@@ -141,7 +140,7 @@ FilmLayer LayerFilm::layer(const std::string& name, const std::vector<std::strin
 }
 
 std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
-                                         const CatcherFilm& catchers) const {
+                                         const PlateFilm& plate) const {
   using enum FilmLayer::Precision;
   std::vector<FilmLayer> out;
   const std::vector<std::string> rgb{"R", "G", "B"}, xyz{"X", "Y", "Z"};
@@ -168,12 +167,11 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
     fill("samples", {"Y"}, full, [&](size_t p) { return std::array{pixels[p].samples()}; });
   for (size_t g = 0; g < shown_groups_; ++g)
     fill("light_" + groups_[g], rgb, half,
-         [&](size_t p) { return light(p, g, pixels[p].samples(), catchers); });
+         [&](size_t p) { return light(p, g, pixels[p].samples(), plate); });
   if (want_.opacity)
     fill("opacity", rgb, half, [&](size_t p) {
-      const double left = catchers.empty() ? 1 : catchers.light_left(p);
-      const Imath::V3d seen = plate_[p].background + plate_[p].catcher * left;
-      return Imath::V3d(1) - seen / pixels[p].samples();
+      const Imath::V3d seen = plate_[p].background + plate_[p].catcher * plate.light_left(p);
+      return Imath::V3d(1) - seen / pixels[p].samples() - Imath::V3d(plate.more_background(p));
     });
   if (want_.cryptomatte) {
     add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);

@@ -36,10 +36,11 @@ class LayerFilm {
   /// Adds a sample to a pixel, row by row from the top left.
   void add(size_t pixel, const PathRecord& record);
   /// The finished layers, those that were asked for.
-  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels,
-                                const CatcherFilm& catchers) const;
+  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels, const PlateFilm& plate) const;
   /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
   void add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const;
+  /// Whether a camera sample of a pixel met the ground or an object that is no matte.
+  bool saw_something(size_t pixel) const { return pixel_[pixel].nearest.depth < kNothing; }
   /// Header entries that belong to them.
   std::vector<std::pair<std::string, std::string>> header() const;
 
@@ -65,7 +66,7 @@ class LayerFilm {
   };
 
   void add_light(size_t pixel, const PathRecord& record);
-  Imath::V3d light(size_t pixel, size_t group, int samples, const CatcherFilm& catchers) const;
+  Imath::V3d light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const;
   V3f motion_of(const PathRecord& record) const;
   FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
                   FilmLayer::Precision precision) const;

@@ -6,6 +6,12 @@
 
 namespace drench {
 
+namespace {
+
+constexpr float kWhole = 1 - 1e-3f;  // this and more is what smoothing leaves of 1
+
+}  // namespace
+
 bool Scene::has_mattes() const {
   return (has_ground_ && ground_matte_ != Matte::none) ||
          std::any_of(objects_.begin(), objects_.end(),
@@ -32,14 +38,14 @@ bool Scene::in_plate(const LightSample& light) const {
          });
 }
 
-std::vector<PixelSum> CatcherFilm::beauty(const std::vector<PixelSum>& all) const {
+std::vector<PixelSum> PlateFilm::beauty(const std::vector<PixelSum>& all) const {
   std::vector<PixelSum> out;
   out.reserve(all.size());
   for (size_t p = 0; p < all.size(); ++p) out.push_back(all[p].less(without_[p], light_left(p)));
   return out;
 }
 
-NoisyPicture CatcherFilm::shadows(int width, int height) const {
+NoisyPicture PlateFilm::shadows(int width, int height) const {
   NoisyPicture picture;
   picture.width = width;
   picture.height = height;
@@ -59,6 +65,27 @@ NoisyPicture CatcherFilm::shadows(int width, int height) const {
     for (NoisyPicture::Plane& colour : picture.variance) colour.push_back(variance);
   }
   return picture;
+}
+
+NoisyPicture PlateFilm::shares(int width, int height) const {
+  NoisyPicture picture = noisy_picture(background_);
+  picture.width = width;
+  picture.height = height;
+  return picture;
+}
+
+void PlateFilm::smooth_shadows(NoisyPicture::Plane light_left) {
+  for (size_t p = 0; p < light_left.size(); ++p)
+    if (light_left[p] > kWhole && dimmest(p).left == 1) light_left[p] = 1;
+  smooth_ = std::move(light_left);
+}
+
+void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> background,
+                              const std::function<bool(size_t)>& seen) {
+  for (size_t c = 0; c < background.size(); ++c)
+    for (size_t p = 0; p < background_.size(); ++p)
+      if (!seen(p)) background[c][p] = background_[p].mean(int(c));
+  smooth_background_ = std::move(background);
 }
 
 }  // namespace drench

@@ -20,6 +20,7 @@
 // A ratio of means is biased as one over the number of samples. W and O share theirs: where objects
 // change nothing they have the same bits, and s is 1.
 
+#include <functional>
 #include <vector>
 
 #include "render/denoise.h"
@@ -34,21 +35,37 @@ struct MatteRecord {
   std::vector<V3f> light;                     // W of each group of lights; empty: not asked for
 };
 
-/// Adds up the samples of shadow catchers: 300 bytes a pixel.
-class CatcherFilm {
+/// Adds up samples of the plate, what of them is needed: 300 bytes a pixel for shadow catchers, 150
+/// for shares of light that the denoiser is to smooth.
+class PlateFilm {
  public:
-  /// @param pixels  0: the scene has no catchers
-  explicit CatcherFilm(size_t pixels) : with_(pixels), without_(pixels) {}
+  /// @param catchers  pixels; 0: the scene has no shadow catchers
+  /// @param shares    pixels; 0: b stays as it is
+  PlateFilm(size_t catchers, size_t shares)
+      : with_(catchers), without_(catchers), background_(shares) {}
 
-  bool empty() const { return with_.empty(); }
+  bool has_catchers() const { return !with_.empty(); }
+  bool has_shares() const { return !background_.empty(); }
   /// Every sample of the picture, in order.
   void add(size_t pixel, const MatteRecord& record) {
-    with_[pixel].add(record.with, 0);
-    without_[pixel].add(record.without, mean(record.catcher));
+    if (has_catchers()) {
+      with_[pixel].add(record.with, 0);
+      without_[pixel].add(record.without, mean(record.catcher));
+    }
+    if (has_shares()) background_[pixel].add(record.background, 0);
   }
   /// s of a pixel.
   float light_left(size_t pixel) const {
+    if (!has_catchers()) return 1;
     return smooth_.empty() ? dimmest(pixel).left : smooth_[pixel];
+  }
+  /// What smoothing adds to b.
+  V3f more_background(size_t pixel) const {
+    if (smooth_background_.empty()) return V3f(0);
+    V3f out;
+    for (int c = 0; c < 3; ++c)
+      out[c] = smooth_background_[size_t(c)][pixel] - background_[pixel].mean(c);
+    return out;
   }
   /// W and W - s O of a pixel's means.
   V3f with(size_t pixel) const { return mean_of(with_[pixel]); }
@@ -58,10 +75,14 @@ class CatcherFilm {
   /// R + W - s O and alpha of each pixel. @param all  sums of R + W and 1 - b
   std::vector<PixelSum> beauty(const std::vector<PixelSum>& all) const;
 
-  /// s as a picture of three equal colours.
+  /// s as a picture of three equal colours, and b, for the denoiser.
   NoisyPicture shadows(int width, int height) const;
-  /// Puts a smoother s in its place.
-  void smooth(NoisyPicture::Plane light_left) { smooth_ = std::move(light_left); }
+  NoisyPicture shares(int width, int height) const;
+  /// Puts a smoother s in its place. What is 1 without noise stays 1 to the bit.
+  void smooth_shadows(NoisyPicture::Plane light_left);
+  /// The same for b. @param seen  whether a pixel has anything but the plate; else its b stays
+  void smooth_shares(std::vector<NoisyPicture::Plane> background,
+                     const std::function<bool(size_t)>& seen);
 
  private:
   static float mean(const V3f& v) { return (v.x + v.y + v.z) / 3; }
@@ -81,8 +102,9 @@ class CatcherFilm {
     return out;
   }
 
-  std::vector<PixelSum> with_, without_;
+  std::vector<PixelSum> with_, without_, background_;
   NoisyPicture::Plane smooth_;
+  std::vector<NoisyPicture::Plane> smooth_background_;
 };
 
 }  // namespace drench

@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_coated.h"
@@ -47,17 +49,17 @@ class PathTracer {
     if (kWater) state.in = settings_.camera_in;
     if constexpr (kPlate) {
       state.clear = true;
-      view_ = state.ray.direction;
+      plate_.view = state.ray.direction;
     }
     walk(state);
     while (kWater && has_pending_) {
       has_pending_ = false;
       PathState next = pending_;
-      on_catcher_ = false;
+      if constexpr (kPlate) plate_.on_catcher = false;
       walk(next);
     }
     if constexpr (kPlate)
-      if (has_plate_) walk_plate();
+      if (plate_.caught) walk_plate();
     return {radiance_, alpha_};
   }
 
@@ -124,7 +126,7 @@ class PathTracer {
   /// Whether a plate stands for what this path meets: it goes on from the camera much as the view
   /// does, not back from within a drop.
   bool sees_plate(const PathState& state) const {
-    return state.clear && dot(state.ray.direction, view_) > 0;
+    return state.clear && dot(state.ray.direction, plate_.view) > 0;
   }
 
   /// Ends the path on the plate.
@@ -140,23 +142,27 @@ class PathTracer {
   /// What is found from here on comes from a shadow catcher; kept for the plate's world.
   void start_catching(PathState& state, const Surface& surface) {
     state.clear = false;
-    on_catcher_ = has_plate_ = true;
-    plate_ = state;
-    plate_.in &= scene_.plate_bodies();
-    plate_surface_ = surface;
+    plate_.on_catcher = plate_.caught = true;
+    plate_.start = state;
+    plate_.start.in &= scene_.plate_bodies();
+    plate_.surface = surface;
     record_->matte.catcher = state.throughput;
     record_->shaded = true;
   }
 
   /// From the catcher on by the same numbers, in the plate's world.
   void walk_plate() {
-    in_plate_ = true;
-    if (!scatter_surface(plate_, plate_surface_, 0) || !survives(plate_)) return;
-    ++plate_.vertices;
-    walk(plate_);
+    plate_.world = World::plate;
+    PathState state = plate_.start;
+    if (!scatter_surface(state, plate_.surface, 0) || !survives(state)) return;
+    ++state.vertices;
+    walk(state);
   }
 
-  World world() const { return kPlate && in_plate_ ? World::plate : World::whole; }
+  World world() const {
+    if constexpr (kPlate) return plate_.world;
+    return World::whole;
+  }
 
   /// Goes on through a surface that divides nothing, because a body of higher priority is there.
   bool inside_higher_body(PathState& state, const Surface& surface) {
@@ -168,7 +174,9 @@ class PathTracer {
   }
 
   void record_first(const PathState& state, const Surface& surface, const Hit& hit) {
-    if (!record_ || state.vertices > 0 || (kPlate && on_catcher_)) return;
+    if (!record_ || state.vertices > 0) return;
+    if constexpr (kPlate)
+      if (plate_.on_catcher) return;
     record_->first = hit;
     record_->position = surface.position;
     record_->normal = dot(state.ray.direction, surface.geometric_normal) < 0
@@ -186,11 +194,11 @@ class PathTracer {
   /// Adds light to the picture.
   void deposit(const V3f& found, uint32_t group) {
     if constexpr (kPlate) {
-      if (in_plate_) {
+      if (world() == World::plate) {
         record_->matte.without += found;
         return;
       }
-      if (on_catcher_) {
+      if (plate_.on_catcher) {
         record_->matte.with += found;
         if (!record_->light.empty()) record_->matte.light[group] += found;
       }
@@ -546,12 +554,7 @@ class PathTracer {
   float alpha_ = 1;
   PathState pending_;
   bool has_pending_ = false;
-  V3f view_;                 // where the camera looks along this sample
-  bool on_catcher_ = false;  // what is found comes from a shadow catcher
-  bool in_plate_ = false;    // the world is the plate's
-  PathState plate_;          // where a path met a catcher
-  Surface plate_surface_;
-  bool has_plate_ = false;
+  [[no_unique_address]] std::conditional_t<kPlate, PlateWalk, std::monostate> plate_;
 };
 
 void clear_light(PathRecord& record) {

@@ -41,4 +41,14 @@ struct PathState {
   uint32_t branch = 0;
 };
 
+/// What a path must remember that may meet the plate.
+struct PlateWalk {
+  V3f view;                 // where the camera looks along this sample
+  bool on_catcher = false;  // what is found comes from a shadow catcher
+  bool caught = false;      // there was one:
+  PathState start;          // where the walk in the plate's world begins
+  Surface surface;
+  World world = World::whole;  // now
+};
+
 }  // namespace drench

@@ -71,15 +71,17 @@ struct Job {
 struct Sums {
   std::vector<PixelSum> pixel;
   LayerFilm layers;
-  CatcherFilm catchers;
+  PlateFilm plate;
   std::vector<PixelSum> without_plate{};  // with catchers, once settled
 
   /// Takes what shadow catchers leave to the plate out of the picture.
   void settle() {
-    if (!catchers.empty()) without_plate = catchers.beauty(pixel);
+    if (plate.has_catchers()) without_plate = plate.beauty(pixel);
   }
   /// Sums of the beauty.
-  const std::vector<PixelSum>& beauty() const { return catchers.empty() ? pixel : without_plate; }
+  const std::vector<PixelSum>& beauty() const {
+    return plate.has_catchers() ? without_plate : pixel;
+  }
 };
 
 /// One more camera sample of a pixel, the next in its order.
@@ -127,7 +129,7 @@ uint64_t render_tile(const Job& job, const SamplePlan& plan, int tile, Sums& sum
         add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
         if (!recorded) continue;
         sums.layers.add(pixel, record);
-        if (!sums.catchers.empty()) sums.catchers.add(pixel, record.matte);
+        sums.plate.add(pixel, record.matte);
         sums.layers.clear(record);
       }
     }
@@ -161,14 +163,9 @@ FilmWindow window_of(const RenderSettings& r) {
 
 /// Puts the denoised beauty in the place of the noisy one, which becomes a layer.
 void denoise_film(const Sums& sums, Film& film) {
-  NoisyPicture picture;
+  NoisyPicture picture = noisy_picture(sums.beauty());
   picture.width = film.width;
   picture.height = film.height;
-  for (const PixelSum& pixel : sums.beauty())
-    for (int c = 0; c < 3; ++c) {
-      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
-      picture.variance[c].push_back(2 * pixel.variance(c));
-    }
   sums.layers.add_features(picture, sums.pixel);
   const std::vector<NoisyPicture::Plane> clean = denoise(std::move(picture));
   FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
@@ -180,11 +177,17 @@ void denoise_film(const Sums& sums, Film& film) {
   film.layer.push_back(std::move(noisy));
 }
 
-/// The same for the shadows that catchers have, before anything is made of them.
-void denoise_shadows(const Job& job, Sums& sums) {
-  NoisyPicture picture = sums.catchers.shadows(job.width, job.height);
-  sums.layers.add_features(picture, sums.pixel);
-  sums.catchers.smooth(denoise(std::move(picture)).front());
+/// The same for what makes alpha, before anything is made of it.
+void denoise_plate(const Job& job, Sums& sums) {
+  const auto clean = [&](NoisyPicture picture) {
+    sums.layers.add_features(picture, sums.pixel);
+    return denoise(std::move(picture));
+  };
+  if (sums.plate.has_catchers())
+    sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)).front());
+  if (sums.plate.has_shares())
+    sums.plate.smooth_shares(clean(sums.plate.shares(job.width, job.height)),
+                             [&](size_t p) { return sums.layers.saw_something(p); });
   sums.settle();
 }
 
@@ -193,11 +196,19 @@ Film developed(const Job& job, const Sums& sums) {
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
   for (size_t p = 0; p < pixels.size(); ++p) {
     for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
-    film.rgba[4 * p + 3] = std::clamp(pixels[p].mean(3), 0.f, 1.f);
+    const V3f more = sums.plate.more_background(p);
+    const float alpha = pixels[p].mean(3) - (more.x + more.y + more.z) / 3;
+    film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
   }
-  film.layer = sums.layers.finish(pixels, sums.catchers);
+  film.layer = sums.layers.finish(pixels, sums.plate);
   film.header = sums.layers.header();
   return film;
+}
+
+PlateFilm plate_film(const Shot& shot, const Scene& scene, size_t pixels) {
+  const bool see_through = shot.render.refraction_alpha == RefractionAlpha::transparent &&
+                           (scene.features() & kMattes) && !scene.bodies().empty();
+  return {scene.has_catchers() ? pixels : 0, shot.render.denoise && see_through ? pixels : 0};
 }
 
 }  // namespace
@@ -254,7 +265,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                 whole ? shot.render.height : shot.render.crop_max.y - window.y};
   Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
             LayerFilm(shot, frame, scene, job.width, job.height),
-            CatcherFilm(scene.has_catchers() ? size_t(job.width) * job.height : 0)};
+            plate_film(shot, scene, size_t(job.width) * job.height)};
   SamplePlan plan(job.width, job.height, shot.render.samples, shot.render.error);
   Progress report(progress);
   uint64_t rays = photon_rays;
@@ -264,7 +275,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
     rays += render_tiles(job, plan, sums, report);
     sums.settle();
   }
-  if (shot.render.denoise && !sums.catchers.empty()) denoise_shadows(job, sums);
+  if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, film);
   if (stats) {

@@ -365,6 +365,35 @@ TEST(ShadowCatcher, IsDenoisedInAlphaToo) {
   EXPECT_NEAR(after.value, 0.5, 4 * before.error);
 }
 
+// The same of water that reflects one sample in 25: over a white plate it was noise, and what is
+// beside it stays empty.
+TEST(SeeThroughWater, IsDenoisedInAlphaToo) {
+  Shot shot = slab_shot(1.333, V3f(0), 64);
+  shot.render.width = shot.render.height = 48;
+  shot.camera.fov_deg = 40;
+  FrameGeometry geometry;
+  geometry.fluid = box_mesh({-2, 0, -2}, {0, 0.5f, 2});
+  const Film noisy = render_frame(shot, 1001, geometry);
+  shot.render.denoise = true;
+  const Film clean = render_frame(shot, 1001, geometry);
+  const std::vector<float>& opacity = layer_of(clean, "opacity").value;
+  double before = 0, after = 0, sum = 0, sum_before = 0;
+  for (size_t y = 0; y < 48; ++y) {
+    for (size_t x = 0; x < 20; ++x) {
+      const size_t p = y * 48 + x;
+      const double a = clean.rgba[4 * p + 3];
+      EXPECT_NEAR(opacity[3 * p], a, 1e-5);
+      before += std::pow(noisy.rgba[4 * p + 3] - 0.04, 2);
+      after += std::pow(a - 0.04, 2);
+      sum += a;
+      sum_before += noisy.rgba[4 * p + 3];
+    }
+    for (size_t x = 28; x < 48; ++x) EXPECT_EQ(clean.rgba[4 * (y * 48 + x) + 3], 0);
+  }
+  EXPECT_LT(after, 0.2 * before);  // measured 0.1
+  EXPECT_NEAR(sum, sum_before, 0.05 * sum_before);
+}
+
 // Where objects change nothing there is no noise, so that no sample beyond the first 32 is spent.
 TEST(ShadowCatcher, TakesSamplesWhereItsShadowsAreNoisy) {
   Shot shot = catcher_shot(panel({0, 2, 0}, 0.4, 0.3, 5), 256);
