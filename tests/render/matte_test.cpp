@@ -4,6 +4,7 @@
 #include "render/matte.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 
@@ -329,6 +330,28 @@ TEST(ShadowCatcher, OverItselfIsThePicture) {
   EXPECT_GT(open, 250);
   EXPECT_GT(dark, 20);
   EXPECT_GT(bright, 3);
+}
+
+TEST(ShadowCatcher, HasTheSameBitsOnAnyThreadsAndInACrop) {
+  Scenery scene;
+  scene.shot.ground.matte = Matte::shadow_catcher;
+  scene.shot.render.samples = 8;
+  scene.shot.layers.opacity = true;
+  const auto on_threads = [&](size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return render_frame(scene.shot, 1001, scene.geometry);
+  };
+  const Film one = on_threads(1), many = on_threads(5);
+  EXPECT_EQ(one.rgba, many.rgba);
+  EXPECT_EQ(layer_of(one, "opacity").value, layer_of(many, "opacity").value);
+  scene.shot.render.crop_min = {4, 8};
+  scene.shot.render.crop_max = {23, 21};
+  const Film part = render_frame(scene.shot, 1001, scene.geometry);
+  for (int y = 0; y < part.height; ++y)
+    for (int x = 0; x < part.width; ++x)
+      for (int c = 0; c < 4; ++c)
+        EXPECT_EQ(part.rgba[4 * size_t(y * part.width + x) + size_t(c)],
+                  one.rgba[4 * size_t((y + 8) * one.width + x + 4) + size_t(c)]);
 }
 
 TEST(ShadowCatcher, LightGroupsSumToTheBeauty) {
