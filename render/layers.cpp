@@ -171,7 +171,7 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
   if (want_.opacity)
     fill("opacity", rgb, half, [&](size_t p) {
       const Imath::V3d seen = plate_[p].background + plate_[p].catcher * plate.light_left(p);
-      return Imath::V3d(1) - seen / pixels[p].samples() - Imath::V3d(plate.more_background(p));
+      return Imath::V3d(1) - seen / pixels[p].samples() - Imath::V3d(plate.more_plate(p));
     });
   if (want_.cryptomatte) {
     add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);

@@ -68,7 +68,10 @@ NoisyPicture PlateFilm::shadows(int width, int height) const {
 }
 
 NoisyPicture PlateFilm::shares(int width, int height) const {
-  NoisyPicture picture = noisy_picture(background_);
+  std::vector<PixelSum> sums;
+  sums.reserve(background_.size());
+  for (size_t p = 0; p < background_.size(); ++p) sums.push_back(plate(p));
+  NoisyPicture picture = noisy_picture(sums);
   picture.width = width;
   picture.height = height;
   return picture;
@@ -80,12 +83,14 @@ void PlateFilm::smooth_shadows(NoisyPicture::Plane light_left) {
   smooth_ = std::move(light_left);
 }
 
-void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> background,
+void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> smooth,
                               const std::function<bool(size_t)>& seen) {
-  for (size_t c = 0; c < background.size(); ++c)
-    for (size_t p = 0; p < background_.size(); ++p)
-      if (!seen(p)) background[c][p] = background_[p].mean(int(c));
-  smooth_background_ = std::move(background);
+  for (size_t p = 0; p < background_.size(); ++p) {
+    if (seen(p)) continue;
+    const V3f kept = mean_of(plate(p));
+    for (size_t c = 0; c < 3; ++c) smooth[c][p] = kept[int(c)];
+  }
+  smooth_plate_ = std::move(smooth);
 }
 
 }  // namespace drench

@@ -35,14 +35,14 @@ struct MatteRecord {
   std::vector<V3f> light;                     // W of each group of lights; empty: not asked for
 };
 
-/// Adds up samples of the plate, what of them is needed: 300 bytes a pixel for shadow catchers, 150
-/// for shares of light that the denoiser is to smooth.
+/// Adds up samples of the plate, what of them is needed: 300 bytes a pixel for shadow catchers, and
+/// as many for shares of light that the denoiser is to smooth.
 class PlateFilm {
  public:
   /// @param catchers  pixels; 0: the scene has no shadow catchers
-  /// @param shares    pixels; 0: b stays as it is
+  /// @param shares    pixels; 0: b and c stay as they are
   PlateFilm(size_t catchers, size_t shares)
-      : with_(catchers), without_(catchers), background_(shares) {}
+      : with_(catchers), without_(catchers), background_(shares), caught_(shares) {}
 
   bool has_catchers() const { return !with_.empty(); }
   bool has_shares() const { return !background_.empty(); }
@@ -52,20 +52,20 @@ class PlateFilm {
       with_[pixel].add(record.with, 0);
       without_[pixel].add(record.without, mean(record.catcher));
     }
-    if (has_shares()) background_[pixel].add(record.background, 0);
+    if (!has_shares()) return;
+    background_[pixel].add(record.background, 0);
+    caught_[pixel].add(record.catcher, 0);
   }
   /// s of a pixel.
   float light_left(size_t pixel) const {
     if (!has_catchers()) return 1;
     return smooth_.empty() ? dimmest(pixel).left : smooth_[pixel];
   }
-  /// What smoothing adds to b.
-  V3f more_background(size_t pixel) const {
-    if (smooth_background_.empty()) return V3f(0);
-    V3f out;
-    for (int c = 0; c < 3; ++c)
-      out[c] = smooth_background_[size_t(c)][pixel] - background_[pixel].mean(c);
-    return out;
+  /// What smoothing adds to b + s c.
+  V3f more_plate(size_t pixel) const {
+    if (smooth_plate_.empty()) return V3f(0);
+    const V3f smooth(smooth_plate_[0][pixel], smooth_plate_[1][pixel], smooth_plate_[2][pixel]);
+    return smooth - mean_of(plate(pixel));
   }
   /// W and W - s O of a pixel's means.
   V3f with(size_t pixel) const { return mean_of(with_[pixel]); }
@@ -75,13 +75,14 @@ class PlateFilm {
   /// R + W - s O and alpha of each pixel. @param all  sums of R + W and 1 - b
   std::vector<PixelSum> beauty(const std::vector<PixelSum>& all) const;
 
-  /// s as a picture of three equal colours, and b, for the denoiser.
+  /// s as a picture of three equal colours, and b + s c with the s that is known by then, for the
+  /// denoiser.
   NoisyPicture shadows(int width, int height) const;
   NoisyPicture shares(int width, int height) const;
   /// Puts a smoother s in its place. What is 1 without noise stays 1 to the bit.
   void smooth_shadows(NoisyPicture::Plane light_left);
-  /// The same for b. @param seen  whether a pixel has anything but the plate; else its b stays
-  void smooth_shares(std::vector<NoisyPicture::Plane> background,
+  /// The same for b + s c. @param seen  whether a pixel has anything but the plate; else it stays
+  void smooth_shares(std::vector<NoisyPicture::Plane> smooth,
                      const std::function<bool(size_t)>& seen);
 
  private:
@@ -102,9 +103,13 @@ class PlateFilm {
     return out;
   }
 
-  std::vector<PixelSum> with_, without_, background_;
+  PixelSum plate(size_t pixel) const {
+    return background_[pixel].less(caught_[pixel], -light_left(pixel));
+  }
+
+  std::vector<PixelSum> with_, without_, background_, caught_;
   NoisyPicture::Plane smooth_;
-  std::vector<NoisyPicture::Plane> smooth_background_;
+  std::vector<NoisyPicture::Plane> smooth_plate_;
 };
 
 }  // namespace drench

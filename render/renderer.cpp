@@ -196,7 +196,7 @@ Film developed(const Job& job, const Sums& sums) {
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
   for (size_t p = 0; p < pixels.size(); ++p) {
     for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
-    const V3f more = sums.plate.more_background(p);
+    const V3f more = sums.plate.more_plate(p);
     const float alpha = pixels[p].mean(3) - (more.x + more.y + more.z) / 3;
     film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
   }
