@@ -36,7 +36,7 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
       catchers_(scene.has_catchers()) {
   const size_t pixels = size_t(width_) * height_;
   if (records()) pixel_.resize(pixels);
-  if (want_.opacity) plate_.resize(pixels);
+  if (want_.opacity) background_.resize(pixels, Imath::V3d(0));
   for (size_t k = 0; k < scene.object_count(); ++k) {
     objects_.add(scene.object(uint32_t(k)).name);
     materials_.add(scene.object(uint32_t(k)).material_name);
@@ -108,10 +108,7 @@ Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples, const Plate
 
 void LayerFilm::add(size_t pixel, const PathRecord& record) {
   add_light(pixel, record);
-  if (!plate_.empty()) {
-    plate_[pixel].background += Imath::V3d(record.matte.background);
-    plate_[pixel].catcher += Imath::V3d(record.matte.catcher);
-  }
+  if (!background_.empty()) background_[pixel] += Imath::V3d(record.matte.background);
   Pixel& p = pixel_[pixel];
   p.albedo += record.albedo;
   p.albedo2 += record.albedo * record.albedo;
@@ -170,8 +167,7 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
          [&](size_t p) { return light(p, g, pixels[p].samples(), plate); });
   if (want_.opacity)
     fill("opacity", rgb, half, [&](size_t p) {
-      const Imath::V3d seen = plate_[p].background + plate_[p].catcher * plate.light_left(p);
-      return Imath::V3d(1) - seen / pixels[p].samples() - Imath::V3d(plate.more_plate(p));
+      return Imath::V3d(1) - background_[p] / pixels[p].samples() - Imath::V3d(plate.seen(p));
     });
   if (want_.cryptomatte) {
     add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);

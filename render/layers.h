@@ -60,11 +60,6 @@ class LayerFilm {
   };
   static constexpr float kNothing = 1e10f;
 
-  /// Sums of a pixel's shares of light from the plate.
-  struct Plate {
-    Imath::V3d background{0, 0, 0}, catcher{0, 0, 0};
-  };
-
   void add_light(size_t pixel, const PathRecord& record);
   Imath::V3d light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const;
   V3f motion_of(const PathRecord& record) const;
@@ -83,9 +78,9 @@ class LayerFilm {
   ShutterCamera frame_camera_;  // at this frame and the next
   NameIndex objects_, materials_;
   std::vector<Pixel> pixel_;
-  std::vector<Imath::V3d> light_;   // by pixel, then group
-  std::vector<Imath::V3d> caught_;  // that of shadow catchers in it; empty without any
-  std::vector<Plate> plate_;
+  std::vector<Imath::V3d> light_;       // by pixel, then group
+  std::vector<Imath::V3d> caught_;      // that of shadow catchers in it; empty without any
+  std::vector<Imath::V3d> background_;  // shares of light from it; empty: not asked for
   bool catchers_;
 };
 

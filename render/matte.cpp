@@ -38,6 +38,29 @@ bool Scene::in_plate(const LightSample& light) const {
          });
 }
 
+namespace {
+
+float ratio(float with, float without) { return without > 0 ? std::min(1.f, with / without) : 1.f; }
+
+}  // namespace
+
+V3f PlateFilm::noisy_light_left(size_t pixel) const {
+  V3f left;
+  for (int c = 0; c < 3; ++c) left[c] = ratio(with_[pixel].mean(c), without_[pixel].mean(c));
+  return left;
+}
+
+V3f PlateFilm::light_left(size_t pixel) const {
+  if (!has_catchers()) return V3f(1);
+  return smooth_shadows_.empty() ? noisy_light_left(pixel) : at(smooth_shadows_, pixel);
+}
+
+V3f PlateFilm::seen(size_t pixel) const {
+  if (caught_.empty()) return V3f(0);
+  const V3f here = mean_of(caught_[pixel]) * light_left(pixel);
+  return smooth_plate_.empty() ? here : here + at(smooth_plate_, pixel) - mean_of(plate(pixel));
+}
+
 std::vector<PixelSum> PlateFilm::beauty(const std::vector<PixelSum>& all) const {
   std::vector<PixelSum> out;
   out.reserve(all.size());
@@ -50,19 +73,14 @@ NoisyPicture PlateFilm::shadows(int width, int height) const {
   picture.width = width;
   picture.height = height;
   for (size_t p = 0; p < with_.size(); ++p) {
-    const Dimmest all = dimmest(p);
-    const float without = without_[p].mean(all.colour);
-    const float unit = without > 0 ? without : 1;
-    // That of W / O to first order.
-    const float variance =
-        2 * with_[p].less(without_[p], all.left).variance(all.colour) / (unit * unit);
-    for (int h = 0; h < 2; ++h) {
-      const float of_half = without_[p].half(h, all.colour);
-      const float left =
-          of_half > 0 ? std::min(1.f, with_[p].half(h, all.colour) / of_half) : all.left;
-      for (NoisyPicture::Plane& colour : picture.half[h]) colour.push_back(left);
+    const PixelSum difference = with_[p].less(without_[p], noisy_light_left(p));
+    for (int c = 0; c < 3; ++c) {
+      for (int h = 0; h < 2; ++h)
+        picture.half[h][c].push_back(ratio(with_[p].half(h, c), without_[p].half(h, c)));
+      const float without = without_[p].mean(c);  // the variance of W / O to first order
+      picture.variance[c].push_back(without > 0 ? 2 * difference.variance(c) / (without * without)
+                                                : 0);
     }
-    for (NoisyPicture::Plane& colour : picture.variance) colour.push_back(variance);
   }
   return picture;
 }
@@ -77,16 +95,19 @@ NoisyPicture PlateFilm::shares(int width, int height) const {
   return picture;
 }
 
-void PlateFilm::smooth_shadows(NoisyPicture::Plane light_left) {
-  for (size_t p = 0; p < light_left.size(); ++p)
-    if (light_left[p] > kWhole && dimmest(p).left == 1) light_left[p] = 1;
-  smooth_ = std::move(light_left);
+void PlateFilm::smooth_shadows(std::vector<NoisyPicture::Plane> smooth) {
+  for (size_t p = 0; p < with_.size(); ++p) {
+    const V3f noisy = noisy_light_left(p);
+    for (size_t c = 0; c < 3; ++c)
+      if (smooth[c][p] > kWhole && noisy[int(c)] == 1) smooth[c][p] = 1;
+  }
+  smooth_shadows_ = std::move(smooth);
 }
 
 void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> smooth,
-                              const std::function<bool(size_t)>& seen) {
+                              const std::function<bool(size_t)>& objects) {
   for (size_t p = 0; p < background_.size(); ++p) {
-    if (seen(p)) continue;
+    if (objects(p)) continue;
     const V3f kept = mean_of(plate(p));
     for (size_t c = 0; c < 3; ++c) smooth[c][p] = kept[int(c)];
   }

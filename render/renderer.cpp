@@ -184,7 +184,7 @@ void denoise_plate(const Job& job, Sums& sums) {
     return denoise(std::move(picture));
   };
   if (sums.plate.has_catchers())
-    sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)).front());
+    sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)));
   if (sums.plate.has_shares())
     sums.plate.smooth_shares(clean(sums.plate.shares(job.width, job.height)),
                              [&](size_t p) { return sums.layers.saw_something(p); });
@@ -196,8 +196,8 @@ Film developed(const Job& job, const Sums& sums) {
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
   for (size_t p = 0; p < pixels.size(); ++p) {
     for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
-    const V3f more = sums.plate.more_plate(p);
-    const float alpha = pixels[p].mean(3) - (more.x + more.y + more.z) / 3;
+    const V3f seen = sums.plate.seen(p);
+    const float alpha = pixels[p].mean(3) - (seen.x + seen.y + seen.z) / 3;
     film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
   }
   film.layer = sums.layers.finish(pixels, sums.plate);
