@@ -206,7 +206,7 @@ std::vector<Parameter> layer_rows() {
                                        "CryptoObject and CryptoMaterial, of what is met first"),
       row<&LayerSettings::opacity>(
           "layers", "opacity", "", none, render,
-          "opacity.RGB: alpha by colour; coloured water needs it to tint a plate"),
+          "opacity.RGB: alpha by colour, for what tints a plate: coloured water and shadows"),
   };
 }
 
