@@ -123,10 +123,9 @@ class PathTracer {
     return scatter_cloth(state, surface);
   }
 
-  /// Whether a plate stands for what this path meets: it goes on from the camera much as the view
-  /// does, not back from within a drop.
+  /// Whether a plate stands for what this path meets.
   bool sees_plate(const PathState& state) const {
-    return state.clear && dot(state.ray.direction, plate_.view) > 0;
+    return state.clear && dot(state.ray.direction, plate_.view) > kMostBend;
   }
 
   /// Ends the path on the plate.

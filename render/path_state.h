@@ -41,6 +41,11 @@ struct PathState {
   uint32_t branch = 0;
 };
 
+/// Cosine of the most that smooth bodies may bend the view for a plate to stand for what is seen
+/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate is another
+/// place; drops show the sky there.
+inline constexpr float kMostBend = 0.9659258f;
+
 /// What a path must remember that may meet the plate.
 struct PlateWalk {
   V3f view;                 // where the camera looks along this sample

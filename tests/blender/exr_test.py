@@ -114,8 +114,9 @@ def test_a_frame_goes_over_a_plate():
     suns_left = math.sqrt(0.5) / (1 + math.sqrt(0.5))  # the card hides the one above
     for point, left in (((-0.7, 1.2, 0), math.exp(-2 * way)), ((0.7, 1.2, 0), 1),
                         ((0, 1.2, 0), 1), ((0, 0, -1), suns_left), ((0.8, 0, -2.5), 1)):
-        numpy.testing.assert_allclose(picture[at(point)], plate * left, rtol=4e-3, err_msg=str(point))
-        numpy.testing.assert_allclose(opacity[at(point)], 1 - left, atol=2e-3, err_msg=str(point))
+        name = str(point)
+        numpy.testing.assert_allclose(picture[at(point)], plate * left, rtol=4e-3, err_msg=name)
+        numpy.testing.assert_allclose(opacity[at(point)], 1 - left, atol=2e-3, err_msg=name)
 
 
 run_tests(globals())
