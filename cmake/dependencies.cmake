@@ -14,6 +14,17 @@ if(NOT embree_FOUND)
   find_package(embree 3 CONFIG REQUIRED)
 endif()
 
+# Optional. Debian's package has no OpenColorIOConfig.
+if(DRENCH_OCIO)
+  find_path(OCIO_INCLUDE OpenColorIO/OpenColorIO.h)
+  find_library(OCIO_LIBRARY OpenColorIO)
+  if(OCIO_INCLUDE AND OCIO_LIBRARY)
+    add_library(OpenColorIO::OpenColorIO UNKNOWN IMPORTED)
+    set_target_properties(OpenColorIO::OpenColorIO PROPERTIES
+      IMPORTED_LOCATION ${OCIO_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${OCIO_INCLUDE})
+  endif()
+endif()
+
 # CLI11, toml++ and xxHash are header-only and found by their headers.
 foreach(header CLI/CLI.hpp toml++/toml.h xxhash.h)
   string(MAKE_C_IDENTIFIER "DRENCH_${header}" variable)

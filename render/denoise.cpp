@@ -261,6 +261,16 @@ void smooth_variance(NoisyPicture& picture) {
 
 }  // namespace
 
+NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels) {
+  NoisyPicture picture;
+  for (const PixelSum& pixel : pixels)
+    for (int c = 0; c < 3; ++c) {
+      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
+      picture.variance[c].push_back(2 * pixel.variance(c));
+    }
+  return picture;
+}
+
 std::vector<Plane> denoise(NoisyPicture picture) {
   tame_outliers(picture);
   smooth_variance(picture);

@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "render/pixel_sum.h"
+
 namespace drench {
 
 /// A picture as two independent halves of its samples. Planes are row-major from the top left,
@@ -17,6 +19,9 @@ struct NoisyPicture {
   std::vector<Plane> feature;           // guides, about 1 in size
   std::vector<Plane> feature_variance;  // of their means
 };
+
+/// Halves and variances of a picture; its size and guides are still to be given.
+NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 
 /// First-order regression on the features, in a window of 15 x 15 pixels around each, with weights
 /// by which patches look alike in the other half: Bitterli et al. 2016, "Nonlinearly Weighted

@@ -22,6 +22,7 @@ struct Head {
 void archive(CheckpointArchive& file, Sums& sums) {
   file.column(sums.pixel);
   sums.layers.archive(file);
+  sums.plate.archive(file);
   sums.plan.archive(file);
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "render/layers.h"
+#include "render/matte.h"
 #include "render/options.h"
 #include "render/sample_plan.h"
 
@@ -13,7 +14,18 @@ namespace drench {
 struct Sums {
   std::vector<PixelSum> pixel;
   LayerFilm layers;
+  PlateFilm plate;
   SamplePlan plan;
+  std::vector<PixelSum> without_plate{};  // with catchers, once settled
+
+  /// Takes what shadow catchers leave to the plate out of the picture.
+  void settle() {
+    if (plate.has_catchers()) without_plate = plate.beauty(pixel);
+  }
+  /// Sums of the beauty.
+  const std::vector<PixelSum>& beauty() const {
+    return plate.has_catchers() ? without_plate : pixel;
+  }
 };
 
 /// @throws Error if the file cannot be written.

@@ -4,6 +4,7 @@
 // surface were level, with a spread for what waves do. An aimed ray is weighed by the density of
 // the mixture, so the mean is that of unguided sampling whatever the surface looks like.
 
+#include "render/bsdf.h"
 #include "render/lights.h"
 
 namespace drench {
@@ -38,5 +39,28 @@ class RefractedLightGuide {
   float ior_;
   size_t first_;  // light to aim at
 };
+
+/// A direction drawn from a surface, or with probability `share` from the guide. Its density is the
+/// surface's own in either case, its weight that of the mixture.
+template <class Bsdf>
+Scatter sample_mixed(const Bsdf& bsdf, const RefractedLightGuide& guide, float share,
+                     const V3f& position, float u, const V2f& uv) {
+  Scatter out;
+  float guide_pdf = 0;
+  if (u < share) {
+    const DirectionSample aimed = guide.sample(position, u / share, uv);
+    if (!(aimed.pdf > 0)) return {};
+    out.direction = aimed.direction;
+    guide_pdf = aimed.pdf;
+  } else {
+    out = bsdf.sample(uv);
+    if (!(out.pdf > 0)) return {};
+    guide_pdf = guide.pdf(position, out.direction);
+  }
+  const V3f value = bsdf.value(out.direction, out.pdf);
+  if (!(out.pdf > 0)) return {};
+  out.weight = value * (1 / (share * guide_pdf + (1 - share) * out.pdf));
+  return out;
+}
 
 }  // namespace drench

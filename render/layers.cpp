@@ -32,9 +32,11 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
       fps_(shot.timeline.fps),
       shutter_open_(shutter(shot, shot.camera.shutter_open)),
       shutter_frames_(shutter(shot, shot.camera.shutter_close) - shutter_open_),
-      frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height) {
+      frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height),
+      catchers_(scene.has_catchers()) {
   const size_t pixels = size_t(width_) * height_;
   if (records()) pixel_.resize(pixels);
+  if (want_.opacity) background_.resize(pixels, Imath::V3d(0));
   for (size_t k = 0; k < scene.object_count(); ++k) {
     objects_.add(scene.object(uint32_t(k)).name);
     materials_.add(scene.object(uint32_t(k)).material_name);
@@ -44,6 +46,7 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
     groups_ = scene.lights().groups();
     groups_.push_back("caustics");
     light_.resize(pixels * groups_.size(), Imath::V3d(0));
+    if (catchers_) caught_ = light_;
     shown_groups_ = groups_.size() - (shot.render.photons > 0 ? 0 : 1);
   }
   objects_.add("ground");
@@ -51,19 +54,23 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
 }
 
 bool LayerFilm::records() const {
-  return features_ || want_.albedo || want_.normal || want_.depth || want_.position ||
-         want_.motion || want_.light_groups || want_.cryptomatte;
+  return features_ || catchers_ || want_.opacity || want_.albedo || want_.normal || want_.depth ||
+         want_.position || want_.motion || want_.light_groups || want_.cryptomatte;
 }
 
 PathRecord LayerFilm::blank() const {
   PathRecord record;
   record.light.resize(groups_.size());
+  if (catchers_) record.matte.light.resize(groups_.size());
   clear(record);
   return record;
 }
 
 void LayerFilm::clear(PathRecord& record) const {
-  std::fill(record.light.begin(), record.light.end(), V3f(0));
+  for (std::vector<V3f>* light : {&record.light, &record.matte.light})
+    std::fill(light->begin(), light->end(), V3f(0));
+  record.matte.background = record.matte.catcher = record.matte.with = record.matte.without =
+      V3f(0);
   record.first = Hit{};
   record.albedo = record.normal = V3f(0);
   record.shaded = false;
@@ -90,9 +97,27 @@ V3f LayerFilm::motion_of(const PathRecord& record) const {
   return {to.x - from.x, from.y - to.y, dot(now + per_frame - next.position, next.forward) - depth};
 }
 
+void LayerFilm::add_light(size_t pixel, const PathRecord& record) {
+  const size_t groups = record.light.size();
+  for (size_t g = 0; g < groups; ++g) light_[pixel * groups + g] += Imath::V3d(record.light[g]);
+  for (size_t g = 0; g < record.matte.light.size(); ++g)
+    caught_[pixel * groups + g] += Imath::V3d(record.matte.light[g]);
+}
+
+/// A group's part of the beauty: of what catchers have of it the share that the beauty has of all.
+Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const {
+  const size_t k = pixel * groups_.size() + group;
+  Imath::V3d sum = light_[k];
+  if (caught_.empty()) return sum / samples;
+  const V3f with = plate.with(pixel), added = plate.added(pixel);
+  for (int c = 0; c < 3; ++c)
+    if (with[c] > 0) sum[c] -= caught_[k][c] * (1 - double(added[c]) / with[c]);
+  return sum / samples;
+}
+
 void LayerFilm::add(size_t pixel, const PathRecord& record) {
-  for (size_t g = 0; g < record.light.size(); ++g)
-    light_[pixel * record.light.size() + g] += Imath::V3d(record.light[g]);
+  add_light(pixel, record);
+  if (!background_.empty()) background_[pixel] += Imath::V3d(record.matte.background);
   Pixel& p = pixel_[pixel];
   p.albedo += record.albedo;
   p.albedo2 += record.albedo * record.albedo;
@@ -120,7 +145,8 @@ FilmLayer LayerFilm::layer(const std::string& name, const std::vector<std::strin
           std::vector<float>(channels.size() * size_t(width_) * height_)};
 }
 
-std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels) const {
+std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
+                                         const PlateFilm& plate) const {
   using enum FilmLayer::Precision;
   std::vector<FilmLayer> out;
   const std::vector<std::string> rgb{"R", "G", "B"}, xyz{"X", "Y", "Z"};
@@ -147,7 +173,11 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels) co
     fill("samples", {"Y"}, full, [&](size_t p) { return std::array{pixels[p].samples()}; });
   for (size_t g = 0; g < shown_groups_; ++g)
     fill("light_" + groups_[g], rgb, half,
-         [&](size_t p) { return light_[p * groups_.size() + g] / pixels[p].samples(); });
+         [&](size_t p) { return light(p, g, pixels[p].samples(), plate); });
+  if (want_.opacity)
+    fill("opacity", rgb, half, [&](size_t p) {
+      return Imath::V3d(1) - background_[p] / pixels[p].samples() - Imath::V3d(plate.seen(p));
+    });
   if (want_.cryptomatte) {
     add_matte(out, "CryptoObject", objects_, &Pixel::object, pixels);
     add_matte(out, "CryptoMaterial", materials_, &Pixel::material, pixels);

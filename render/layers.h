@@ -38,9 +38,11 @@ class LayerFilm {
   void add(size_t pixel, const PathRecord& record);
   void archive(CheckpointArchive& file);
   /// The finished layers, those that were asked for.
-  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels) const;
+  std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels, const PlateFilm& plate) const;
   /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
   void add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const;
+  /// Whether a camera sample of a pixel met the ground or an object that is no matte.
+  bool saw_something(size_t pixel) const { return pixel_[pixel].nearest.depth < kNothing; }
   /// Header entries that belong to them.
   std::vector<std::pair<std::string, std::string>> header() const;
 
@@ -60,6 +62,8 @@ class LayerFilm {
   };
   static constexpr float kNothing = 1e10f;
 
+  void add_light(size_t pixel, const PathRecord& record);
+  Imath::V3d light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const;
   V3f motion_of(const PathRecord& record) const;
   FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
                   FilmLayer::Precision precision) const;
@@ -76,7 +80,10 @@ class LayerFilm {
   ShutterCamera frame_camera_;  // at this frame and the next
   NameIndex objects_, materials_;
   std::vector<Pixel> pixel_;
-  std::vector<Imath::V3d> light_;  // by pixel, then group
+  std::vector<Imath::V3d> light_;       // by pixel, then group
+  std::vector<Imath::V3d> caught_;      // that of shadow catchers in it; empty without any
+  std::vector<Imath::V3d> background_;  // shares of light from it; empty: not asked for
+  bool catchers_;
 };
 
 }  // namespace drench

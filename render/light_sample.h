@@ -12,6 +12,7 @@ struct LightSample {
   V3f radiance;        // W/(sr m^2)
   float pdf = 0;       // per steradian, with the choice of the light; 0: no sample
   uint32_t group = 0;
+  int mesh = -1;  // which of the objects that shine, if it is one
 };
 
 }  // namespace drench

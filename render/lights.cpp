@@ -276,6 +276,7 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float time, floa
   } else if (chosen < environment_index()) {
     out = meshes_[chosen - lamps()].sample(from, time, u);
     out.group = mesh_group_[chosen - lamps()];
+    out.mesh = int(chosen - lamps());
   } else {
     const DirectionSample d = environment_->sample(u);
     out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf, environment_group_};

@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "render/bsdf_cloth.h"
 #include "render/bsdf_coated.h"
@@ -18,19 +20,13 @@
 #include "render/bsdf_rough.h"
 #include "render/fabric.h"
 #include "render/guide.h"
-#include "render/path_state.h"
+#include "render/path_film.h"
 
 namespace drench {
 
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Vertices before roulette may end a path: few are worth ending that may still leave the water for
-/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
-/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
-/// high because the few that last would otherwise come out of a glass as bright dots.
-constexpr int kRouletteStart = 10, kLongPath = 64;
-constexpr float kLongSurvival = 0.99f;
 
 template <unsigned features>
 class PathTracer {
@@ -38,11 +34,12 @@ class PathTracer {
   static constexpr bool kWater = features & kDielectric;
   static constexpr bool kLights = features & kSampledLights;
   static constexpr bool kFacets = features & kGlossy;
+  static constexpr bool kPlate = features & kMattes;
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
              uint64_t& rays, PathRecord* record)
-      : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays), record_(record) {}
+      : scene_(scene), settings_(settings), sampler_(sampler), rays_(rays), film_(record) {}
 
   PathSample run(const V2f& film) {
     const float time = kMoving ? scene_.camera().time(sampler_.one(kTimeDimension), film) : 0.f;
@@ -52,13 +49,20 @@ class PathTracer {
         scene_.camera().template ray<kMoving, (features & kThinLens) != 0>(film, lens, time);
     state.vertex = state.ray.origin;
     if (kWater) state.in = settings_.camera_in;
+    if constexpr (kPlate) {
+      state.clear = true;
+      film_.plate.view = state.ray.direction;
+    }
     walk(state);
     while (kWater && has_pending_) {
       has_pending_ = false;
       PathState next = pending_;
+      if constexpr (kPlate) film_.plate.on_catcher = false;
       walk(next);
     }
-    return {radiance_, alpha_};
+    if constexpr (kPlate)
+      if (film_.plate.caught) walk_plate();
+    return film_.sample();
   }
 
  private:
@@ -66,7 +70,8 @@ class PathTracer {
     for (bool going = true; going; ++state.vertices) {
       if (!finite(state.ray.direction) || !finite(state.ray.origin)) return;
       const Hit hit = scene_.intersect(
-          state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent);
+          state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent,
+          film_.world());
       ++rays_;
       if (hit.kind == Hit::Kind::nothing || hit.kind == Hit::Kind::light) {
         if constexpr (kWater)
@@ -96,13 +101,27 @@ class PathTracer {
       if (!outwards) state.in &= ~surface.body;
       absorb(state, hit.distance);
       if (outwards) state.in |= surface.body;
+    }
+    if constexpr (kPlate)
+      if (film_.sees_plate(state)) {
+        const Matte matte = scene_.matte(hit);
+        if (matte == Matte::holdout) return film_.show_plate(state);
+        if (matte == Matte::shadow_catcher && film_.records())
+          film_.start_catching(state, surface, hit, scene_.plate_bodies());
+      }
+    if constexpr (kWater) {
       if (surface.body) {
         if (inside_higher_body(state, surface)) return true;
-        record_first(state, surface, hit);
+        film_.record_first(state, surface, hit);
         return scatter_interface(state, surface);
       }
     }
-    record_first(state, surface, hit);
+    if constexpr (kPlate) state.clear = false;
+    film_.record_first(state, surface, hit);
+    return scatter_surface(state, surface, hit);
+  }
+
+  bool scatter_surface(PathState& state, const Surface& surface, const Hit& hit) {
     if constexpr (kLights)
       if (surface.light >= 0) add_own_light(state, surface, hit.distance);
     if constexpr (kFacets) {
@@ -117,6 +136,15 @@ class PathTracer {
     return scatter_cloth(state, surface);
   }
 
+  /// From the catcher on by the same numbers, in the plate's world.
+  void walk_plate() {
+    film_.plate.world = World::plate;
+    PathState state = film_.plate.start;
+    if (!scatter_surface(state, film_.plate.surface, film_.plate.hit) || !survives(state)) return;
+    ++state.vertices;
+    walk(state);
+  }
+
   /// Goes on through a surface that divides nothing, because a body of higher priority is there.
   bool inside_higher_body(PathState& state, const Surface& surface) {
     const Bodies beyond = state.in ^ surface.body;
@@ -124,28 +152,6 @@ class PathTracer {
     state.in = beyond;
     pass(state, surface);
     return true;
-  }
-
-  void record_first(const PathState& state, const Surface& surface, const Hit& hit) {
-    if (!record_ || state.vertices > 0) return;
-    record_->first = hit;
-    record_->position = surface.position;
-    record_->normal = dot(state.ray.direction, surface.geometric_normal) < 0
-                          ? surface.shading_normal
-                          : -surface.shading_normal;
-    record_->time = state.ray.time;
-  }
-
-  void record_albedo(const V3f& albedo) {
-    if (!record_ || record_->shaded) return;
-    record_->albedo = albedo;
-    record_->shaded = true;
-  }
-
-  /// Adds light to the picture.
-  void deposit(const V3f& found, uint32_t group) {
-    radiance_ += found;
-    if (record_ && !record_->light.empty()) record_->light[group] += found;
   }
 
   /// Between water and the sheet it lies on; what little is between counts as water.
@@ -237,25 +243,31 @@ class PathTracer {
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
+    if constexpr (kPlate)
+      if (settings_.background == Background::clear && hit.kind == Hit::Kind::nothing &&
+          film_.sees_plate(state)) {
+        film_.show_plate(state);
+        return;
+      }
     // What mirrors show of the sky and of lamps counts as white, the sky itself as black.
-    if (state.vertices > 0 || hit.kind == Hit::Kind::light) record_albedo(state.survival);
+    if (state.vertices > 0 || hit.kind == Hit::Kind::light) film_.record_albedo(state.survival);
     if (hit.kind == Hit::Kind::light) {
       if (left_to_photons(state)) return;
       const float pdf = kLights && state.bsdf_pdf > 0
                             ? lights.shape_pdf(int(hit.index), state.vertex, direction,
                                                flown(state, hit.distance))
                             : 0.f;
-      deposit(
+      film_.deposit(
           state.throughput * lights.shape_radiance(int(hit.index)) * emission_weight(state, pdf),
           lights.shape_group(hit.index));
     } else {
-      if (state.vertices == 0 && !lights.has_environment()) alpha_ = 0;
-      lights.for_each_infinite(state.vertex, direction, state.bsdf_pdf > 0,
-                               left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
-                               [&](const V3f& radiance, float pdf, uint32_t group) {
-                                 deposit(state.throughput * radiance * emission_weight(state, pdf),
-                                         group);
-                               });
+      if (state.vertices == 0 && !lights.has_environment()) film_.show_nothing();
+      lights.for_each_infinite(
+          state.vertex, direction, state.bsdf_pdf > 0,
+          left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
+          [&](const V3f& radiance, float pdf, uint32_t group) {
+            film_.deposit(state.throughput * radiance * emission_weight(state, pdf), group);
+          });
     }
   }
 
@@ -268,8 +280,8 @@ class PathTracer {
                           ? lights.mesh_pdf(surface.light, surface.triangle, state.vertex,
                                             state.ray.time, flown(state, distance), facing)
                           : 0.f;
-    deposit(state.throughput * surface.material->emission * emission_weight(state, pdf),
-            lights.mesh_group(surface.light));
+    film_.deposit(state.throughput * surface.material->emission * emission_weight(state, pdf),
+                  lights.mesh_group(surface.light));
   }
 
   /// Whether lights are sampled from a point in these bodies: light from outside reaches it only
@@ -289,10 +301,11 @@ class PathTracer {
 
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
+    if constexpr (kPlate) state.clear &= settings_.refraction_alpha == RefractionAlpha::transparent;
     const float eta = scene_.medium(state.in ^ surface.body).ior / scene_.medium(state.in).ior;
     if constexpr (kFacets)
       if (surface.material->alpha > 0) {
-        state.has_photons = false;  // they pass smooth bodies only
+        state.has_photons = state.clear = false;  // photons pass smooth bodies only
         const AlbedoTable* albedo = scene_.interface_albedo(surface, state.in);
         if (albedo) return scatter_rough(state, surface, eta, *albedo);
       }
@@ -303,12 +316,16 @@ class PathTracer {
       split = split_at_interface(d, flat, eta);
     state.bsdf_pdf = 0;
     ++state.interfaces;
+    // Only mirrors that are within a body which the path has entered.
+    const bool clear_mirror =
+        kPlate && state.clear && (state.in & ~settings_.camera_in & surface.body) != 0;
     bool reflect = split.reflectance >= 1;
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
       pending_ = state;
       pending_.throughput *= split.reflectance;
       pending_.survival *= split.reflectance;
       pending_.branch = 1;
+      pending_.clear = clear_mirror;
       ++pending_.vertices;
       depart(pending_, surface, split.reflected);
       has_pending_ = true;
@@ -318,6 +335,7 @@ class PathTracer {
       reflect = number(state, kScatterSide) < split.reflectance;
     }
     depart(state, surface, reflect ? split.reflected : split.refracted);
+    if (reflect) state.clear = clear_mirror;
     if (!reflect) state.in ^= surface.body;
     return true;
   }
@@ -327,7 +345,7 @@ class PathTracer {
     const RoughBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
                          surface.material->alpha, eta, albedo);
     const Bodies beyond = state.in ^ surface.body;
-    record_albedo(state.survival);
+    film_.record_albedo(state.survival);
     add_direct(state, surface, beyond, bsdf);
     const Scatter next = bsdf.sample(point(state, kScatterDirection), number(state, kScatterSide));
     return follow(state, surface, next, bsdf.through(next.direction) ? beyond : state.in);
@@ -342,7 +360,7 @@ class PathTracer {
     state.has_photons = false;
     add_direct(state, surface, state.in, bsdf);
     state.survival *= bsdf.albedo();
-    if (material.alpha > 0) record_albedo(state.survival);  // else it shows other things
+    if (material.alpha > 0) film_.record_albedo(state.survival);  // else it shows other things
     return follow(state, surface, bsdf.sample(point(state, kScatterDirection)), state.in);
   }
 
@@ -356,7 +374,7 @@ class PathTracer {
                           scene_.coat_albedo(material, state.in));
     const CoatLobe coat = bsdf.coat();
     const CoatedBase base = bsdf.base();
-    const bool photons = kWater && settings_.photons && !surface.small;
+    const bool photons = gathers_photons(surface);
     if (photons) add_caustics(state, surface, base);
     add_direct(state, surface, state.in, coat, base);
     const bool follow_coat = number(state, kScatterSide) < bsdf.coat_share();
@@ -364,7 +382,7 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = photons && !follow_coat;
     state.survival *= bsdf.albedo();
-    record_albedo(state.survival);
+    film_.record_albedo(state.survival);
     return follow(state, surface, follow_coat ? coat.sample(u) : base.sample(u), state.in);
   }
 
@@ -383,10 +401,10 @@ class PathTracer {
     const ShadingMaterial& material = *surface.material;
     const ClothBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
                          material.reflectance_at(surface.uv), material.transmittance);
-    record_albedo(state.survival * bsdf.albedo());
+    film_.record_albedo(state.survival * bsdf.albedo());
     if (bsdf.black()) return false;
     state.interfaces = 0;
-    state.has_photons = kWater && settings_.photons && !surface.small;
+    state.has_photons = gathers_photons(surface);
     if (state.has_photons) add_caustics(state, surface, bsdf);
     add_direct(state, surface, state.in, bsdf);
     const Scatter next = sample_scatter(state, surface, bsdf);
@@ -399,8 +417,8 @@ class PathTracer {
     if (++state.diffuse > settings_.depth) return false;
     const FabricBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
                           fabric_at(scene_, surface, hit, state.ray.time, wetness, state.in));
-    record_albedo(state.survival * bsdf.albedo());
-    const bool photons = kWater && settings_.photons && !surface.small;
+    film_.record_albedo(state.survival * bsdf.albedo());
+    const bool photons = gathers_photons(surface);
     if (photons) add_caustics(state, surface, bsdf.soft());
     add_direct(state, surface, state.in, bsdf.soft(), bsdf.glints());
     const bool glint = number(state, kScatterSide) < bsdf.glint_share();
@@ -444,23 +462,11 @@ class PathTracer {
                                     state.has_photons ? Aim::meshes : Aim::all);
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(uv);
-    const float u = number(state, kScatterSide);
-    Scatter out;
-    float guide_pdf = 0;
-    if (u < share) {
-      const DirectionSample aimed = guide.sample(surface.position, u / share, uv);
-      if (!(aimed.pdf > 0)) return {};
-      out.direction = aimed.direction;
-      guide_pdf = aimed.pdf;
-    } else {
-      out = bsdf.sample(uv);
-      if (!(out.pdf > 0)) return {};
-      guide_pdf = guide.pdf(surface.position, out.direction);
-    }
-    const V3f value = bsdf.value(out.direction, out.pdf);
-    if (!(out.pdf > 0)) return {};
-    out.weight = value * (1 / (share * guide_pdf + (1 - share) * out.pdf));
-    return out;
+    return sample_mixed(bsdf, guide, share, surface.position, number(state, kScatterSide), uv);
+  }
+
+  bool gathers_photons(const Surface& surface) const {
+    return kWater && settings_.photons && !surface.small && film_.world() == World::whole;
   }
 
   template <class Bsdf>
@@ -470,7 +476,7 @@ class PathTracer {
                                      [&](const Photon& photon, float share) {
                                        bsdf.receive(light, -photon.direction, photon.power * share);
                                      });
-    deposit(state.throughput * bsdf.radiance(light), scene_.lights().caustics_group());
+    film_.deposit(state.throughput * bsdf.radiance(light), scene_.lights().caustics_group());
   }
 
   /// Light from a sampled light by way of each lobe. @param beyond  bodies that the surface's other
@@ -483,6 +489,7 @@ class PathTracer {
     const LightSample light = scene_.lights().sample(
         surface.position, state.ray.time, number(state, kLightChoice), point(state, kLightPoint));
     if (!(light.pdf > 0)) return;
+    if (film_.world() == World::plate && !scene_.in_plate(light)) return;
     Bodies in = state.in;
     if constexpr (kFacets) {
       const V3f& n = surface.geometric_normal;
@@ -503,9 +510,9 @@ class PathTracer {
     const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
     ++rays_;
     if constexpr (kFacets) {
-      found *= scene_.transmitted(shadow, light.distance);
+      found *= scene_.transmitted(shadow, light.distance, film_.world());
       if (is_black(found)) return;
-    } else if (scene_.occluded(shadow, light.distance)) {
+    } else if (scene_.occluded(shadow, light.distance, film_.world())) {
       return;
     }
     if constexpr (kWater)
@@ -513,7 +520,7 @@ class PathTracer {
         const V3f& a = scene_.medium(in).absorption;
         for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
       }
-    if (finite(found)) deposit(found, light.group);
+    if (finite(found)) film_.deposit(found, light.group);
   }
 
   bool survives(PathState& state) {
@@ -542,20 +549,24 @@ class PathTracer {
   const PathSettings& settings_;
   const Sampler& sampler_;
   uint64_t& rays_;
-  PathRecord* record_;
-  V3f radiance_{0, 0, 0};
-  float alpha_ = 1;
+  PathFilm<kPlate> film_;
   PathState pending_;
   bool has_pending_ = false;
 };
+
+void clear_light(PathRecord& record) {
+  for (std::vector<V3f>* light : {&record.light, &record.matte.light})
+    std::fill(light->begin(), light->end(), V3f(0));
+  record.matte.with = record.matte.without = V3f(0);
+}
 
 template <unsigned features>
 PathSample trace(const Scene& scene, const PathSettings& settings, const Sampler& sampler,
                  const V2f& film, uint64_t& rays, PathRecord* record) {
   PathSample sample = PathTracer<features>(scene, settings, sampler, rays, record).run(film);
-  if (!finite(sample.radiance)) {
+  if (!finite(sample.radiance) || (record && !finite(record->matte.without))) {
     sample.radiance = V3f(0);
-    if (record) std::fill(record->light.begin(), record->light.end(), V3f(0));
+    if (record) clear_light(*record);
   }
   return sample;
 }
@@ -569,6 +580,7 @@ constexpr std::array<PathFunction, sizeof...(features)> table(std::index_sequenc
 
 PathFunction path_function(unsigned features) {
   static constexpr auto functions = table(std::make_index_sequence<kFeatureCount>{});
+  if (features & kMattes) return &trace<kMattes | (kFeatureCount - 1)>;
   return functions[features % kFeatureCount];
 }
 

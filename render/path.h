@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/matte.h"
 #include "render/photons.h"
 
 namespace drench {
@@ -15,7 +16,8 @@ enum Feature : unsigned {
   kSampledLights = 4,  // lights are sampled, with multiple importance sampling
   kThinLens = 8,
   kGlossy = 16,        // metal, coats, rough dielectrics, fabric
-  kFeatureCount = 32,  // combinations
+  kFeatureCount = 32,  // combinations of these
+  kMattes = 32,        // a plate goes behind; such frames have all the others switched on
 };
 
 /// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.
@@ -23,7 +25,7 @@ enum CameraDimension : uint32_t { kFilterDimension, kLensDimension, kTimeDimensi
 
 struct PathSample {
   V3f radiance;     // W/(sr m^2)
-  float alpha = 1;  // 0 where the camera sees nothing at all
+  float alpha = 1;  // less where the camera sees the background or a holdout
 };
 
 /// What a camera sample met, for the layers of a film.
@@ -34,6 +36,7 @@ struct PathRecord {
   float time = 0;          // in the shutter
   V3f albedo;              // of the first diffuse surface, through water and glass
   bool shaded = false;     // whether there was one
+  MatteRecord matte;
 };
 
 struct PathSettings {
@@ -42,11 +45,13 @@ struct PathSettings {
   FirstInterface first_interface = FirstInterface::one;
   WaterGuide water_guide = WaterGuide::on;
   Bodies camera_in = 0;
+  Background background = Background::sky;
+  RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
   const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
 };
 
 /// One camera sample. `film` in pixels; `rays` counts rays traced; `record`, unless null, is
-/// filled.
+/// filled; without it shadow catchers are seen as any object.
 using PathFunction = PathSample (*)(const Scene&, const PathSettings&, const Sampler&,
                                     const V2f& film, uint64_t& rays, PathRecord* record);
 

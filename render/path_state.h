@@ -1,11 +1,16 @@
 #pragma once
-// A path between two of its vertices, and the random numbers that it takes.
-
-#include <cstdint>
+// A path on its way, for path.cpp.
 
 #include "render/scene.h"
 
 namespace drench {
+
+/// Vertices before roulette may end a path: few are worth ending that may still leave the water for
+/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
+/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
+/// high because the few that last would otherwise come out of a glass as bright dots.
+inline constexpr int kRouletteStart = 10, kLongPath = 64;
+inline constexpr float kLongSurvival = 0.99f;
 
 /// Sampling dimensions after those of the camera: a block for every vertex of a branch.
 enum VertexDimension : uint32_t {
@@ -39,7 +44,24 @@ struct PathState {
   bool dry_gap = false;
   int interfaces = 0;        // since the last diffuse surface
   bool has_photons = false;  // that surface, and nothing but smooth bodies since
+  bool clear = false;        // nothing but smooth bodies on the way, none of them a mirror
   uint32_t branch = 0;
+};
+
+/// Cosine of the most that smooth bodies may bend the view for a plate to stand for what is seen
+/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate is another
+/// place; drops show the sky there.
+inline constexpr float kMostBend = 0.9659258f;
+
+/// What a path must remember that may meet the plate.
+struct PlateWalk {
+  V3f view;                 // where the camera looks along this sample
+  bool on_catcher = false;  // what is found comes from a shadow catcher
+  bool caught = false;      // there was one:
+  PathState start;          // where the walk in the plate's world begins
+  Surface surface;
+  Hit hit;
+  World world = World::whole;  // now
 };
 
 }  // namespace drench

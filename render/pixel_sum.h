@@ -36,6 +36,13 @@ class PixelSum {
     }
     return float(square / (whole_ - 1) / (double(size_) * samples_));
   }
+  /// This, less a share of the colours that the same samples add up to elsewhere.
+  PixelSum less(const PixelSum& other, const V3f& share) const {
+    PixelSum out = *this;
+    for (int c = 0; c < 3; ++c) out.sum_[c] -= double(share[c]) * other.sum_[c];
+    for (int b = 0; b < kMost; ++b) out.batch_[b] -= other.batch_[b] * share;
+    return out;
+  }
   /// Means of a colour by every second batch: two pictures of independent errors. From two batches
   /// on.
   float half(int which, int channel) const {

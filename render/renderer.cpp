@@ -115,6 +115,7 @@ uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
         add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
         if (!recorded) continue;
         sums.layers.add(pixel, record);
+        sums.plate.add(pixel, record.matte);
         sums.layers.clear(record);
       }
     }
@@ -158,10 +159,12 @@ void render_passes(const Job& job, const FrameCheckpoint& checkpoint, Sums& sums
     while (more) {
       progress.expect(sums.plan.expected());
       const Clock::time_point until = keeps ? Clock::now() + every : Clock::time_point::max();
-      if (render_tiles(job, sums, until, rays, progress))
-        more = sums.plan.next(sums.pixel);
-      else
+      if (!render_tiles(job, sums, until, rays, progress)) {
         write_checkpoint(checkpoint, sums);
+        continue;
+      }
+      sums.settle();
+      more = sums.plan.next(sums.beauty());
     }
   } catch (...) {
     if (keeps) write_checkpoint(checkpoint, sums);
@@ -182,14 +185,9 @@ FilmWindow window_of(const RenderSettings& r) {
 
 /// Puts the denoised beauty in the place of the noisy one, which becomes a layer.
 void denoise_film(const Sums& sums, Film& film) {
-  NoisyPicture picture;
+  NoisyPicture picture = noisy_picture(sums.beauty());
   picture.width = film.width;
   picture.height = film.height;
-  for (const PixelSum& pixel : sums.pixel)
-    for (int c = 0; c < 3; ++c) {
-      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
-      picture.variance[c].push_back(2 * pixel.variance(c));
-    }
   sums.layers.add_features(picture, sums.pixel);
   const std::vector<NoisyPicture::Plane> clean = denoise(std::move(picture));
   FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
@@ -201,13 +199,38 @@ void denoise_film(const Sums& sums, Film& film) {
   film.layer.push_back(std::move(noisy));
 }
 
+/// The same for what makes alpha, before anything is made of it.
+void denoise_plate(const Job& job, Sums& sums) {
+  const auto clean = [&](NoisyPicture picture) {
+    sums.layers.add_features(picture, sums.pixel);
+    return denoise(std::move(picture));
+  };
+  if (sums.plate.has_catchers())
+    sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)));
+  if (sums.plate.has_shares())
+    sums.plate.smooth_shares(clean(sums.plate.shares(job.width, job.height)),
+                             [&](size_t p) { return sums.layers.saw_something(p); });
+  sums.settle();
+}
+
 Film developed(const Job& job, const Sums& sums) {
+  const std::vector<PixelSum>& pixels = sums.beauty();
   Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
-  for (size_t p = 0; p < sums.pixel.size(); ++p)
-    for (int c = 0; c < 4; ++c) film.rgba[4 * p + size_t(c)] = sums.pixel[p].mean(c);
-  film.layer = sums.layers.finish(sums.pixel);
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
+    const V3f seen = sums.plate.seen(p);
+    const float alpha = pixels[p].mean(3) - (seen.x + seen.y + seen.z) / 3;
+    film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
+  }
+  film.layer = sums.layers.finish(pixels, sums.plate);
   film.header = sums.layers.header();
   return film;
+}
+
+PlateFilm plate_film(const Shot& shot, const Scene& scene, size_t pixels) {
+  const bool see_through = shot.render.refraction_alpha == RefractionAlpha::transparent &&
+                           (scene.features() & kMattes) && !scene.bodies().empty();
+  return {scene.has_catchers() ? pixels : 0, shot.render.denoise && see_through ? pixels : 0};
 }
 
 }  // namespace
@@ -240,6 +263,8 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.estimator = options.estimator;
   path.first_interface = options.first_interface;
   path.water_guide = options.water_guide;
+  path.background = shot.render.background;
+  path.refraction_alpha = shot.render.refraction_alpha;
   path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
   uint64_t photon_rays = 0;
@@ -262,14 +287,17 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                 whole ? shot.render.height : shot.render.crop_max.y - window.y};
   Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
             LayerFilm(shot, frame, scene, job.width, job.height),
+            plate_film(shot, scene, size_t(job.width) * job.height),
             SamplePlan(job.width, job.height, shot.render.samples, shot.render.error)};
   Progress report(progress);
   uint64_t rays = photon_rays;
   render_passes(job, options.checkpoint, sums, rays, report);
+  if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, film);
   if (stats) {
-    *stats = {report.samples(), rays, picture_error(sums.pixel), process_cpu_seconds() - cpu_start};
+    *stats = {report.samples(), rays, picture_error(sums.beauty()),
+              process_cpu_seconds() - cpu_start};
   }
   return film;
 }

@@ -68,8 +68,6 @@ enum class Primaries { converted, as_they_are };  // to ACEScg; as_they_are: wha
 /// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.
 Film read_exr(const std::filesystem::path& path, Primaries primaries = Primaries::converted);
 
-/// Display-referred 8-bit sRGB of a film through the built-in view transform; 3 x width x height.
-std::vector<uint8_t> view_transform(const Film& film);
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,
                       const std::vector<uint8_t>& rgb);
 

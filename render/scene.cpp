@@ -15,81 +15,11 @@ namespace drench {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kVisibleMotion = 0.1f;  // pixels
 /// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
 constexpr float kRelativeError = 16 * 0x1p-24f;
 constexpr float kSharedError = 2 * 0x1p-24f;
-/// Of foam: froth scatters light many times and absorbs next to none.
-constexpr float kFoamReflectance = 0.9f;
 /// Indices whose ratio is so near 1 have no facets that bend light.
 constexpr float kSameIndex = 1e-3f;
-
-void check_embree(RTCDevice device) {
-  const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_OUT_OF_MEMORY)
-    throw Error(
-        "the scene's ray-tracing structure does not fit into memory; use a coarser surface");
-  if (error != RTC_ERROR_NONE)
-    throw std::runtime_error(fmt::format("Embree reports error {}", int(error)));
-}
-
-void check_mesh(const TriangleMesh& mesh, const std::string& what) {
-  const auto fail = [&](const std::string& why) {
-    throw Error(fmt::format("{}: {}; make the mesh anew", what, why));
-  };
-  const size_t n = mesh.position.size();
-  if (!mesh.velocity.empty() && mesh.velocity.size() != n)
-    fail(fmt::format("{} velocities for {} vertices", mesh.velocity.size(), n));
-  if (!mesh.normal.empty() && mesh.normal.size() != n)
-    fail(fmt::format("{} normals for {} vertices", mesh.normal.size(), n));
-  if (!mesh.uv.empty() && mesh.uv.size() != n)
-    fail(fmt::format("{} texture coordinates for {} vertices", mesh.uv.size(), n));
-  if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
-    fail(fmt::format("{} contacts for {} triangles", mesh.contact.size(), mesh.triangle.size()));
-  for (size_t k = 0; k < n; ++k)
-    if (!finite(mesh.position[k]) || (!mesh.velocity.empty() && !finite(mesh.velocity[k])))
-      fail(fmt::format("vertex {} is not finite", k));
-  for (size_t k = 0; k < mesh.triangle.size(); ++k)
-    if (std::max({mesh.triangle[k].x, mesh.triangle[k].y, mesh.triangle[k].z}) >= n)
-      fail(fmt::format("triangle {} names a vertex beyond the {} there are", k, n));
-}
-
-void check_foam(const FoamFrame& foam) {
-  const size_t n = foam.position.size();
-  if (foam.velocity.size() != n || foam.radius.size() != n)
-    throw Error(fmt::format("foam: {} positions, {} velocities and {} radii; make the foam anew", n,
-                            foam.velocity.size(), foam.radius.size()));
-  for (size_t k = 0; k < n; ++k)
-    if (!finite(foam.position[k]) || !finite(foam.velocity[k]) || !(foam.radius[k] > 0) ||
-        !(foam.radius[k] < kInfinity))
-      throw Error(
-          fmt::format("foam: particle {} is not finite or has no radius; make the foam anew", k));
-}
-
-/// Vertex normals weighted by area.
-std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
-  std::vector<V3f> normal(mesh.position.size(), V3f(0));
-  for (const auto& t : mesh.triangle) {
-    const V3f& a = mesh.position[t.x];
-    const V3f n = cross(mesh.position[t.y] - a, mesh.position[t.z] - a);
-    for (uint32_t v : {t.x, t.y, t.z}) normal[v] += n;
-  }
-  for (V3f& n : normal) n = dot(n, n) > 0 ? normalized(n) : V3f(0, 1, 0);
-  return normal;
-}
-
-/// Of the vertices over the shutter; the last entry is padding.
-Imath::Box3f bounds_of(const SceneObject& object) {
-  Imath::Box3f box;
-  for (const std::vector<V3f>* positions : {&object.position, &object.position_close})
-    for (size_t k = 0; k + 1 < positions->size(); ++k) box.extendBy((*positions)[k]);
-  for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
-    for (const Imath::V4f& s : *spheres) {
-      box.extendBy(V3f(s.x, s.y, s.z) - V3f(s.w));
-      box.extendBy(V3f(s.x, s.y, s.z) + V3f(s.w));
-    }
-  return box;
-}
 
 RTCRay embree_ray(const Ray& ray, float reach) {
   const V3f &o = ray.origin, &d = ray.direction;
@@ -143,6 +73,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     ground_center_ =
         V3f(float(shot.ground.center.x), float(shot.ground.height), float(shot.ground.center.z));
     ground_half_size_ = float(shot.ground.half_size);
+    ground_matte_ = shot.ground.matte;
     ground_material_ = add_material(shot, shot.ground.material);
     if (materials_[ground_material_].type == MaterialType::dielectric)
       throw Error(
@@ -152,14 +83,16 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   }
   const bool has_fluid = !geometry.fluid.triangle.empty();
   if (has_fluid)
-    add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material));
+    add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material),
+               Matte::none);
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
   for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
     if (cloth.mesh.triangle.empty()) continue;
     std::string material = "cotton";
+    Matte matte = Matte::none;
     for (const Cloth& c : shot.cloth)
-      if (c.name == cloth.name) material = c.material;
+      if (c.name == cloth.name) material = c.material, matte = c.matte;
     const uint32_t index = add_material(shot, material);
     if (materials_[index].type == MaterialType::dielectric)
       throw Error(
@@ -167,7 +100,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
                       "surface; use a cloth, diffuse, metal or coated one",
                       cloth.name, material));
     const std::string what = fmt::format("cloth '{}'", cloth.name);
-    add_object(cloth.mesh, cloth.name, what, index);
+    add_object(cloth.mesh, cloth.name, what, index, matte);
     check_yarns(objects_.back(), what);
     add_wetness(objects_.back(), cloth.mesh, what);
   }
@@ -176,7 +109,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   find_bodies(has_fluid);
   find_albedos();
   find_fabrics();
-  find_features();
+  find_features(shot.render.background);
 }
 
 Scene::~Scene() {
@@ -192,10 +125,11 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
 
 void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
   std::string material = "ground";
+  Matte matte = Matte::none;
   for (const Obstacle& o : shot.obstacle)
-    if (o.name == obstacle.name) material = o.material;
+    if (o.name == obstacle.name) material = o.material, matte = o.matte;
   const std::string what = fmt::format("obstacle '{}'", obstacle.name);
-  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material));
+  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material), matte);
   check_yarns(objects_.back(), what);
   add_wetness(objects_.back(), obstacle.mesh, what);
 }
@@ -274,159 +208,7 @@ const AlbedoTable* Scene::interface_albedo(const Surface& surface, Bodies in) co
   return (in & surface.body ? m.albedo_inside : m.albedo_outside)[outside].get();
 }
 
-bool Scene::moves_visibly(const TriangleMesh& mesh) const {
-  if (mesh.velocity.empty() || close_ == open_) return false;
-  const float shutter = float((close_ - open_) / fps_);  // s
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
-  for (const auto& t : mesh.triangle) {
-    const V3f &a = mesh.position[t.x], &b = mesh.position[t.y], &c = mesh.position[t.z];
-    const V3f middle = (a + b + c) / 3;
-    const float reach2 =
-        std::max({(a - middle).length2(), (b - middle).length2(), (c - middle).length2()});
-    const float distance =
-        std::max(0.f, (middle - camera_.open().position).length() - std::sqrt(reach2));
-    const float speed2 = std::max(
-        {mesh.velocity[t.x].length2(), mesh.velocity[t.y].length2(), mesh.velocity[t.z].length2()});
-    if (std::sqrt(speed2) > limit * distance) return true;
-  }
-  return false;
-}
-
-/// Of all that a standing object is built from.
-Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
-                          uint32_t material) const {
-  Hasher hasher;
-  const auto add = [&](const auto& column) {
-    hasher.value(column.size()).bytes(column.data(), column.size() * sizeof(column[0]));
-  };
-  hasher.text(name).text(material_names_[material]);
-  add(mesh.triangle), add(mesh.position), add(mesh.normal), add(mesh.uv), add(mesh.contact);
-  if (layers_.motion) add(mesh.velocity);
-  return hasher.finish();
-}
-
-void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                       uint32_t material) {
-  check_mesh(mesh, what);
-  const bool moves = moves_visibly(mesh);
-  const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);
-  if (std::optional<SceneObject> kept = moves ? std::nullopt : parts_->take(contents)) {
-    kept->material = material;
-    kept->light = -1;
-    kept->body = 0;
-    objects_.push_back(std::move(*kept));
-    return;
-  }
-  SceneObject object;
-  object.contents = contents;
-  object.name = name;
-  object.material_name = material_names_[material];
-  if (layers_.motion) object.velocity = mesh.velocity;
-  object.triangle = mesh.triangle;
-  object.normal = mesh.normal.empty() ? smooth_normals(mesh) : mesh.normal;
-  object.uv = mesh.uv;
-  object.contact = mesh.contact;
-  object.material = material;
-  const auto at = [&](double frames) {
-    std::vector<V3f> moved = mesh.position;
-    const float dt = float(frames / fps_);
-    if (dt != 0 && !mesh.velocity.empty())
-      for (size_t k = 0; k < moved.size(); ++k) moved[k] += mesh.velocity[k] * dt;
-    moved.push_back(V3f(0));
-    return moved;
-  };
-  if (moves) {
-    object.position = at(open_);
-    object.position_close = at(close_);
-  } else {
-    object.position = at(0);
-  }
-  objects_.push_back(std::move(object));
-}
-
-bool Scene::moves_visibly(const FoamFrame& foam) const {
-  const float shutter = float((close_ - open_) / fps_);  // s
-  if (shutter == 0) return false;
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
-  for (size_t k = 0; k < foam.position.size(); ++k) {
-    const float distance = (foam.position[k] - camera_.open().position).length();
-    if (foam.velocity[k].length() > limit * std::max(0.f, distance - foam.radius[k])) return true;
-  }
-  return false;
-}
-
-void Scene::add_foam(const FoamFrame& foam) {
-  check_foam(foam);
-  ShadingMaterial white;
-  white.reflectance = V3f(kFoamReflectance);
-  white.transmittance = white.absorption = V3f(0);
-  materials_.push_back(white);
-  material_names_.push_back("foam");
-  SceneObject object;
-  object.name = object.material_name = "foam";
-  if (layers_.motion) object.velocity = foam.velocity;
-  object.material = uint32_t(materials_.size() - 1);
-  const auto at = [&](double frames) {
-    std::vector<Imath::V4f> spheres;
-    spheres.reserve(foam.position.size());
-    for (size_t k = 0; k < foam.position.size(); ++k) {
-      const V3f p = foam.position[k] + foam.velocity[k] * float(frames / fps_);
-      spheres.emplace_back(p.x, p.y, p.z, foam.radius[k]);
-    }
-    return spheres;
-  };
-  if (moves_visibly(foam)) {
-    object.sphere = at(open_);
-    object.sphere_close = at(close_);
-  } else {
-    object.sphere = at(0);
-  }
-  objects_.push_back(std::move(object));
-}
-
-EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-  const size_t vertices = object.position.size() - 1;
-  rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                             object.position.data(), 0, sizeof(V3f), vertices);
-  if (object.moves())
-    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 1, RTC_FORMAT_FLOAT3,
-                               object.position_close.data(), 0, sizeof(V3f), vertices);
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                             object.triangle.data(), 0, 3 * sizeof(uint32_t),
-                             object.triangle.size());
-  return geometry;
-}
-
-EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
-  rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
-  unsigned step = 0;
-  for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
-    if (!spheres->empty())
-      rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, step++, RTC_FORMAT_FLOAT4,
-                                 spheres->data(), 0, sizeof(Imath::V4f), spheres->size());
-  return geometry;
-}
-
-void Scene::build(SceneObject& object) {
-  if (object.scene) return;  // it was kept
-  object.bounds = bounds_of(object);
-  const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
-  rtcSetGeometryMask(geometry.get(), 0xffffffffu);
-  rtcCommitGeometry(geometry.get());
-  object.scene.reset(rtcNewScene(parts_->device().get()));
-  if (materials_[object.material].type == MaterialType::dielectric)
-    rtcSetSceneFlags(object.scene.get(), RTC_SCENE_FLAG_ROBUST);
-  // High quality would split triangles differently for different thread counts.
-  rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
-  rtcAttachGeometry(object.scene.get(), geometry.get());
-  rtcJoinCommitScene(object.scene.get());
-  check_embree(parts_->device().get());
-}
-
-void Scene::find_features() {
+void Scene::find_features(Background background) {
   bool moving = camera_.moves();
   for (const SceneObject& object : objects_) moving |= object.moves();
   const bool facets =
@@ -436,7 +218,8 @@ void Scene::find_features() {
                           [](const ShadingMaterial& m) { return m.gap > 0; });
   features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
               (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
-              (facets || has_gaps_ ? kGlossy : 0u);
+              (facets || has_gaps_ ? kGlossy : 0u) |
+              (background == Background::clear || has_mattes() ? kMattes : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
@@ -446,10 +229,10 @@ float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
 }
 
-Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
+Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   Hit hit;
   hit.distance = kInfinity;
-  if (has_ground_) {
+  if (has_ground_ && (world == World::whole || ground_matte_ != Matte::none)) {
     hit.distance = ground_distance(ray.origin, ray.direction);
     if (hit.distance < kInfinity) hit.kind = Hit::Kind::ground;
   }
@@ -460,6 +243,7 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   const InverseDirection inverse(ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {
     if (!inverse.meets(objects_[k].bounds, ray.origin, query.ray.tfar)) continue;
+    if (world == World::plate && objects_[k].matte == Matte::none) continue;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree_intersect(objects_[k].scene.get(), query, coherence);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
@@ -469,15 +253,17 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence) const {
   return hit;
 }
 
-bool Scene::occluded(const Ray& ray, float distance, Gaps gaps) const {
+bool Scene::occluded(const Ray& ray, float distance, World world, Gaps gaps) const {
   const float reach = distance * (1 - 1e-4f);
-  if (has_ground_ && ground_distance(ray.origin, ray.direction) < reach) return true;
+  const bool ground = has_ground_ && (world == World::whole || ground_matte_ != Matte::none);
+  if (ground && ground_distance(ray.origin, ray.direction) < reach) return true;
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
   if (objects_.empty()) return false;
   RTCRay query = embree_ray(ray, reach);
   const InverseDirection inverse(ray.direction);
   for (const SceneObject& object : objects_) {
     if (!inverse.meets(object.bounds, ray.origin, reach)) continue;
+    if (world == World::plate && object.matte == Matte::none) continue;
     if (gaps == Gaps::open && materials_[object.material].gap > 0) continue;
     embree_occluded(object.scene.get(), query);
     if (query.tfar < 0) return true;

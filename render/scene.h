@@ -38,8 +38,9 @@ struct SceneObject {
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   std::vector<float> wetness;                    // of cloth, 0 to 1; may be empty
   uint32_t material = 0;
-  int light = -1;       // its number among the meshes that shine
-  Bodies body = 0;      // its bit, if it is a dielectric
+  int light = -1;   // its number among the meshes that shine
+  Bodies body = 0;  // its bit, if it is a dielectric
+  Matte matte = Matte::none;
   Digest contents;      // of what stands; 0 of what moves
   Imath::Box3f bounds;  // over the shutter
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
@@ -56,6 +57,9 @@ struct Hit {
   uint32_t triangle = 0;  // or sphere
   float u = 0, v = 0;     // barycentric weights of vertices 1 and 2
 };
+
+/// What rays meet: all there is, or what the plate shows, holdouts and shadow catchers alone.
+enum class World { whole, plate };
 
 /// A point of a surface.
 struct Surface {
@@ -82,12 +86,13 @@ class Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  Hit intersect(const Ray& ray, Coherence coherence) const;
+  Hit intersect(const Ray& ray, Coherence coherence, World world = World::whole) const;
   enum class Gaps { closed, open };  // open: what has gaps is not there
   /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
-  bool occluded(const Ray& ray, float distance, Gaps gaps = Gaps::closed) const;
+  bool occluded(const Ray& ray, float distance, World world = World::whole,
+                Gaps gaps = Gaps::closed) const;
   /// The share of light that comes along the ray: 0, 1, or what gaps of cloth let through.
-  float transmitted(const Ray& ray, float distance) const;
+  float transmitted(const Ray& ray, float distance, World world = World::whole) const;
   /// Whether the fluid fills a place in these bodies.
   bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
   /// Whether the fluid is where a ray starts that came through a gap of cloth.
@@ -108,6 +113,15 @@ class Scene {
     return *material.albedo_outside[size_t(std::bit_width(in))];
   }
 
+  Matte matte(const Hit& hit) const {
+    return hit.kind == Hit::Kind::object ? objects_[hit.index].matte : ground_matte_;
+  }
+  bool has_catchers() const;
+  /// Bodies of the plate's world.
+  Bodies plate_bodies() const;
+  /// Whether a drawn light is there in the plate's world, too.
+  bool in_plate(const LightSample& light) const;
+
   const ShutterCamera& camera() const { return camera_; }
   const Lights& lights() const { return lights_; }
   const SceneObject& object(uint32_t index) const { return objects_[index]; }
@@ -126,7 +140,7 @@ class Scene {
   void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                  uint32_t material);
+                  uint32_t material, Matte matte);
   void check_yarns(const SceneObject& object, const std::string& what) const;
   void find_fabrics();
   void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
@@ -139,7 +153,8 @@ class Scene {
   Digest contents_of(const TriangleMesh& mesh, const std::string& name, uint32_t material) const;
   EmbreeGeometry triangles_of(const SceneObject& object) const;
   EmbreeGeometry spheres_of(const SceneObject& object) const;
-  void find_features();
+  void find_features(Background background);
+  bool has_mattes() const;
   bool moves_visibly(const TriangleMesh& mesh) const;
   bool moves_visibly(const FoamFrame& foam) const;
   /// The nearest point of one object.
@@ -159,6 +174,7 @@ class Scene {
   V3f ground_center_;
   float ground_half_size_ = 0;
   uint32_t ground_material_ = 0;
+  Matte ground_matte_ = Matte::none;
   std::vector<uint32_t> bodies_;
   std::vector<Medium> medium_{{}};  // air, and each body's
   Bodies fluid_ = 0;

@@ -182,10 +182,20 @@ class PictureChecker : CheckBase {
              fmt::format("ground.material is \"{}\", which has a gap of {}, but there is nothing "
                          "below the ground. Use a material without, or a sheet of cloth",
                          m.name, m.gap));
+    check_catchers();
     check_dark("fluid.material", shot_.fluid.material, "the fluid");
     check_dark("ground.material", shot_.ground.material, "the ground");
     for (size_t i = 0; i < shot_.cloth.size(); ++i)
       check_dark(fmt::format("cloth[{}].material", i), shot_.cloth[i].material, "cloth");
+  }
+
+  void check_catchers() const {
+    for (size_t i = 0; i < shot_.obstacle.size(); ++i) {
+      if (shot_.obstacle[i].matte != Matte::shadow_catcher) continue;
+      check_use(fmt::format("obstacle[{}].material", i), shot_.obstacle[i].material,
+                MaterialType::dielectric, "a shadow catcher",
+                "Use type diffuse, metal or coated, the colour of what the plate shows there");
+    }
   }
 
   void check_dark(const std::string& key, const std::string& name, std::string_view user) const {

@@ -21,6 +21,11 @@ using Imath::V3f;
 
 enum class Interpolation { linear, smooth, step };
 
+/// How the camera sees an object that stands in the filmed plate, too, where it sees it directly;
+/// light, shadows and mirrors know it as any other. holdout: a hole, alpha 0. shadow_catcher: as
+/// nothing but what the other objects do to the light on it (render/matte.h).
+enum class Matte { none, holdout, shadow_catcher };
+
 /// A value over frames; one key is a constant. Frames are film frames and may be fractional.
 template <class T>
 struct Animated {
@@ -163,6 +168,7 @@ struct Cloth {
   Slip slip = Slip::automatic;      // of fluid along it
   double contact_angle_deg = 90;    // of the fluid's surface at it, within the fluid
   std::string material = "cotton";
+  Matte matte = Matte::none;
 };
 
 enum class ObstacleType { plane, box, sphere, mesh };
@@ -184,6 +190,7 @@ struct Obstacle {
   double contact_angle_deg = 90;       // of the fluid's surface at it, within the fluid
   std::string material = "ground";
   bool visible = true;
+  Matte matte = Matte::none;
 };
 
 /// A part of space that takes away the fluid in it. No solid, not drawn.
@@ -322,7 +329,16 @@ struct Ground {
   double half_size = 50;  // m, square around center
   V3d center{0, 0, 0};    // m; y is unused
   std::string material = "ground";
+  Matte matte = Matte::none;
 };
+
+/// What the camera sees where there is nothing; clear: alpha 0, and the sky and suns are seen in
+/// mirrors and by refraction only.
+enum class Background { sky, clear };
+
+/// Of smooth water and glass before a clear background or a matte object; transparent: a plate
+/// shows through, undistorted.
+enum class RefractionAlpha { opaque, transparent };
 
 struct RenderSettings {
   int width = 960, height = 540;       // pixels
@@ -332,6 +348,8 @@ struct RenderSettings {
   bool denoise = false;                // of the beauty, by its layers' help
   int depth = 8;                       // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
+  Background background = Background::sky;
+  RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
   double photons = 0.05;  // of caustics, for each camera sample; 0: caustics by paths alone
   uint32_t seed = 1;
 };
@@ -347,6 +365,13 @@ struct LayerSettings {
   bool samples = false;       // samples.Y, camera samples that the pixel got
   bool light_groups = false;  // light_GROUP.RGB; they sum to the beauty
   bool cryptomatte = false;   // CryptoObject, CryptoMaterial
+  bool opacity = false;       // opacity.RGB, alpha by colour
+};
+
+/// How PNGs and movies show a frame; nothing given: by the built-in transform.
+struct ViewSettings {
+  std::filesystem::path ocio_config;  // empty, with a display or view: $OCIO
+  std::string display, view;          // names in the config; empty: its default
 };
 
 /// A whole shot.
@@ -374,6 +399,7 @@ struct Shot {
   Ground ground;
   RenderSettings render;
   LayerSettings layers;
+  ViewSettings view;
 };
 
 /// What `automatic` and 0 stand for.

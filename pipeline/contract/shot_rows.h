@@ -100,6 +100,11 @@ inline constexpr Limits speed{-1000, 1000};    // m/s
 inline constexpr Limits seeds{0, 4294967295};  // uint32_t
 inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits of ObstacleType
 
+inline constexpr std::string_view matte_text =
+    "how the camera sees it directly, for a render that goes over a plate it is in: as a holdout, "
+    "a "
+    "hole with alpha 0, or as a shadow_catcher, nothing but what the other objects do to its light";
+
 /// Rows of emitters, volumes, sinks and wind: where fluid comes from and goes to, and what drives
 /// it.
 std::vector<Parameter> source_rows();

@@ -169,6 +169,8 @@ std::vector<Parameter> film_rows() {
       row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
       row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
       row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),
+      row<&Ground::matte>("ground", "matte", "", none, render, matte_text)
+          .one_of({"none", "holdout", "shadow_catcher"}),
 
       row<&RenderSettings::width>("render", "width", "pixel", {1, 16384}, render, "of a frame"),
       row<&RenderSettings::height>("render", "height", "pixel", {1, 16384}, render, "of a frame"),
@@ -189,6 +191,15 @@ std::vector<Parameter> film_rows() {
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,
                                         "from the stored velocities, over the shutter"),
+      row<&RenderSettings::background>(
+          "render", "background", "", none, render,
+          "what the camera sees where there is nothing: the sky, or clear, alpha 0, for a plate")
+          .one_of({"sky", "clear"}),
+      row<&RenderSettings::refraction_alpha>(
+          "render", "refraction_alpha", "", none, render,
+          "of smooth water and glass before a clear background or what is matte: opaque, or "
+          "transparent, so that a plate shows through, undistorted")
+          .one_of({"opaque", "transparent"}),
       row<&RenderSettings::photons>(
           "render", "photons", "", {0, 1000}, render,
           "started for each camera sample, for light of lamps through water; 0: by paths alone"),
@@ -220,6 +231,22 @@ std::vector<Parameter> layer_rows() {
           "light_caustics"),
       row<&LayerSettings::cryptomatte>("layers", "cryptomatte", "", none, render,
                                        "CryptoObject and CryptoMaterial, of what is met first"),
+      row<&LayerSettings::opacity>(
+          "layers", "opacity", "", none, render,
+          "opacity.RGB: alpha by colour, for what tints a plate: coloured water and shadows"),
+  };
+}
+
+std::vector<Parameter> view_rows() {
+  return {
+      row<&ViewSettings::ocio_config>("view", "ocio_config", "", none, no_stage,
+                                      "OpenColorIO's config; with a display or view alone $OCIO"),
+      row<&ViewSettings::display>("view", "display", "", none, no_stage,
+                                  "of the config; its default if empty")
+          .as(Kind::label),
+      row<&ViewSettings::view>("view", "view", "", none, no_stage,
+                               "of the display; its default if empty")
+          .as(Kind::label),
   };
 }
 
@@ -227,7 +254,8 @@ std::vector<Parameter> layer_rows() {
 
 std::vector<Parameter> picture_rows() {
   std::vector<Parameter> all;
-  for (const auto& part : {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows()})
+  for (const auto& part :
+       {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows(), view_rows()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

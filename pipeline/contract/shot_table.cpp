@@ -208,6 +208,8 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::contact_angle_deg>("cloth", "contact_angle_deg", "deg", {30, 150}, simulate,
                                      contact_angle),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
+      row<&Cloth::matte>("cloth", "matte", "", none, render, matte_text)
+          .one_of({"none", "holdout", "shadow_catcher"}),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
                                "indices of vertices held where they start"),
@@ -264,6 +266,8 @@ std::vector<Parameter> obstacle_rows() {
                                         contact_angle),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
+      row<&Obstacle::matte>("obstacle", "matte", "", none, render, matte_text)
+          .one_of({"none", "holdout", "shadow_catcher"}),
   };
 }
 
@@ -412,6 +416,9 @@ const std::vector<Section>& sections() {
       single<&Shot::ground>("ground", "A plane under the scene; the simulation does not know it."),
       single<&Shot::render>("render", "The picture."),
       single<&Shot::layers>("layers", "What else a frame's EXR holds, for compositing."),
+      single<&Shot::view>("view",
+                          "How PNGs and movies show frames: by the built-in transform, or with any "
+                          "of these keys by OpenColorIO."),
   };
   return table;
 }

@@ -17,6 +17,7 @@ enum class Kind {
   natural,       // uint32_t
   number,        // double
   text,          // std::string that can be part of a file name
+  label,         // std::string, any text
   name,          // std::string of letters, digits, '_' and '-'
   path,          // std::filesystem::path, empty: none
   mesh_files,    // the same, or with one %04d in its name: a file for every frame

@@ -169,6 +169,12 @@ class ValueReader {
     return word;
   }
 
+  std::string label(const toml::node& node) const {
+    std::string words = text(node);
+    if (words.empty() || words.find('\0') != std::string::npos) fail("a name is expected");
+    return words;
+  }
+
   std::string file_name(const toml::node& node) const {
     const std::string word = text(node);
     if (const char* const why = file_name_problem(word)) fail(why);
@@ -376,6 +382,8 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
       return put<double>(field, reader.limited(value));
     case Kind::text:
       return put<std::string>(field, reader.file_name(value));
+    case Kind::label:
+      return put<std::string>(field, reader.label(value));
     case Kind::name:
       return put<std::string>(field, reader.name(value));
     case Kind::path:
@@ -457,6 +465,7 @@ std::string value_text(const Parameter& parameter, const void* field) {
     case Kind::number:
       return number_text(as<double>(field));
     case Kind::text:
+    case Kind::label:
     case Kind::name:
       return as<std::string>(field).empty() ? "" : quoted(as<std::string>(field));
     case Kind::path:
@@ -506,6 +515,7 @@ std::string kind_text(const Parameter& parameter) {
     case Kind::number:
       return "a number" + in;
     case Kind::text:
+    case Kind::label:
     case Kind::name:
       return "a name in quotes";
     case Kind::path:

@@ -209,8 +209,7 @@ void clean_command(const ShotArguments& arguments) {
                               system_reason(code.value())));
     }
   }
-  for (const std::string& file : unlisted_files(job.folder, manifest))
-    if (layout::is_frame_samples(file)) fs::remove(job.folder / file);
+  remove_frame_samples(job.folder);
   if (arguments.format == OutputFormat::json) print(json{{"removed", plan.beyond}}.dump() + "\n");
   log_info("driver", fmt::format("removed {} files", plan.beyond.size()));
 }

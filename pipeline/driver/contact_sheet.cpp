@@ -8,7 +8,6 @@
 #include <string>
 
 #include "pipeline/contract/error.h"
-#include "render/renderer.h"
 
 namespace drench {
 
@@ -105,7 +104,7 @@ void draw_number(Picture& picture, int x, int y, int scale, std::string_view tex
   }
 }
 
-Picture contact_sheet(const std::vector<NumberedImage>& images) {
+Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransform& view) {
   if (images.empty()) throw std::logic_error("contact sheet without frames");
   const std::vector<NumberedImage> shown = evenly_picked(images);
   Film film = read_exr(shown.front().file);
@@ -123,7 +122,7 @@ Picture contact_sheet(const std::vector<NumberedImage>& images) {
       throw Error(
           fmt::format("{}: holds no pixels; render the frame again", shown[k].file.string()));
     }
-    Picture thumbnail{width, height, view_transform(shrink(film, width, height))};
+    Picture thumbnail{width, height, view(shrink(film, width, height))};
     draw_number(thumbnail, 6, 6, width >= 160 ? 2 : 1, std::to_string(shown[k].frame));
     place(sheet, thumbnail, gap + int(k % size_t(columns)) * (width + gap),
           gap + int(k / size_t(columns)) * (height + gap));
@@ -132,8 +131,9 @@ Picture contact_sheet(const std::vector<NumberedImage>& images) {
 }
 
 WrittenFile write_contact_sheet(const std::filesystem::path& path,
-                                const std::vector<NumberedImage>& images) {
-  const Picture sheet = contact_sheet(images);
+                                const std::vector<NumberedImage>& images,
+                                const ViewTransform& view) {
+  const Picture sheet = contact_sheet(images, view);
   return write_png(path, sheet.width, sheet.height, sheet.rgb);
 }
 

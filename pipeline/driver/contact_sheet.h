@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/files.h"
+#include "render/view_transform.h"
 
 namespace drench {
 
@@ -22,12 +23,13 @@ struct Picture {
 };
 
 /// Thumbnails of up to 64 frames, evenly picked, averaged in linear light and then taken through
-/// the view transform; frame numbers in the corner.
+/// the view; frame numbers in the corner.
 /// @param images  at least one; frames of different sizes are an error.
 /// @throws Error if a frame cannot be read.
-Picture contact_sheet(const std::vector<NumberedImage>& images);
+Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransform& view = {});
 WrittenFile write_contact_sheet(const std::filesystem::path& path,
-                                const std::vector<NumberedImage>& images);
+                                const std::vector<NumberedImage>& images,
+                                const ViewTransform& view = {});
 
 /// Writes digits and '-' of a built-in 5 x 7 font, white with a dark rim, `scale` pixels a dot,
 /// with the top left corner of the first character at (x, y). What lies outside the picture is cut

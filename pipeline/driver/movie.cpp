@@ -16,7 +16,6 @@
 #include <string_view>
 
 #include "pipeline/contract/error.h"
-#include "render/renderer.h"
 
 namespace drench {
 
@@ -171,7 +170,8 @@ std::vector<std::string> encode_command(const fs::path& ffmpeg, const fs::path& 
 
 /// @return the error text, empty when the file was written.
 std::string encode(const fs::path& file, const std::vector<NumberedImage>& images, double fps,
-                   std::string_view codec, const std::function<bool()>& keep_going) {
+                   std::string_view codec, const std::function<bool()>& keep_going,
+                   const ViewTransform& view) {
   const std::optional<fs::path> ffmpeg = find_ffmpeg();
   if (!ffmpeg) throw Error("ffmpeg: not found on PATH; install the package ffmpeg");
   Film film = read_exr(images.front().file);
@@ -190,7 +190,7 @@ std::string encode(const fs::path& file, const std::vector<NumberedImage>& image
                       "frames at one size",
                       images[k].file.string(), film.width, film.height, width, height));
     }
-    const std::vector<uint8_t> rgb = view_transform(film);
+    const std::vector<uint8_t> rgb = view(film);
     if (!child.send(rgb.data(), rgb.size())) break;
   }
   const int status = child.finish();
@@ -215,11 +215,11 @@ std::optional<fs::path> find_ffmpeg() {
 }
 
 WrittenFile write_movie(const fs::path& path, const std::vector<NumberedImage>& images, double fps,
-                        const std::function<bool()>& keep_going) {
+                        const std::function<bool()>& keep_going, const ViewTransform& view) {
   return write_file_whole(path, [&](const fs::path& temporary) {
-    const std::string first = encode(temporary, images, fps, "libx264", keep_going);
+    const std::string first = encode(temporary, images, fps, "libx264", keep_going, view);
     if (first.empty()) return;
-    const std::string second = encode(temporary, images, fps, "mpeg4", keep_going);
+    const std::string second = encode(temporary, images, fps, "mpeg4", keep_going, view);
     if (second.empty()) return;
     throw Error(fmt::format("{}: the movie was not made: {}; with mpeg4: {}", path.string(), first,
                             second));

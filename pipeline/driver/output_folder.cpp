@@ -133,10 +133,19 @@ std::vector<std::string> unlisted_files(const fs::path& folder, const Manifest& 
     if (entry->is_directory(code)) continue;
     const std::string file = entry->path().lexically_relative(folder).generic_string();
     if (file == layout::manifest || file == layout::stats || file == layout::lock) continue;
-    if (!records.contains(file)) files.push_back(file);
+    if (!records.contains(file) && !layout::is_frame_samples(file)) files.push_back(file);
   }
   std::sort(files.begin(), files.end());
   return files;
+}
+
+void remove_frame_samples(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code code;
+  for (fs::directory_iterator entry(folder / "render", code), end; !code && entry != end;
+       entry.increment(code))
+    if (layout::is_frame_samples(entry->path().string())) files.push_back(entry->path());
+  for (const fs::path& file : files) fs::remove(file);
 }
 
 void remove_leftovers(const fs::path& folder) {

@@ -53,9 +53,12 @@ bool has_recorded_digest(const std::filesystem::path& folder, const Record& reco
 Record record_of_file(const std::filesystem::path& folder, const WrittenFile& written);
 
 /// Files under `folder` that the manifest does not list, relative, sorted; the driver's own
-/// (manifest, stats, lock) are left out.
+/// (manifest, stats, lock, samples of stopped frames) are left out.
 std::vector<std::string> unlisted_files(const std::filesystem::path& folder,
                                         const Manifest& manifest);
+
+/// Removes the samples of stopped frames. Call with the lock held.
+void remove_frame_samples(const std::filesystem::path& folder);
 
 /// Removes what killed runs left half-written. Call with the lock held.
 void remove_leftovers(const std::filesystem::path& folder);

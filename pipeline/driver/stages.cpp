@@ -15,6 +15,7 @@
 #include "pipeline/driver/movie.h"
 #include "render/kept_parts.h"
 #include "render/renderer.h"
+#include "render/view_transform.h"
 #include "surfacing/foam.h"
 #include "surfacing/surface.h"
 
@@ -219,8 +220,8 @@ class ShotStages final : public Stages {
 
   StageReport contact_sheet(const fs::path& folder, const std::vector<int>& frames) override {
     StageReport report;
-    report.files.push_back(
-        write_contact_sheet(folder / layout::contact_sheet, images(folder, frames)));
+    report.files.push_back(write_contact_sheet(folder / layout::contact_sheet,
+                                               images(folder, frames), ViewTransform(shot_.view)));
     return report;
   }
 
@@ -228,7 +229,7 @@ class ShotStages final : public Stages {
                     const std::function<bool()>& keep_going) override {
     StageReport report;
     report.files.push_back(write_movie(folder / layout::movie(shot_.name), images(folder, frames),
-                                       shot_.timeline.fps, keep_going));
+                                       shot_.timeline.fps, keep_going, ViewTransform(shot_.view)));
     return report;
   }
 

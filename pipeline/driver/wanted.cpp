@@ -10,6 +10,7 @@
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "render/view_transform.h"
 
 namespace drench {
 
@@ -51,6 +52,13 @@ class StageKeyBuilder {
   StageKeyBuilder& device(const std::string& name) {
     hasher_.text(name);
     parts_["device"] = name;
+    return *this;
+  }
+  /// Nothing if there is no text.
+  StageKeyBuilder& part(const std::string& name, const std::string& text) {
+    if (text.empty()) return *this;
+    hasher_.text(name).text(text);
+    parts_[name] = short_hex(hash_bytes(text.data(), text.size()));
     return *this;
   }
   StageKeyBuilder& file(const std::filesystem::path& path) {
@@ -144,6 +152,13 @@ StageKey render_key(const Shot& shot) {
   return builder.finish();
 }
 
+StageKey dailies_key(const Shot& shot) {
+  return StageKeyBuilder("dailies", build_id::dailies, {})
+      .number("fps", shot.timeline.fps)
+      .part("view", ViewTransform(shot.view).key())
+      .finish();
+}
+
 }  // namespace
 
 std::string_view step_name(Step step) {
@@ -191,8 +206,8 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.has_foam = wanted.fluid && shot.foam.present;
   if (wanted.has_foam) wanted.foam = foam_key(shot);
   wanted.render = render_key(shot);
-  wanted.dailies =
-      StageKeyBuilder("dailies", build_id::dailies, {}).number("fps", shot.timeline.fps).finish();
+  if (wanted.may(Step::contact_sheet) || wanted.may(Step::movie))
+    wanted.dailies = dailies_key(shot);  // who shows nothing needs no OpenColorIO
   wanted.has_ffmpeg = find_ffmpeg().has_value();
   return wanted;
 }

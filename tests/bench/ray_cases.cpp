@@ -45,26 +45,29 @@ RTCRayHit embree_query(const Ray& ray, float reach) {
 }  // namespace
 
 // Scene::intersect and Scene::occluded as the linker calls them, `this` first.
-#define DRENCH_INTERSECT "_ZNK6drench5Scene9intersectERKNS_3RayENS_9CoherenceE"
-#define DRENCH_OCCLUDED "_ZNK6drench5Scene8occludedERKNS_3RayEf"
-Hit real_intersect(const Scene*, const Ray&, Coherence) asm("__real_" DRENCH_INTERSECT);
-bool real_occluded(const Scene*, const Ray&, float) asm("__real_" DRENCH_OCCLUDED);
-Hit wrapped_intersect(const Scene*, const Ray&, Coherence) asm("__wrap_" DRENCH_INTERSECT);
-bool wrapped_occluded(const Scene*, const Ray&, float) asm("__wrap_" DRENCH_OCCLUDED);
+#define DRENCH_INTERSECT "_ZNK6drench5Scene9intersectERKNS_3RayENS_9CoherenceENS_5WorldE"
+#define DRENCH_OCCLUDED "_ZNK6drench5Scene8occludedERKNS_3RayEfNS_5WorldENS0_4GapsE"
+Hit real_intersect(const Scene*, const Ray&, Coherence, World) asm("__real_" DRENCH_INTERSECT);
+bool real_occluded(const Scene*, const Ray&, float, World,
+                   Scene::Gaps) asm("__real_" DRENCH_OCCLUDED);
+Hit wrapped_intersect(const Scene*, const Ray&, Coherence, World) asm("__wrap_" DRENCH_INTERSECT);
+bool wrapped_occluded(const Scene*, const Ray&, float, World,
+                      Scene::Gaps) asm("__wrap_" DRENCH_OCCLUDED);
 
-Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence) {
+Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence, World world) {
   if (recording) {
     recording->scene = scene;
     recording->queries.push_back(
         {embree_query(ray, std::numeric_limits<float>::infinity()), false, coherence});
   }
-  return real_intersect(scene, ray, coherence);
+  return real_intersect(scene, ray, coherence, world);
 }
 
-bool wrapped_occluded(const Scene* scene, const Ray& ray, float distance) {
+bool wrapped_occluded(const Scene* scene, const Ray& ray, float distance, World world,
+                      Scene::Gaps gaps) {
   if (recording)
     recording->queries.push_back({embree_query(ray, distance * (1 - 1e-4f)), true, {}});
-  return real_occluded(scene, ray, distance);
+  return real_occluded(scene, ray, distance, world, gaps);
 }
 
 namespace {

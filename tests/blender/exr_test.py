@@ -1,6 +1,6 @@
-"""Reads a frame with all its layers in Blender's compositor: see run. The frame is the first of
-ball.toml, a ball of water of radius 0.1 m, 2 m before the camera, that flies 4 m/s along x; its
-geometry says what the layers must hold."""
+"""Reads frames in Blender's compositor: see run. The first of ball.toml has all layers: a ball of
+water of radius 0.1 m, 2 m before the camera, that flies 4 m/s along x; its geometry says what they
+must hold. The frame of plate.toml is put over a plate."""
 
 import math
 import sys
@@ -13,7 +13,7 @@ import numpy
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from run_tests import run_tests  # beside this file
 
-FRAME = Path(sys.argv[sys.argv.index("--") + 1]) / "render/ball.1001.exr"
+BALL, PLATE = (Path(folder) / "render" for folder in sys.argv[sys.argv.index("--") + 1:])
 WIDTH, HEIGHT, SAMPLES = 96, 64, 16
 PIXELS_PER_RADIAN = WIDTH / (2 * math.tan(math.radians(10)))
 
@@ -21,7 +21,7 @@ PIXELS_PER_RADIAN = WIDTH / (2 * math.tan(math.radians(10)))
 class Compositor:
     """The frame as an image node, what is linked from it as a picture."""
 
-    def __init__(self):
+    def __init__(self, frame=BALL / "ball.1001.exr"):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.scene = bpy.context.scene
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -35,7 +35,7 @@ class Compositor:
         self.tree.nodes.clear()
         self.output = self.tree.nodes.new("CompositorNodeComposite")
         self.image = self.tree.nodes.new("CompositorNodeImage")
-        self.image.image = bpy.data.images.load(str(FRAME))
+        self.image.image = bpy.data.images.load(str(frame))
 
     def picture(self, socket):
         """height x width x 3, the bottom row first."""
@@ -46,8 +46,11 @@ class Compositor:
             image = bpy.data.images.load(self.scene.render.filepath)
             return numpy.array(image.pixels).reshape(HEIGHT, WIDTH, 4)[:, :, :3]
 
+    def layer_output(self, name):
+        return self.image.outputs[name]
+
     def layer(self, name):
-        return self.picture(self.image.outputs[name])
+        return self.picture(self.layer_output(name))
 
 
 def at_centre(picture):
@@ -86,6 +89,34 @@ def test_cryptomatte_covers_the_ball():
         area = compositor.picture(node.outputs["Matte"])[:, :, 0].sum()
         radius = math.tan(math.asin(0.1 / 2)) * PIXELS_PER_RADIAN
         numpy.testing.assert_allclose(area, math.pi * radius**2, rtol=0.08)
+
+
+def test_a_frame_goes_over_a_plate():
+    """Over a plate of one colour each thing is what its closed form says of it."""
+    compositor = Compositor(PLATE / "plate.1001.exr")
+    plate = numpy.array((0.2, 0.4, 0.8))
+    over = compositor.tree.nodes.new("CompositorNodeAlphaOver")
+    over.inputs[1].default_value = (*plate, 1)
+    compositor.tree.links.new(compositor.layer_output("Combined"), over.inputs[2])
+    picture = compositor.picture(over.outputs[0])
+    opacity = compositor.layer("opacity")
+    forward = numpy.array((0, -0.2, -4)) / math.hypot(0.2, 4)
+    up = numpy.array((0, forward[2], -forward[1])) * -1
+    scale = WIDTH / (2 * math.tan(math.radians(20)))
+
+    def at(point):
+        """Pixel, from the bottom left, of a point seen from the camera."""
+        to = numpy.array(point) - (0, 1, 4)
+        depth = to @ forward
+        return int(HEIGHT / 2 + scale * (to @ up) / depth), int(WIDTH / 2 + scale * to[0] / depth)
+
+    way = 0.25 * math.hypot(0.7, 0.2, 4) / 4  # through the slab's middle, aslant
+    suns_left = math.sqrt(0.5) / (1 + math.sqrt(0.5))  # the card hides the one above
+    for point, left in (((-0.7, 1.2, 0), math.exp(-2 * way)), ((0.7, 1.2, 0), 1),
+                        ((0, 1.2, 0), 1), ((0, 0, -1), suns_left), ((0.8, 0, -2.5), 1)):
+        name = str(point)
+        numpy.testing.assert_allclose(picture[at(point)], plate * left, rtol=4e-3, err_msg=name)
+        numpy.testing.assert_allclose(opacity[at(point)], 1 - left, atol=2e-3, err_msg=name)
 
 
 run_tests(globals())

@@ -41,11 +41,13 @@ TEST(ObstacleShot, LocksToTheSame) {
       "[[obstacle]]\ntype = \"box\"\nname = \"door\"\nsize = [1, 2, 3]\ninterp = \"smooth\"\n"
       "position = [[1001, [0, 0, 0]], [1010.5, [1, 0, 0]]]\nrotation_deg = [[1001, [0, 0, 0]], "
       "[1048, [0, 720, 0]]]\n"
-      "[[obstacle]]\ntype = \"sphere\"\nradius = 0.25\nvisible = false\n"
+      "[[obstacle]]\ntype = \"sphere\"\nradius = 0.25\nvisible = false\nmatte = "
+      "\"holdout\"\n"
       "[[obstacle]]\ntype = \"mesh\"\nmesh = \"ball.ply\"\nscale = 0.1\n",
       folder.path());
   ASSERT_EQ(shot.obstacle.size(), 4u);
   EXPECT_EQ(shot.obstacle[2].name, "obstacle3");
+  EXPECT_EQ(shot.obstacle[2].matte, Matte::holdout);
   EXPECT_EQ(shot.obstacle[1].rotation_deg.interpolation, Interpolation::smooth);
   EXPECT_EQ(shot_lock(parse_shot(shot_lock(shot), "shot.lock.toml")), shot_lock(shot));
 }

@@ -36,6 +36,7 @@ void change(const Parameter& p, void* field, const std::filesystem::path& file) 
       as<double>(field) += 0.125;
       break;
     case Kind::text:
+    case Kind::label:
     case Kind::name:
       as<std::string>(field) += "x";
       break;

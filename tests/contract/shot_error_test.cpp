@@ -264,6 +264,9 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
        {"scene.toml:8", "cloth", "does not shine"}},
       {"[[material]]\nname = \"glow\"\nemission = [1, 1, 1]\n[ground]\nmaterial = \"glow\"\n",
        {"scene.toml:8", "the ground", "does not shine"}},
+      {"[[obstacle]]\ntype = \"box\"\nmaterial = \"water\"\nmatte = \"shadow_catcher\"\n",
+       {"scene.toml:6", "a shadow catcher cannot have", "metal"}},
+      {"[ground]\nmatte = \"hole\"\n", {"scene.toml:5", "holdout", "shadow_catcher"}},
       {"[camera]\nposition = [0, 3, 0]\ntarget = [0, 0, 0]\n", {"along the view"}},
   });
 }

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/driver/movie.h"
-#include "render/renderer.h"
+#include "render/view_transform.h"
 #include "tests/driver/folder.h"
 
 namespace drench {
@@ -45,7 +45,7 @@ TEST(ContactSheet, ShowsEachFramesOwnColour) {
     seen.insert(sheet.rgb[k]);
   }
   for (int k = 0; k < 6; ++k) {
-    const uint8_t expected = view_transform(flat(1, 1, 0.02f * float(k + 1)))[0];
+    const uint8_t expected = ViewTransform()(flat(1, 1, 0.02f * float(k + 1)))[0];
     bool found = false;  // half floats of the file: a level of 8-bit rounding
     for (int level = expected - 1; level <= expected + 1; ++level) found |= seen.contains(level);
     EXPECT_TRUE(found) << k;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/hash.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/output_folder.h"
 #include "tests/driver/child.h"
@@ -301,7 +302,9 @@ TEST(Program, ReportsFramesBeyondAShortenedRangeAndCleansThem) {
   const Ended ended = shot.run("run");
   EXPECT_TRUE(has(ended.err, "drench clean")) << ended.err;
   EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1010)));
+  put_text(shot.out() / layout::frame_samples("tiny", 1010), "of a stopped frame");
   EXPECT_EQ(shot.run("clean").code, done);
+  EXPECT_FALSE(fs::exists(shot.out() / layout::frame_samples("tiny", 1010)));
   EXPECT_FALSE(fs::exists(shot.out() / layout::image("tiny", 1009)));
   EXPECT_FALSE(fs::exists(shot.out() / layout::particles(1012)));
   EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1008)));

@@ -15,6 +15,7 @@
 
 #include "render/color.h"
 #include "render/texture.h"
+#include "render/view_transform.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
@@ -168,7 +169,7 @@ Film greys(const std::vector<float>& values) {
 TEST(ViewTransform, KeepsGreysGreyAndRising) {
   std::vector<float> values;
   for (int k = 0; k < 400; ++k) values.push_back(std::pow(10.f, -4 + 0.02f * float(k)));
-  const std::vector<uint8_t> rgb = view_transform(greys(values));
+  const std::vector<uint8_t> rgb = ViewTransform()(greys(values));
   for (size_t k = 0; k < values.size(); ++k) {
     EXPECT_EQ(rgb[3 * k], rgb[3 * k + 1]);
     EXPECT_EQ(rgb[3 * k], rgb[3 * k + 2]);
@@ -179,7 +180,8 @@ TEST(ViewTransform, KeepsGreysGreyAndRising) {
 }
 
 TEST(ViewTransform, ShowsMiddleGreyInTheMiddleAndHighlightsBelowWhite) {
-  const std::vector<uint8_t> rgb = view_transform(greys({0, 0.18f, 1, 4, 1e4f, -1, std::nanf("")}));
+  const std::vector<uint8_t> rgb =
+      ViewTransform()(greys({0, 0.18f, 1, 4, 1e4f, -1, std::nanf("")}));
   EXPECT_EQ(rgb[0], 0);
   EXPECT_NEAR(rgb[3], 0.461 * 255, 1);  // the sRGB code of 0.18
   EXPECT_GT(rgb[6], 190);
@@ -192,7 +194,7 @@ TEST(ViewTransform, ShowsMiddleGreyInTheMiddleAndHighlightsBelowWhite) {
 
 TEST(ViewTransform, WhitensBrightColours) {
   Film film{2, 1, {0.5f, 0.05f, 0.05f, 1, 50, 5, 5, 1}};
-  const std::vector<uint8_t> rgb = view_transform(film);
+  const std::vector<uint8_t> rgb = ViewTransform()(film);
   EXPECT_GT(int(rgb[0]) - int(rgb[1]), 60);
   EXPECT_LT(int(rgb[3]) - int(rgb[4]), 40);
 }

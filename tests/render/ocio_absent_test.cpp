@@ -1,0 +1,19 @@
+// A build without OpenColorIO says so when it is asked for.
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/error.h"
+#include "render/view_transform.h"
+#include "tests/temporary_folder.h"
+
+namespace drench::test {
+namespace {
+
+TEST(OcioView, SaysWhatToInstall) {
+  const std::string error = error_of([] { ViewTransform({"", "Monitor", ""}); });
+  EXPECT_NE(error.find("libopencolorio-dev"), std::string::npos);
+  EXPECT_EQ(ViewTransform(ViewSettings{}).key(), "");
+}
+
+}  // namespace
+}  // namespace drench::test
