@@ -255,9 +255,11 @@ double typical_count(const std::vector<Photon>& photons, float edge) {
   return 1;
 }
 
-/// The radius within which the median photon has 20 of 1e5 photons, and more of more.
+/// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
+double wanted_count(size_t photons) { return 20 * std::sqrt(double(photons) / 1e5); }
+
 float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& bounds) {
-  const double wanted = 20 * std::sqrt(double(photons.size()) / 1e5);
+  const double wanted = wanted_count(photons.size());
   const float diagonal = std::max((bounds.max - bounds.min).length(), 1e-6f);
   // Cells stay countable, however far from the origin the photons lie.
   const float far = std::max(largest(absolute(bounds.min)), largest(absolute(bounds.max)));
@@ -285,6 +287,7 @@ PhotonMap::PhotonMap(std::vector<Photon> photons) {
   radius_ = choose_radius(photons, reach_);
   reach_.min -= V3f(radius_), reach_.max += V3f(radius_);
   inverse_edge_ = 1 / (2 * radius_);
+  crowd_ = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(photons.size())));
   while (size_t{mask_} + 1 < photons.size()) mask_ = 2 * mask_ + 1;
   first_.assign(size_t{mask_} + 2, 0);
   for (const Photon& p : photons) ++first_[bucket_of(cell_of(p.position)) + 1];

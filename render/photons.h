@@ -38,12 +38,16 @@ class PhotonMap {
   float radius() const { return radius_; }  // m
 
   /// Calls f(photon, share) for photons near a point of a surface: the sum of share x power is the
-  /// irradiance, W/m^2. Weighed by Epanechnikov's kernel over a disc.
+  /// irradiance, W/m^2. Weighed by Epanechnikov's kernel over a disc, which is smaller where
+  /// photons crowd: there fewer do, and its blur shows most.
   template <class F>
   void for_each_near(const V3f& point, const V3f& normal, F f) const {
     if (!reach_.intersects(point)) return;
-    const float r2 = radius_ * radius_, scale = 2 / (kPi * r2);
-    const Imath::V3i low = cell_of(point - V3f(radius_)), high = cell_of(point + V3f(radius_));
+    const uint32_t middle = bucket_of(cell_of(point));
+    const uint32_t count = first_[middle + 1] - first_[middle];
+    const float share = count > crowd_ ? float(crowd_) / float(count) : 1.f;
+    const float r2 = radius_ * radius_ * share, r = std::sqrt(r2), scale = 2 / (kPi * r2);
+    const Imath::V3i low = cell_of(point - V3f(r)), high = cell_of(point + V3f(r));
     std::array<uint32_t, 8> seen;  // cells may share a bucket
     size_t buckets = 0;
     Imath::V3i c;
@@ -55,7 +59,7 @@ class PhotonMap {
           if (first_[bucket] == first_[bucket + 1] || std::find(seen.begin(), end, bucket) != end)
             continue;
           if (buckets < seen.size()) seen[buckets++] = bucket;
-          for_each_in(bucket, point, normal, [&](const Photon& photon, float square) {
+          for_each_in(bucket, point, normal, r2, [&](const Photon& photon, float square) {
             if (std::abs(dot(photon.normal, normal)) >= kSameSurface)
               f(photon, scale * (1 - square / r2));
           });
@@ -65,6 +69,8 @@ class PhotonMap {
  private:
   static constexpr float kSameSurface = 0.7f;  // cosine between normals
   static constexpr float kThickness = 0.5f;    // of the disc, radii: curved surfaces count whole
+  static constexpr float kCrowd = 4;           // times the photons of the median one's disc
+  static constexpr uint32_t kFewest = 400;     // photons of a crowded cell: noise above blur
 
   Imath::V3i cell_of(const V3f& p) const {
     return {int(std::floor(p.x * inverse_edge_)), int(std::floor(p.y * inverse_edge_)),
@@ -74,9 +80,9 @@ class PhotonMap {
 
   /// Calls f(photon, distance^2) for the photons of a bucket within the disc.
   template <class F>
-  void for_each_in(uint32_t bucket, const V3f& point, const V3f& normal, F f) const {
-    const __m256 r2 = _mm256_set1_ps(radius_ * radius_);
-    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius_ * radius_);
+  void for_each_in(uint32_t bucket, const V3f& point, const V3f& normal, float radius2, F f) const {
+    const __m256 r2 = _mm256_set1_ps(radius2);
+    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius2);
     const uint32_t last = first_[bucket + 1];
     for (uint32_t k = first_[bucket]; k < last; k += 8) {
       const auto away = [&](int axis) {
@@ -101,6 +107,7 @@ class PhotonMap {
   Imath::Box3f reach_;  // of the photons and a radius around them; empty without any
   float radius_ = 0, inverse_edge_ = 0;  // cells are two radii wide
   uint32_t mask_ = 0;
+  uint32_t crowd_ = 0;                       // photons in a cell beyond which the disc shrinks
   std::vector<uint32_t> first_;              // of each bucket, and the number of photons
   std::vector<Photon> photon_;               // by bucket
   std::array<std::vector<float>, 3> place_;  // of each, and room for a pack to be read

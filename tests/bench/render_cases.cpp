@@ -1,10 +1,13 @@
-// Rendering a sheet of cloth over the ground: camera samples per CPU second, and error against
-// samples measured on one picture, so that both belong to one configuration. Rendering a pool with
-// a small lamp: what photons gain over paths. What the denoiser and samples by a target gain.
+// Rendering a sheet of cloth over the ground, and a pool with a small lamp: camera samples per CPU
+// second, error against samples and time. What photons gain over paths, what the denoiser and
+// samples by a target gain.
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -67,33 +70,73 @@ Line line_of(const Sampled& sampled) {
   return line;
 }
 
-void render_cloth(const Emit& emit) {
-  const Shot shot = cloth_shot();
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
-  const Film reference = render(shot, geometry, kReferenceSamples, 1000).film;
+/// CPU s at which a straight line between the points of log error over log CPU s meets an error;
+/// none if the last point does not.
+std::optional<double> time_to(double error, const std::vector<Sampled>& curve) {
+  for (size_t k = 1; k < curve.size(); ++k) {
+    if (curve[k].error > error) continue;
+    const double from = std::log(curve[k - 1].median.cost.cpu_s),
+                 to = std::log(curve[k].median.cost.cpu_s);
+    const double share =
+        std::log(curve[k - 1].error / error) / std::log(curve[k - 1].error / curve[k].error);
+    return std::exp(from + (to - from) * std::max(share, 0.));
+  }
+  return {};
+}
+
+void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
+                const FrameGeometry& geometry, const Film& reference) {
   std::vector<double> counts, errors;
-  Line rate;
+  std::vector<Sampled> curve;
   for (const int samples : {1, 4, 16, 64, 256}) {
-    const Sampled sampled = sample(shot, geometry, samples, reference);
-    Line line = line_of(sampled);
-    rate = line;  // the last has so many samples that building the scene no longer counts
+    curve.push_back(sample(shot, geometry, samples, reference));
     counts.push_back(samples);
-    errors.push_back(sampled.error);
-    line.error = sampled.error;
+    errors.push_back(curve.back().error);
+    Line line = line_of(curve.back());
+    line.method = name;
+    line.error = errors.back();
     line.error_of = "relMSE against " + std::to_string(kReferenceSamples) + " samples";
     if (counts.size() > 1) line.more["slope"] = log_slope(counts, errors);
     emit(line);
   }
-  rate.method += ", rate";
-  rate.error = 1e6 / rate.more["samples_per_cpu_s"].get<double>();
-  rate.error_of = "CPU s per million camera samples";
-  rate.gate = kMostCost;
-  emit(rate);
+  Line line = line_of(curve.back());
+  line.method = name + ", slope";
+  line.error = 1 / -log_slope(counts, errors);
+  line.error_of = "1 over the power of the samples that the error falls by";
+  line.gate = 1;
+  for (const double error : {0.01, 0.001})
+    if (const std::optional<double> cpu_s = time_to(error, curve))
+      line.more[fmt::format("cpu_s_to_{}", error)] = *cpu_s;
+  emit(line);
+}
+
+void render_convergence(const Emit& emit) {
+  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
+  emit_curve(emit, "cloth", cloth_shot(), cloth,
+             render(cloth_shot(), cloth, kReferenceSamples, 1000).film);
+  Shot paths = pool_shot();
+  paths.render.photons = 0;
+  emit_curve(emit, "pool, small lamp", pool_shot(), pool,
+             render(paths, pool, kReferenceSamples, 1000).film);
+}
+
+const Registration render_convergence_case{
+    "render_convergence", "error at 1 to 256 samples, its slope, CPU s to an error",
+    render_convergence};
+
+void render_cloth(const Emit& emit) {
+  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  // So many samples that building the scene no longer counts.
+  Line line = line_of({0, render(cloth_shot(), geometry, 256, 1)});
+  line.method += ", rate";
+  line.error = 1e6 / line.more["samples_per_cpu_s"].get<double>();
+  line.error_of = "CPU s per million camera samples";
+  line.gate = kMostCost;
+  emit(line);
 }
 
 const Registration render_cloth_case{
-    "render_cloth", "cloth over ground at depth 8: samples per CPU s, error at 1 to 256 samples",
-    render_cloth};
+    "render_cloth", "cloth over ground at depth 8: samples per CPU s", render_cloth};
 
 /// The reference is of paths alone. Gain: of 1 / (error x CPU s), at as many samples.
 void render_caustics(const Emit& emit) {
