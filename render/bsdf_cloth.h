@@ -19,8 +19,11 @@ class ClothBsdf {
   ClothBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, const V3f& reflectance,
             const V3f& transmittance)
       : reflectance_(reflectance), transmittance_(transmittance) {
-    const float side = dot(outgoing, geometric) < 0 ? -1.f : 1.f;
-    geometric_ = geometric * side;
+    // A sheet has nothing within that light must be kept from: its sides are those of the smooth
+    // normal, or flat triangles would show as a chequer where light grazes them.
+    const V3f& real = is_black(transmittance) ? geometric : shading;
+    const float side = dot(outgoing, real) < 0 ? -1.f : 1.f;
+    geometric_ = real * side;
     shading_ = shading * side;
     const float r = largest(reflectance), t = largest(transmittance);
     reflect_probability_ = r + t > 0 ? r / (r + t) : 1;
@@ -77,7 +80,8 @@ class ClothBsdf {
     return g > 0 ? g * (1 + g * (1 - g)) : 0;
   }
 
-  V3f geometric_, shading_, reflectance_, transmittance_;
+  V3f geometric_;  // of the normal that divides the sides
+  V3f shading_, reflectance_, transmittance_;
   float reflect_probability_ = 1;
 };
 

@@ -140,6 +140,38 @@ TEST(Cloth, IsTheSameSeenFromTheOtherEnd) {
   }
 }
 
+// Light from behind a bowl that grazes it shows through by the cosine of the smooth bowl, not of
+// the triangles: these were a chequer of lit and dark.
+TEST(Cloth, ShowsNoTrianglesWhereLightGrazesIt) {
+  Shot shot = plain_shot(64, 64);
+  shot.render.depth = 1;
+  Material cotton = diffuse("cotton", 0.4f);
+  cotton.type = MaterialType::cloth;
+  cotton.transmittance = V3f(0.4f);
+  shot.material = {cotton};
+  Light sun;
+  sun.type = LightType::sun;
+  sun.direction = {-1, -0.4, 0};  // along the bowl where its slope is 0.4, at x = 0.5
+  sun.radiance = V3f(10);
+  shot.light = {sun};
+  const TriangleMesh bowl = sheet_mesh(24, [](float x, float) { return 0.4f * x * x; });
+  shot.camera.position = V3d(0.75, 20, 0);
+  shot.camera.target = V3d(0.75, 0.2, 0);
+  shot.camera.up = V3d(0, 0, -1);
+  shot.camera.fov_deg = 1.1;
+  const Film film = render_frame(shot, 1001, {{}, {{"cloth", bowl}}});
+  const double half = std::tan(0.55 * kPi64 / 180) * 19.8;  // m
+  double most = 0;
+  for (int y = 0; y < film.height; ++y)
+    for (int x = 0; x < film.width; ++x) {
+      const double at = 0.75 + half * (2 * (x + 0.5) / film.width - 1);
+      const double cos = (0.8 * at - 0.4) / std::sqrt((1 + 0.64 * at * at) * 1.16);
+      const double shown = film.rgba[4 * (size_t(y) * film.width + x)];
+      most = std::max(most, std::abs(shown - 0.4 * 10 * cos / kPi64));
+    }
+  EXPECT_LT(most, 0.01);
+}
+
 TEST(Texture, LiesOnTheClothByItsCoordinates) {
   // A 2 x 2 picture: red, green above; blue, white below. u runs along x, v along z (sheet_mesh).
   const TemporaryFolder folder;
