@@ -18,6 +18,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
 constexpr float kRelativeError = 16 * 0x1p-24f;
 constexpr float kSharedError = 2 * 0x1p-24f;
+constexpr float kNearEdge = 0.01f;  // of a barycentric coordinate
 /// Indices whose ratio is so near 1 have no facets that bend light.
 constexpr float kSameIndex = 1e-3f;
 
@@ -45,6 +46,18 @@ struct InverseDirection {
     return from <= to * (1 + 8 * 0x1p-24f);
   }
 };
+
+/// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
+/// else it may lie beyond the face that meets this one there, and a ray from it is lost.
+void keep_off_edges(const V3f& a, const V3f& b, const V3f& c, const Hit& hit, Surface& s) {
+  const float longest = std::max({(b - a).length(), (c - a).length(), (c - b).length()});
+  const float twice_area = cross(b - a, c - a).length();
+  const float least = std::min(largest(s.error) * longest / twice_area, 1.f / 3);
+  if (!(least > 0)) return;
+  const float w = std::max(1 - hit.u - hit.v, least), u = std::max(hit.u, least),
+              v = std::max(hit.v, least);
+  s.position = (a * w + b * u + c * v) * (1 / (w + u + v));
+}
 
 }  // namespace
 
@@ -329,6 +342,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   s.position = a * w + b * hit.u + c * hit.v;
   const V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(a, b, c, hit, s);
   s.geometric_normal = normalized(cross(b - a, c - a));
   s.shading_normal =
       normalized(object.normal[t.x] * w + object.normal[t.y] * hit.u + object.normal[t.z] * hit.v);

@@ -20,6 +20,7 @@
 #include "render/sampling.h"
 #include "render/scene.h"
 #include "tests/bench/render_scenes.h"
+#include "tests/render/closed_body.h"
 
 namespace drench::bench {
 
@@ -245,26 +246,6 @@ void render_load(const Emit& emit) {
 const Registration render_load_case{
     "render_load", "a frame of a million triangles, from the file to the first ray", render_load};
 
-/// Rays that go on from where they arrive, back into the body: one that meets nothing, or a face
-/// from without, has been lost.
-uint64_t lost_rays(const Scene& scene, const V3f& start, uint32_t chain, int length) {
-  const FlushDenormals flush;
-  Ray ray{start, {0, 0, 0}, 0};
-  V3f side(0);
-  for (int k = 0; k < length; ++k) {
-    const uint32_t bits = hash_bits(chain * 0x9e3779b9u + uint32_t(k));
-    ray.direction = sample_cone({unit_float(bits), unit_float(hash_bits(bits))}, 2);
-    if (dot(ray.direction, side) > 0) ray.direction = -ray.direction;
-    const Hit hit = scene.intersect(ray, Coherence::incoherent);
-    if (hit.kind != Hit::Kind::object) return 1;
-    const Surface surface = scene.surface<false>(ray, hit);
-    if (!(dot(ray.direction, surface.geometric_normal) >= 0)) return 1;
-    side = surface.geometric_normal;
-    ray.origin = surface.leave(-side);
-  }
-  return 0;
-}
-
 void render_leaks(const Emit& emit) {
   constexpr uint32_t kChains = 1u << 20;
   constexpr int kLength = 100;
@@ -278,7 +259,7 @@ void render_leaks(const Emit& emit) {
     line.cost = measure([&] {
       tbb::parallel_for(0u, kChains, [&](uint32_t chain) {
         const float x = unit_float(hash_bits(chain)) - 0.5f;
-        lost += lost_rays(scene, {3.9f * x, 0.1f, 0.3f}, chain, kLength);
+        lost += test::loses_ray(scene, {3.9f * x, 0.1f, 0.3f}, chain, kLength);
       });
     });
     line.method = waves ? "slab with waves" : "box";

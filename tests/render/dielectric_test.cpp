@@ -7,6 +7,7 @@
 #include "render/guide.h"
 #include "render/kept_parts.h"
 #include "render/scene.h"
+#include "tests/render/closed_body.h"
 #include "tests/render/support.h"
 
 namespace drench::test {
@@ -28,6 +29,25 @@ struct Slab {
     geometry.fluid = box_mesh({-10, float(-thickness), -10}, {10, 0, 10});
   }
 };
+
+// A million rays here, a hundred million in ./bench render_leaks.
+TEST(ClosedBody, LosesNoRay) {
+  constexpr uint32_t kChains = 4096;
+  for (const float far : {0.f, 300.f})
+    for (const bool round : {false, true}) {
+      Shot shot = plain_shot(1);
+      shot.material = {dielectric("water", kIndex)};
+      const V3f center(far, 0.5f * far, -far);
+      FrameGeometry geometry;
+      geometry.fluid = round ? sphere_mesh(4) : box_mesh({-1, -1, -1}, {1, 1, 1});
+      translate(geometry.fluid, center);
+      const Scene scene(shot, 1001, geometry, {});
+      uint32_t lost = 0;
+      for (uint32_t chain = 0; chain < kChains; ++chain)
+        lost += loses_ray(scene, center, chain, 64);
+      EXPECT_EQ(lost, 0u) << "far " << far << ", round " << round;
+    }
+}
 
 TEST(FresnelSlab, ReflectsWhatBothFacesSumTo) {
   // R = R1 + (1 - R1)^2 R1 (1 + R1^2 + ...) = 2 R1 / (1 + R1) = 0.03993.
