@@ -35,6 +35,9 @@ drench_use_blender() {
   )
 }
 
+# ./bench render_skips counts instructions.
+drench_use_valgrind() { drench_packages+=("valgrind:/usr/bin/valgrind"); }
+
 drench_missing_packages() {
   local entry package files file found
   for entry in "${drench_packages[@]}"; do

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <tuple>
 
@@ -87,6 +88,8 @@ void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std
           fmt::format("{}: wetness of vertex {} is {}, but it is the share of the cloth that is "
                       "wet; write values from 0 to 1, or leave the column out",
                       what, k, mesh.wetness[k]));
+  const auto is_dry = [](float w) { return w == 0; };
+  if (std::all_of(mesh.wetness.begin(), mesh.wetness.end(), is_dry)) return;
   object.wetness = mesh.wetness;
   material.alpha = material.film_alpha;
   material.fibres = WetFibres(double(material.ior));
