@@ -9,15 +9,18 @@
 #include <functional>
 #include <memory>
 
+#include "render/motion_match.h"
+
 namespace drench {
 
 namespace {
 
 using Plane = NoisyPicture::Plane;
 
-constexpr int kTile = 32;  // pixels a side of what is worked on at once
-constexpr int kReach = 7;  // of the window
-constexpr int kPatch = 3;  // of the patches compared
+constexpr int kTile = 32;        // pixels a side of what is worked on at once
+constexpr int kReach = 7;        // of the window
+constexpr int kReachBeside = 4;  // of that in a frame before or after
+constexpr int kPatch = 3;        // of the patches compared
 constexpr int kPad = kReach + kPatch;
 constexpr int kPadded = kTile + 2 * kPad;
 constexpr int kCompared = kTile + 2 * kPatch;
@@ -40,20 +43,56 @@ using TileRow = std::array<float, kTile>;
 struct Padded {
   std::array<float, kPadded * kPadded> value;
 
-  void take(const Plane& from, int x0, int y0, int width, int height) {
+  /// @param at  value of a pixel of the picture
+  template <class At>
+  void take(const At& at, int x0, int y0, int width, int height) {
     for (int y = 0; y < kPadded; ++y)
       for (int x = 0; x < kPadded; ++x)
         value[size_t(y * kPadded + x)] =
-            from[size_t(std::clamp(y0 + y - kPad, 0, height - 1)) * size_t(width) +
-                 size_t(std::clamp(x0 + x - kPad, 0, width - 1))];
+            at(size_t(std::clamp(y0 + y - kPad, 0, height - 1)) * size_t(width) +
+               size_t(std::clamp(x0 + x - kPad, 0, width - 1)));
   }
   /// Row of the tile's coordinates, which start at 0 within the padding.
   const float* row(int x, int y) const { return &value[size_t((y + kPad) * kPadded + x + kPad)]; }
 };
 
+/// A picture whose pixels join the windows, with the way to it from the picture that is denoised.
+struct Source {
+  const NoisyPicture* picture;
+  const PixelMatch* match;  // null: that picture itself
+  int reach;                // of the window in it
+};
+
+/// A tile of one source, where its pixels are in the picture that is denoised.
 struct TileInput {
+  TileInput(const Source& source, const NoisyPicture& target, int x0, int y0)
+      : feature(target.feature.size()),
+        feature_variance(target.feature.size()),
+        reach(source.reach) {
+    const auto take = [&](Padded& to, const Plane& from, float scale) {
+      const auto at = [&](size_t p) {
+        return source.match ? scale * from[size_t(source.match->pixel[p])] : from[p];
+      };
+      to.take(at, x0, y0, target.width, target.height);
+    };
+    const NoisyPicture& picture = *source.picture;
+    for (int c = 0; c < 3; ++c) {
+      for (int h = 0; h < 2; ++h) take(half[h][c], picture.half[h][c], 1);
+      take(variance[c], picture.variance[c], 1);
+    }
+    for (size_t f = 0; f < feature.size(); ++f) {
+      const float scale = picture.unit(f) / target.unit(f);
+      take(feature[f], picture.feature[f], scale);
+      take(feature_variance[f], picture.feature_variance[f], scale * scale);
+    }
+    const auto counts = [&](size_t p) { return source.match ? source.match->same[p] : 1.f; };
+    same.take(counts, x0, y0, target.width, target.height);
+  }
+
   Padded half[2][3], variance[3];
   std::vector<Padded> feature, feature_variance;
+  Padded same;  // 0: counts nothing
+  int reach;
 };
 
 /// Sums over 2 kPatch + 1 values in a row, and then in a column.
@@ -74,16 +113,19 @@ void sum_patches(const std::array<float, kCompared * kCompared>& distance,
     }
 }
 
-/// How much the pixel at an offset counts for each of the tile, by the looks of one half.
-void weigh(const TileInput& tile, int half, int dx, int dy,
-           std::array<float, kTile * kTile>& weight) {
+using TileWeight = std::array<float, kTile * kTile>;
+
+/// How much the pixel of `other` at an offset counts for each of the tile, by the looks of one
+/// half.
+void weigh(const TileInput& tile, const TileInput& other, int half, int dx, int dy,
+           TileWeight& weight) {
   std::array<float, kCompared * kCompared> distance{};
   for (int c = 0; c < 3; ++c)
     for (int y = 0; y < kCompared; ++y) {
       const float *a = tile.half[half][c].row(-kPatch, y - kPatch),
-                  *b = tile.half[half][c].row(dx - kPatch, y - kPatch + dy),
+                  *b = other.half[half][c].row(dx - kPatch, y - kPatch + dy),
                   *va = tile.variance[c].row(-kPatch, y - kPatch),
-                  *vb = tile.variance[c].row(dx - kPatch, y - kPatch + dy);
+                  *vb = other.variance[c].row(dx - kPatch, y - kPatch + dy);
       float* out = &distance[size_t(y * kCompared)];
       for (int x = 0; x < kCompared; ++x) {
         const float d = a[x] - b[x];
@@ -94,6 +136,10 @@ void weigh(const TileInput& tile, int half, int dx, int dy,
   sum_patches(distance, weight);
   constexpr float kShare = 1.f / (3 * (2 * kPatch + 1) * (2 * kPatch + 1));
   for (float& w : weight) w = std::exp(-std::max(0.f, w * kShare));
+  for (int y = 0; y < kTile; ++y) {
+    const float* same = other.same.row(dx, y + dy);
+    for (int x = 0; x < kTile; ++x) weight[size_t(y * kTile + x)] *= same[x];
+  }
 }
 
 /// Sums of the normal equations for a row of pixels: the upper triangle of terms x (terms +
@@ -130,30 +176,34 @@ std::array<float, 3> solve(const NormalEquations& equations, int x, int terms) {
   return out;
 }
 
+/// Calls with the offsets of a window.
+template <class Visit>
+void for_each_offset(int reach, const Visit& visit) {
+  for (int dy = -reach; dy <= reach; ++dy)
+    for (int dx = -reach; dx <= reach; ++dx) visit(dx, dy);
+}
+
 class TileDenoiser {
  public:
-  TileDenoiser(const NoisyPicture& picture, int x0, int y0)
-      : picture_(picture), x0_(x0), y0_(y0), terms_(int(picture.feature.size()) + 3) {
-    const auto take = [&](Padded& to, const Plane& from) {
-      to.take(from, x0, y0, picture.width, picture.height);
-    };
-    for (int c = 0; c < 3; ++c) {
-      for (int h = 0; h < 2; ++h) take(tile_.half[h][c], picture.half[h][c]);
-      take(tile_.variance[c], picture.variance[c]);
+  /// @param sources  first the picture itself
+  TileDenoiser(const std::vector<Source>& sources, int x0, int y0)
+      : picture_(*sources[0].picture), x0_(x0), y0_(y0), terms_(int(picture_.feature.size()) + 3) {
+    size_t offsets = 0;
+    tile_.reserve(sources.size());
+    for (const Source& source : sources) {
+      tile_.emplace_back(source, picture_, x0, y0);
+      offsets += size_t((2 * source.reach + 1) * (2 * source.reach + 1));
     }
-    tile_.feature.resize(picture.feature.size());
-    tile_.feature_variance.resize(picture.feature.size());
-    for (size_t f = 0; f < picture.feature.size(); ++f) {
-      take(tile_.feature[f], picture.feature[f]);
-      take(tile_.feature_variance[f], picture.feature_variance[f]);
-    }
+    weight_.resize(offsets);
   }
 
   void run(std::vector<Plane>& out) {
     for (int h = 0; h < 2; ++h) {
       size_t k = 0;
-      for (int dy = -kReach; dy <= kReach; ++dy)
-        for (int dx = -kReach; dx <= kReach; ++dx) weigh(tile_, 1 - h, dx, dy, weight_[k++]);
+      for (const TileInput& other : tile_)
+        for_each_offset(other.reach, [&](int dx, int dy) {
+          weigh(tile_[0], other, 1 - h, dx, dy, weight_[k++]);
+        });
       for (int y = 0; y < std::min(kTile, picture_.height - y0_); ++y) fit_row(h, y, out);
     }
   }
@@ -164,9 +214,10 @@ class TileDenoiser {
       for (TileRow& sum : row) sum.fill(0);
     for (TileRow& noise : equations_.noise) noise.fill(0);
     size_t k = 0;
-    for (int dy = -kReach; dy <= kReach; ++dy)
-      for (int dx = -kReach; dx <= kReach; ++dx)
-        add_neighbour(half, y, dx, dy, &weight_[k++][size_t(y * kTile)]);
+    for (const TileInput& other : tile_)
+      for_each_offset(other.reach, [&](int dx, int dy) {
+        add_neighbour(other, half, y, dx, dy, &weight_[k++][size_t(y * kTile)]);
+      });
     for (int x = 0; x < std::min(kTile, picture_.width - x0_); ++x) {
       const std::array<float, 3> colour = solve(equations_, x, terms_);
       const size_t pixel = size_t(y0_ + y) * size_t(picture_.width) + size_t(x0_ + x);
@@ -174,14 +225,14 @@ class TileDenoiser {
     }
   }
 
-  void add_neighbour(int half, int y, int dx, int dy, const float* weight) {
+  void add_neighbour(const TileInput& other, int half, int y, int dx, int dy, const float* weight) {
     std::array<TileRow, kRows> term;
     term[0].fill(1);
     term[1].fill(float(dx) / kReach);
     term[2].fill(float(dy) / kReach);
-    for (size_t f = 0; f < tile_.feature.size(); ++f) {
-      const float *here = tile_.feature[f].row(0, y), *there = tile_.feature[f].row(dx, y + dy),
-                  *noise = tile_.feature_variance[f].row(dx, y + dy);
+    for (size_t f = 0; f < other.feature.size(); ++f) {
+      const float *here = tile_[0].feature[f].row(0, y), *there = other.feature[f].row(dx, y + dy),
+                  *noise = other.feature_variance[f].row(dx, y + dy);
       TileRow& sum = equations_.noise[f + 2];
       for (int x = 0; x < kTile; ++x) {
         term[f + 3][size_t(x)] = there[x] - here[x];
@@ -189,7 +240,7 @@ class TileDenoiser {
       }
     }
     for (size_t c = 0; c < 3; ++c) {
-      const float* there = tile_.half[half][c].row(dx, y + dy);
+      const float* there = other.half[half][c].row(dx, y + dy);
       std::copy(there, there + kTile, term[size_t(terms_) + c].begin());
     }
     for (size_t i = 0; i < size_t(terms_); ++i) {
@@ -204,8 +255,8 @@ class TileDenoiser {
 
   const NoisyPicture& picture_;
   int x0_, y0_, terms_;
-  TileInput tile_;
-  std::array<std::array<float, kTile * kTile>, (2 * kReach + 1) * (2 * kReach + 1)> weight_;
+  std::vector<TileInput> tile_;     // of each source
+  std::vector<TileWeight> weight_;  // of each offset in each
   NormalEquations equations_;
 };
 
@@ -271,20 +322,55 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels) {
   return picture;
 }
 
-std::vector<Plane> denoise(NoisyPicture picture) {
+namespace {
+
+/// The picture itself, the frames before it and those after it.
+class Sources {
+ public:
+  Sources(const NoisyPicture& picture, const Neighbours& neighbours)
+      : list_{{&picture, nullptr, kReach}} {
+    const size_t before = neighbours.before.size(), after = neighbours.after.size();
+    matches_.reserve(before + after);
+    add(picture, neighbours.before, Side::before);
+    add(picture, neighbours.after, Side::after);
+  }
+  const std::vector<Source>& list() const { return list_; }
+
+ private:
+  void add(const NoisyPicture& picture, const std::vector<NoisyPicture>& frames, Side side) {
+    const NoisyPicture* from = &picture;
+    for (const NoisyPicture& to : frames) {
+      PixelMatch step = match_pixels(*from, to, side);
+      matches_.push_back(from == &picture ? std::move(step) : chained(matches_.back(), step));
+      list_.push_back({&to, &matches_.back(), kReachBeside});
+      from = &to;
+    }
+  }
+
+  std::vector<PixelMatch> matches_;
+  std::vector<Source> list_;
+};
+
+void prepare(NoisyPicture& picture) {
   tame_outliers(picture);
   smooth_variance(picture);
+}
+
+}  // namespace
+
+std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
+  prepare(picture);
+  for (std::vector<NoisyPicture>* side : {&neighbours.before, &neighbours.after})
+    for (NoisyPicture& frame : *side) prepare(frame);
+  const Sources sources(picture, neighbours);
   std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
   const int columns = (picture.width + kTile - 1) / kTile;
   const int rows = (picture.height + kTile - 1) / kTile;
   tbb::parallel_for(
       tbb::blocked_range<int>(0, columns * rows, 1),
       [&](const tbb::blocked_range<int>& range) {
-        for (int t = range.begin(); t < range.end(); ++t) {
-          const auto tile =
-              std::make_unique<TileDenoiser>(picture, t % columns * kTile, t / columns * kTile);
-          tile->run(out);
-        }
+        for (int t = range.begin(); t < range.end(); ++t)
+          TileDenoiser(sources.list(), t % columns * kTile, t / columns * kTile).run(out);
       },
       tbb::simple_partitioner{});
   return out;

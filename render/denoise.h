@@ -1,6 +1,6 @@
 #pragma once
 // Takes the noise of a rendered picture away, guided by what is known without noise or with less:
-// albedo, normal and distance.
+// albedo, normal and distance; and by the frames before and after it, where they show the same.
 
 #include <vector>
 
@@ -18,6 +18,17 @@ struct NoisyPicture {
   Plane variance[3];                    // of a half's mean
   std::vector<Plane> feature;           // guides, about 1 in size
   std::vector<Plane> feature_variance;  // of their means
+  std::vector<float> feature_unit;      // what 1 is, of each; empty: as in all other frames
+  /// Pixels to the right and down to where what is seen is in the frame before and in the one
+  /// after; needed with neighbours only.
+  Plane motion[2][2];
+
+  float unit(size_t f) const { return feature_unit.empty() ? 1.f : feature_unit[f]; }
+};
+
+/// Frames of the same size before a frame and after it, the nearest first.
+struct Neighbours {
+  std::vector<NoisyPicture> before, after;
 };
 
 /// Halves and variances of a picture; its size and guides are still to be given.
@@ -30,7 +41,12 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 /// weigh less (ridge) in place of being filtered first. A lone pixel that far outshines all around
 /// it, by a light that few of its samples found, is brought down to them first: spread over its
 /// window it would be a white square. The same bits for any thread count.
+///
+/// Pixels of neighbours in time join the window, led there by their motion, in a smaller window of
+/// 9 x 9 since the same place comes first; a pixel that shows something else there counts nothing.
+/// What does not move as its surface does, a refraction say, is told by its patches. Neighbours are
+/// taken as they were rendered, so that a frame depends on those alone.
 /// @return the three colours
-std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture);
+std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture, Neighbours neighbours = {});
 
 }  // namespace drench

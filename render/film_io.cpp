@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstring>
 #include <deque>
+#include <map>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
@@ -99,6 +100,27 @@ class Channels {
   uint64_t clamped_ = 0;
 };
 
+/// Layers of a file by the names of its channels, with room for their values; beauty aside.
+std::vector<FilmLayer> layers_of(const Imf::Header& header, size_t pixels) {
+  std::map<std::string, FilmLayer> layers;
+  for (auto at = header.channels().begin(); at != header.channels().end(); ++at) {
+    const std::string channel = at.name();
+    const size_t dot = channel.rfind('.');
+    if (dot == std::string::npos) continue;
+    FilmLayer& layer = layers[channel.substr(0, dot)];
+    layer.name = channel.substr(0, dot);
+    layer.channel.push_back(channel.substr(dot + 1));
+    layer.precision =
+        at.channel().type == Imf::FLOAT ? FilmLayer::Precision::full : FilmLayer::Precision::half;
+  }
+  std::vector<FilmLayer> out;
+  for (auto& [name, layer] : layers) {
+    layer.value.resize(layer.channel.size() * pixels);
+    out.push_back(std::move(layer));
+  }
+  return out;
+}
+
 /// The window of pixels that a header promises, checked against the file that made the promise.
 Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header& header) {
   const Imath::Box2i window = header.dataWindow();
@@ -145,6 +167,51 @@ Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
   return film;
 }
 
+FilmWindow film_window(const Imf::Header& header) {
+  const Imath::Box2i &all = header.displayWindow(), &part = header.dataWindow();
+  if (all == part) return {};
+  return {part.min.x, part.min.y, all.size().x + 1, all.size().y + 1};
+}
+
+Film read_all(const std::filesystem::path& path) {
+  Imf::InputFile file(path.c_str());
+  const Imf::Header& header = file.header();
+  const Imath::Box2i window = checked_window(path, header);
+  Film film{window.size().x + 1, window.size().y + 1, {}, film_window(header)};
+  const size_t pixels = size_t(film.width) * size_t(film.height);
+  film.rgba.resize(4 * pixels);
+  film.layer = layers_of(header, pixels);
+  Imf::FrameBuffer buffer;
+  const auto add = [&](const std::string& prefix, const std::vector<std::string>& names,
+                       std::vector<float>& value) {
+    const size_t stride = names.size() * sizeof(float);
+    for (size_t c = 0; c < names.size(); ++c)
+      buffer.insert(prefix + names[c], Imf::Slice::Make(Imf::FLOAT, value.data() + c, window,
+                                                        stride, stride * size_t(film.width)));
+  };
+  add("", {"R", "G", "B", "A"}, film.rgba);
+  for (FilmLayer& layer : film.layer) add(layer.name + ".", layer.channel, layer.value);
+  file.setFrameBuffer(buffer);
+  file.readPixels(window.min.y, window.max.y);
+  for (auto at = header.begin(); at != header.end(); ++at)
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&at.attribute()))
+      film.header.emplace_back(at.name(), text->value());
+  return film;
+}
+
+/// What a reader gives. @throws Error with the path for whatever it throws
+template <class Read>
+Film read_or_fail(const std::filesystem::path& path, const Read& read) {
+  if (!std::filesystem::is_regular_file(path)) fail_read(path, "there is no such file");
+  try {
+    return read();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    fail_read(path, e.what());
+  }
+}
+
 }  // namespace
 
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
@@ -183,15 +250,12 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
   });
 }
 
+Film read_layers(const std::filesystem::path& path) {
+  return read_or_fail(path, [&] { return read_all(path); });
+}
+
 Film read_exr(const std::filesystem::path& path, Primaries primaries) {
-  if (!std::filesystem::is_regular_file(path)) fail_read(path, "there is no such file");
-  try {
-    return read_pixels(path, primaries);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& e) {
-    fail_read(path, e.what());
-  }
+  return read_or_fail(path, [&] { return read_pixels(path, primaries); });
 }
 
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,

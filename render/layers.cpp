@@ -29,10 +29,12 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
       features_(shot.render.denoise),
       width_(width),
       height_(height),
+      corner_(shot.render.crop_min),
       fps_(shot.timeline.fps),
       shutter_open_(shutter(shot, shot.camera.shutter_open)),
       shutter_frames_(shutter(shot, shot.camera.shutter_close) - shutter_open_),
       frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height),
+      before_camera_(shot.camera, frame - 1, frame, shot.render.width, shot.render.height),
       catchers_(scene.has_catchers()) {
   const size_t pixels = size_t(width_) * height_;
   if (records()) pixel_.resize(pixels);
@@ -85,16 +87,25 @@ void LayerFilm::archive(CheckpointArchive& file) {
   }
 }
 
-V3f LayerFilm::motion_of(const PathRecord& record) const {
+/// Rows count down, the layer up.
+V3f LayerFilm::motion_of(const PathRecord& record, const CameraPose& eye, float frames) const {
   const V3f per_frame = scene_->velocity(record.first) * float(1 / fps_);
   const double since_frame = shutter_open_ + record.time * shutter_frames_;
   const V3f now = record.position - per_frame * float(since_frame);
-  const V2f from = frame_camera_.project(frame_camera_.open(), now);
-  const V2f to = frame_camera_.project(frame_camera_.close(), now + per_frame);
-  const CameraPose &eye = frame_camera_.open(), &next = frame_camera_.close();
-  const float depth = dot(now - eye.position, eye.forward);
-  // Rows count down, the layer up.
-  return {to.x - from.x, from.y - to.y, dot(now + per_frame - next.position, next.forward) - depth};
+  const V3f then = now + per_frame * frames;
+  const CameraPose& here = frame_camera_.open();
+  const V2f from = frame_camera_.project(here, now), to = frame_camera_.project(eye, then);
+  const float depth = dot(now - here.position, here.forward);
+  return {to.x - from.x, from.y - to.y, dot(then - eye.position, eye.forward) - depth};
+}
+
+/// Of what is infinitely far away.
+V3f LayerFilm::motion_of_sky(size_t pixel, const CameraPose& eye) const {
+  const V2f film(float(corner_.x + int(pixel % size_t(width_))) + 0.5f,
+                 float(corner_.y + int(pixel / size_t(width_))) + 0.5f);
+  const Ray ray = frame_camera_.ray<false, false>(film, V2f(0), 0);
+  const V2f to = frame_camera_.project(eye, eye.position + ray.direction);
+  return {to.x - film.x, film.y - to.y, 0};
 }
 
 void LayerFilm::add_light(size_t pixel, const PathRecord& record) {
@@ -129,8 +140,9 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   p.inverse_depth += 1 / depth;
   p.inverse_depth2 += 1 / (depth * depth);
   if (depth < p.nearest.depth) {
-    p.nearest = {depth, record.position, V3f(0)};
-    if (want_.motion) p.nearest.motion = motion_of(record);
+    p.nearest = {depth, record.position};
+    if (want_.motion || features_) p.nearest.motion = motion_of(record, frame_camera_.close(), 1);
+    if (features_) p.nearest.back = motion_of(record, before_camera_.open(), -1);
   }
   if (!want_.cryptomatte) return;
   const size_t object =
@@ -220,9 +232,23 @@ void LayerFilm::add_features(NoisyPicture& picture, const std::vector<PixelSum>&
   for (size_t p = 0; p < pixels.size(); ++p)
     largest_nearness =
         std::max(largest_nearness, double(pixel_[p].inverse_depth) / pixels[p].samples());
+  if (!(largest_nearness > 0)) largest_nearness = 1;
   add([](const Pixel& p) { return double(p.inverse_depth); },
-      [](const Pixel& p) { return double(p.inverse_depth2); },
-      largest_nearness > 0 ? largest_nearness : 1);
+      [](const Pixel& p) { return double(p.inverse_depth2); }, largest_nearness);
+  picture.feature_unit.assign(picture.feature.size(), 1);
+  picture.feature_unit.back() = float(largest_nearness);
+}
+
+void LayerFilm::add_motion(NoisyPicture& picture) const {
+  for (auto& side : picture.motion)
+    for (NoisyPicture::Plane& plane : side) plane.resize(pixel_.size());
+  for (size_t p = 0; p < pixel_.size(); ++p) {
+    const bool sky = !saw_something(p);
+    const V3f before = sky ? motion_of_sky(p, before_camera_.open()) : pixel_[p].nearest.back;
+    const V3f after = sky ? motion_of_sky(p, frame_camera_.close()) : pixel_[p].nearest.motion;
+    picture.motion[0][0][p] = before.x, picture.motion[0][1][p] = -before.y;
+    picture.motion[1][0][p] = after.x, picture.motion[1][1][p] = -after.y;
+  }
 }
 
 std::vector<std::pair<std::string, std::string>> LayerFilm::header() const {

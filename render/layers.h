@@ -41,6 +41,8 @@ class LayerFilm {
   std::vector<FilmLayer> finish(const std::vector<PixelSum>& pixels, const PlateFilm& plate) const;
   /// What guides the denoiser, with the variance of each: albedo, normal, nearness.
   void add_features(NoisyPicture& picture, const std::vector<PixelSum>& pixels) const;
+  /// And where what is seen is in the frames before and after.
+  void add_motion(NoisyPicture& picture) const;
   /// Whether a camera sample of a pixel met the ground or an object that is no matte.
   bool saw_something(size_t pixel) const { return pixel_[pixel].nearest.depth < kNothing; }
   /// Header entries that belong to them.
@@ -51,7 +53,7 @@ class LayerFilm {
   struct Nearest {
     float depth = kNothing;
     V3f position{0, 0, 0};
-    V3f motion{0, 0, 0};
+    V3f motion{0, 0, 0}, back{0, 0, 0};  // to the next frame and to the one before
   };
   struct Pixel {
     V3f albedo{0, 0, 0}, normal{0, 0, 0};
@@ -64,7 +66,8 @@ class LayerFilm {
 
   void add_light(size_t pixel, const PathRecord& record);
   Imath::V3d light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const;
-  V3f motion_of(const PathRecord& record) const;
+  V3f motion_of(const PathRecord& record, const CameraPose& eye, float frames) const;
+  V3f motion_of_sky(size_t pixel, const CameraPose& eye) const;
   FilmLayer layer(const std::string& name, const std::vector<std::string>& channels,
                   FilmLayer::Precision precision) const;
   void add_matte(std::vector<FilmLayer>& out, const std::string& name, const NameIndex& things,
@@ -76,8 +79,10 @@ class LayerFilm {
   std::vector<std::string> groups_;  // of light, the last is photons'
   size_t shown_groups_ = 0;
   int width_, height_;
+  V2i corner_;  // of the part in the frame, pixels
   double fps_, shutter_open_, shutter_frames_;
-  ShutterCamera frame_camera_;  // at this frame and the next
+  ShutterCamera frame_camera_;   // at this frame and the next
+  ShutterCamera before_camera_;  // at the frame before and this one
   NameIndex objects_, materials_;
   std::vector<Pixel> pixel_;
   std::vector<Imath::V3d> light_;       // by pixel, then group

@@ -27,6 +27,12 @@ enum class WaterGuide {
   off,
 };
 
+/// What render.denoise makes of a frame.
+enum class Denoised {
+  alone,  // smooth, by this frame only
+  later,  // noisy, with the layers of noisy_frame.h
+};
+
 /// Where a frame's samples are kept until it is finished, so that a stopped one goes on.
 struct FrameCheckpoint {
   std::filesystem::path file;  // empty: none is kept
@@ -44,6 +50,7 @@ struct RenderOptions {
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
   FrameCheckpoint checkpoint{};
+  Denoised denoised = Denoised::alone;
   std::shared_ptr<KeptParts> parts{};  // of frames of the same shot before; null: none
 };
 

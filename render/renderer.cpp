@@ -13,6 +13,7 @@
 #include "pipeline/contract/error.h"
 #include "render/filter.h"
 #include "render/frame_checkpoint.h"
+#include "render/noisy_frame.h"
 #include "render/options.h"
 #include "render/path.h"
 #include "render/photons.h"
@@ -183,23 +184,18 @@ FilmWindow window_of(const RenderSettings& r) {
   return {r.crop_min.x, r.crop_min.y, r.width, r.height};
 }
 
-/// Puts the denoised beauty in the place of the noisy one, which becomes a layer.
-void denoise_film(const Sums& sums, Film& film) {
+/// Denoises the beauty, or adds what that takes.
+void denoise_film(const Sums& sums, Denoised denoised, Film& film) {
   NoisyPicture picture = noisy_picture(sums.beauty());
   picture.width = film.width;
   picture.height = film.height;
   sums.layers.add_features(picture, sums.pixel);
-  const std::vector<NoisyPicture::Plane> clean = denoise(std::move(picture));
-  FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
-  for (size_t p = 0; p < sums.pixel.size(); ++p)
-    for (size_t c = 0; c < 3; ++c) {
-      noisy.value.push_back(film.rgba[4 * p + c]);
-      film.rgba[4 * p + c] = clean[c][p];
-    }
-  film.layer.push_back(std::move(noisy));
+  if (denoised == Denoised::alone) return put_clean(film, denoise(std::move(picture)));
+  sums.layers.add_motion(picture);
+  add_picture(film, std::move(picture));
 }
 
-/// The same for what makes alpha, before anything is made of it.
+/// Denoises what makes alpha, before anything is made of it; by this frame only.
 void denoise_plate(const Job& job, Sums& sums) {
   const auto clean = [&](NoisyPicture picture) {
     sums.layers.add_features(picture, sums.pixel);
@@ -294,7 +290,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   render_passes(job, options.checkpoint, sums, rays, report);
   if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
-  if (shot.render.denoise) denoise_film(sums, film);
+  if (shot.render.denoise) denoise_film(sums, options.denoised, film);
   if (stats) {
     *stats = {report.samples(), rays, picture_error(sums.beauty()),
               process_cpu_seconds() - cpu_start};

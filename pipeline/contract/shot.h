@@ -346,6 +346,7 @@ struct RenderSettings {
   int samples = 64;                    // camera samples a pixel, at most where there is a target
   double error = 0;                    // relative MSE to sample until; 0: all samples everywhere
   bool denoise = false;                // of the beauty, by its layers' help
+  int denoise_frames = 1;              // before and after that help, too
   int depth = 8;                       // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
   Background background = Background::sky;

@@ -27,7 +27,7 @@ Shot parse_shot(const std::string& text, const std::filesystem::path& file,
 /// parse_shot(lock) gives the same shot.
 std::string shot_lock(const Shot& shot);
 
-enum class Stage { simulate, mesh, foam, render };
+enum class Stage { simulate, mesh, foam, render, denoise };
 /// Hash of the settings this stage reads and no others (frames excluded; keys are per frame).
 Digest stage_settings_digest(const Shot& shot, Stage stage);
 

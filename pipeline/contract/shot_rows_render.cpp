@@ -187,6 +187,10 @@ std::vector<Parameter> film_rows() {
           "(colour^2 + 0.01); 0: every pixel gets all samples"),
       row<&RenderSettings::denoise>("render", "denoise", "", none, render,
                                     "smooths the beauty's noise; what was rendered is noisy.RGB"),
+      row<&RenderSettings::denoise_frames>(
+          "render", "denoise_frames", "", {0, 3}, denoise,
+          "before and after a frame that denoise looks at, too, so that it does not flicker; 0: "
+          "each frame alone, and no files of noisy frames"),
       row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,

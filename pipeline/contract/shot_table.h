@@ -36,7 +36,7 @@ enum class Kind {
 };
 
 /// Stages that read a value; a stage's digest covers exactly the rows that name it.
-enum : unsigned { no_stage = 0, simulate = 1, mesh = 2, render = 4, foam = 8 };
+enum : unsigned { no_stage = 0, simulate = 1, mesh = 2, render = 4, foam = 8, denoise = 16 };
 
 struct Limits {
   double lowest = 0, highest = 0;  // inclusive, of every component

@@ -30,6 +30,7 @@ std::string stages_text(unsigned stages) {
   add(shot_table::mesh, "mesh");
   add(shot_table::foam, "foam");
   add(shot_table::render, "render");
+  add(shot_table::denoise, "denoise");
   return text.empty() ? "-" : text;
 }
 
@@ -104,7 +105,8 @@ Digest stage_settings_digest(const Shot& shot, Stage stage) {
   const unsigned bit = stage == Stage::simulate ? shot_table::simulate
                        : stage == Stage::mesh   ? shot_table::mesh
                        : stage == Stage::foam   ? shot_table::foam
-                                                : shot_table::render;
+                       : stage == Stage::render ? shot_table::render
+                                                : shot_table::denoise;
   Hasher hasher;
   hasher.text("drench shot settings").value(uint32_t(bit));
   Shot copy = shot;

@@ -73,7 +73,7 @@ void add_commands(CLI::App& app, Arguments& arguments) {
            "shots/pour.toml --frames 1010", {Step::mesh, Step::foam});
   add_make(app, arguments, "render", "meshes to EXR frames, a contact sheet and a movie",
            "shots/pour.toml --set render.samples=256",
-           {Step::render, Step::contact_sheet, Step::movie});
+           {Step::render, Step::denoise, Step::contact_sheet, Step::movie});
 
   CLI::App* plan = app.add_subcommand("plan", "what would run and what is skipped, with reasons");
   add_shot_options(*plan, arguments);

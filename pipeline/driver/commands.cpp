@@ -154,7 +154,8 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
 }  // namespace
 
 std::vector<Step> all_steps() {
-  return {Step::simulate, Step::mesh, Step::foam, Step::render, Step::contact_sheet, Step::movie};
+  return {Step::simulate, Step::mesh,          Step::foam, Step::render,
+          Step::denoise,  Step::contact_sheet, Step::movie};
 }
 
 void make_command(const ShotArguments& arguments, const std::vector<Step>& steps) {

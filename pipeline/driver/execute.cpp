@@ -59,6 +59,10 @@ class Executor {
   void make_foam(int frame);
   void render_frames();
   void make_image(int frame);
+  bool neighbours_are_rendered(int frame) const;
+  void denoise_beside(int frame);
+  void denoise_rest();
+  void make_denoised(int frame);
   void make_dailies(Step step);
 
   void write_probes(int frame);
@@ -97,6 +101,10 @@ class Executor {
   bool has_committed_ = false;
 
   int next_foam_;  // frame that foam was not looked at yet; foam comes in order
+  std::mutex denoise_mutex_;
+  std::set<int> rendered_;  // wanted frames that are as they shall be
+  std::set<int> denoised_;  // frames that someone has taken on
+  std::atomic<int> renderers_{0};
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
   tbb::task_arena simulate_arena_, mesh_arena_, render_arena_;
   std::counting_semaphore<most_stage_threads> slots_;
@@ -413,8 +421,68 @@ void Executor::make_image(int frame) {
 
 void Executor::render_frames() {
   while (const std::optional<int> frame = to_render_.pop()) {
-    if (wanted_.may(Step::render)) make_image(*frame);
+    if (!wanted_.may(Step::render)) continue;
+    make_image(*frame);
+    if (wanted_.denoise_frames > 0) denoise_beside(*frame);
   }
+  if (--renderers_ == 0 && wanted_.denoise_frames > 0 && !stopping()) denoise_rest();
+}
+
+/// Whether nothing of this run can change what a wanted frame is denoised by.
+bool Executor::neighbours_are_rendered(int frame) const {
+  for (int k = -wanted_.denoise_frames; k <= wanted_.denoise_frames; ++k) {
+    const int near = frame + k;
+    // Whether one that is not wanted may be used is known when all its caches are made.
+    if (wanted_.wants(near) ? !rendered_.contains(near)
+                            : manifest_.find(layout::noisy(wanted_.shot, near)).has_value())
+      return false;
+  }
+  return true;
+}
+
+/// Denoises the frames that waited for this one and for no other.
+void Executor::denoise_beside(int frame) {
+  std::vector<int> ready;
+  {
+    const std::scoped_lock lock(denoise_mutex_);
+    rendered_.insert(frame);
+    for (int k = -wanted_.denoise_frames; k <= wanted_.denoise_frames; ++k) {
+      const int near = frame + k;
+      if (wanted_.wants(near) && neighbours_are_rendered(near) && denoised_.insert(near).second)
+        ready.push_back(near);
+    }
+  }
+  for (const int near : ready) {
+    if (stopping()) return;
+    make_denoised(near);
+  }
+}
+
+/// Once all frames are rendered: those at the ends of what is wanted.
+void Executor::denoise_rest() {
+  for (const int frame : denoised_frames(wanted_, lookup_)) {
+    if (stopping()) return;
+    if (denoised_.insert(frame).second) make_denoised(frame);
+  }
+}
+
+void Executor::make_denoised(int frame) {
+  const std::optional<Decision> decision = decide_denoise(wanted_, frame, lookup_);
+  if (!decision) throw PlanAgain(fmt::format("the noisy frame {} is missing", frame));
+  if (!decision->make) return progress_.not_needed(Step::denoise, frame);
+  const Clock::time_point start = Clock::now();
+  const NoisyFiles noisy = denoise_inputs(wanted_, frame, lookup_);
+  Attributes attributes{{"key.denoise", decision->key.digest.hex()}};
+  for (const std::string& file : noisy.all()) {
+    check_input(file);
+    const std::optional<Record> record = manifest_.find(file);
+    if (record)
+      attributes.emplace_back(fmt::format("key.noisy.{}", record->frame), record->digest.hex());
+  }
+  StageReport report;
+  compute(render_arena_, [&] { report = stages_.denoise(folder_, frame, noisy, attributes); });
+  commit(report.files, step_name(Step::denoise), frame, decision->key);
+  finished(Step::denoise, frame, start, report);
 }
 
 void Executor::make_dailies(Step step) {
@@ -467,6 +535,7 @@ void Executor::run() {
   progress_.start(plan_);
   const int at_once = frames_at_once(options_.threads);
   running_ = 2 + at_once;
+  renderers_ = at_once;
   simulating_ = true;
   std::thread simulating([this] {
     guard(&Executor::simulate_frames);

@@ -17,6 +17,9 @@ std::string foam(int frame) { return fmt::format("mesh/foam.{:04d}.vdb", frame);
 std::string image(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.exr", shot, frame);
 }
+std::string noisy(const std::string& shot, int frame) {
+  return fmt::format("noisy/{}.{:04d}.exr", shot, frame);
+}
 std::string frame_samples(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.samples", shot, frame);
 }

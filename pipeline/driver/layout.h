@@ -22,6 +22,7 @@ std::string fluid_obj(int frame);                               // mesh/fluid.10
 std::string level_set(int frame);                               // mesh/fluid.1001.vdb
 std::string foam(int frame);                                    // mesh/foam.1001.vdb
 std::string image(const std::string& shot, int frame);          // render/pour.1001.exr
+std::string noisy(const std::string& shot, int frame);          // noisy/pour.1001.exr
 std::string frame_samples(const std::string& shot, int frame);  // render/pour.1001.samples
 bool is_frame_samples(std::string_view file);
 std::string movie(const std::string& shot);  // pour.mp4

@@ -69,6 +69,7 @@ class Planner {
   void plan_mesh();
   void plan_foam();
   void plan_render();
+  void plan_denoise();
   void plan_dailies(Step step);
   Plan finish(const Snapshot& snapshot, int timeline_last);
 
@@ -91,7 +92,7 @@ class Planner {
   const Wanted& wanted_;
   const Lookup lookup_;
   Plan plan_;
-  std::map<int, Action> simulated_, meshed_, foamed_, rendered_;
+  std::map<int, Action> simulated_, meshed_, foamed_, rendered_, delivered_;
 };
 
 bool Planner::usable_checkpoint(const std::string& file, const Digest& key) const {
@@ -263,11 +264,24 @@ void Planner::plan_render() {
         if (!known || known->state != FileState::intact) missing.push_back(file);
       }
     }
-    add_made_from(Step::render, frame, decision, input, {layout::image(wanted_.shot, frame)},
+    add_made_from(Step::render, frame, decision, input, {render_file(wanted_, frame)},
                   wanted_.render);
-    rendered_[frame] = plan_.tasks.back().action;
+    rendered_[frame] = delivered_[frame] = plan_.tasks.back().action;
   }
   check_inputs(missing, wanted_.fluid ? "mesh" : "simulate");
+}
+
+void Planner::plan_denoise() {
+  if (wanted_.denoise_frames == 0) return;
+  for (const int frame : denoised_frames(wanted_, lookup_)) {
+    Action input = Action::skip;
+    const auto end = rendered_.upper_bound(frame + wanted_.denoise_frames);
+    for (auto at = rendered_.lower_bound(frame - wanted_.denoise_frames); at != end; ++at)
+      if (at->second != Action::skip) input = Action::depends;
+    add_made_from(Step::denoise, frame, decide_denoise(wanted_, frame, lookup_), input,
+                  {layout::image(wanted_.shot, frame)}, wanted_.denoise);
+    if (wanted_.wants(frame)) delivered_[frame] = plan_.tasks.back().action;
+  }
 }
 
 void Planner::plan_dailies(Step step) {
@@ -278,7 +292,7 @@ void Planner::plan_dailies(Step step) {
     return add(step, 0, Action::skip, "ffmpeg is not installed");
   }
   Action input = Action::skip;
-  for (const auto& [frame, action] : rendered_) {
+  for (const auto& [frame, action] : delivered_) {
     if (action == Action::run) input = Action::run;
     if (action == Action::depends && input == Action::skip) input = Action::depends;
   }
@@ -297,13 +311,15 @@ Plan Planner::finish(const Snapshot& snapshot, int timeline_last) {
     if (of_probe && std::find(probes.begin(), probes.end(), file) == probes.end())
       plan_.beyond.push_back(file);
     const bool framed = known.record.step == "simulate" || known.record.step == "mesh" ||
-                        known.record.step == "foam" || known.record.step == "render";
+                        known.record.step == "foam" || known.record.step == "render" ||
+                        known.record.step == "denoise";
     if (!framed) continue;
     const int frame = known.record.frame;
     const std::string image = layout::image(wanted_.shot, frame);
     std::vector<std::string> wanted = simulated_files(wanted_, frame);
     for (std::string& mesh : mesh_files(wanted_, frame)) wanted.push_back(std::move(mesh));
     if (wanted_.has_foam) wanted.push_back(layout::foam(frame));
+    wanted.push_back(render_file(wanted_, frame));
     const bool named =
         file == image || std::find(wanted.begin(), wanted.end(), file) != wanted.end();
     if (frame > last || frame < wanted_.first || !named) plan_.beyond.push_back(file);
@@ -376,8 +392,62 @@ std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Loo
   if (!inputs) return {};
   // Velocities come from the frames on both sides.
   for (auto& input : sequence_inputs(wanted, frame - 1, frame + 1)) inputs->push_back(input);
+  return decide({render_file(wanted, frame)}, step_key(wanted.render, Step::render, frame, *inputs),
+                lookup);
+}
+
+std::vector<std::string> NoisyFiles::all() const {
+  std::vector<std::string> files{frame};
+  files.insert(files.end(), before.begin(), before.end());
+  files.insert(files.end(), after.begin(), after.end());
+  return files;
+}
+
+namespace {
+
+/// Whether a noisy frame lies there and is what the shot says now, as far as this run's steps know.
+bool lies_there(const Wanted& wanted, int frame, const Lookup& lookup) {
+  const std::optional<KnownFile> known = lookup(layout::noisy(wanted.shot, frame));
+  if (!known || known->state != FileState::intact || frame < wanted.first) return false;
+  if (wanted.wants(frame)) return true;
+  const auto stands = [](const std::optional<Decision>& decision) {
+    return decision && !decision->make;
+  };
+  if (!stands(decide_render(wanted, frame, lookup))) return false;
+  if (wanted.may(Step::mesh) && wanted.fluid && !stands(decide_mesh(wanted, frame, lookup)))
+    return false;
+  if (wanted.may(Step::foam) && wanted.has_foam && !stands(decide_foam(wanted, frame, lookup)))
+    return false;
+  if (!wanted.may(Step::simulate)) return true;
+  const Key key{simulation_keys(wanted, frame).back(), wanted.simulate.parts};
+  return stands(decide(simulated_files(wanted, frame), key, lookup));
+}
+
+}  // namespace
+
+NoisyFiles denoise_inputs(const Wanted& wanted, int frame, const Lookup& lookup) {
+  NoisyFiles files{layout::noisy(wanted.shot, frame), {}, {}};
+  const int reach = wanted.denoise_frames;
+  for (int k = 1; k <= reach && lies_there(wanted, frame - k, lookup); ++k)
+    files.before.push_back(layout::noisy(wanted.shot, frame - k));
+  for (int k = 1; k <= reach && lies_there(wanted, frame + k, lookup); ++k)
+    files.after.push_back(layout::noisy(wanted.shot, frame + k));
+  return files;
+}
+
+std::optional<Decision> decide_denoise(const Wanted& wanted, int frame, const Lookup& lookup) {
+  const auto inputs = digests_of(denoise_inputs(wanted, frame, lookup).all(), lookup);
+  if (!inputs) return {};
   return decide({layout::image(wanted.shot, frame)},
-                step_key(wanted.render, Step::render, frame, *inputs), lookup);
+                step_key(wanted.denoise, Step::denoise, frame, *inputs), lookup);
+}
+
+std::vector<int> denoised_frames(const Wanted& wanted, const Lookup& lookup) {
+  std::set<int> frames(wanted.frames.begin(), wanted.frames.end());
+  for (const int near : wanted.frames)
+    for (int frame = near - wanted.denoise_frames; frame <= near + wanted.denoise_frames; ++frame)
+      if (!frames.contains(frame) && lies_there(wanted, frame, lookup)) frames.insert(frame);
+  return {frames.begin(), frames.end()};
 }
 
 std::optional<Decision> decide_dailies(const Wanted& wanted, Step step, const Lookup& lookup) {
@@ -401,6 +471,7 @@ Plan make_plan(const Wanted& wanted, const Snapshot& snapshot, int timeline_last
   if (wanted.may(Step::mesh)) planner.plan_mesh();
   if (wanted.may(Step::foam)) planner.plan_foam();
   if (wanted.may(Step::render)) planner.plan_render();
+  if (wanted.may(Step::denoise)) planner.plan_denoise();
   if (wanted.may(Step::contact_sheet)) planner.plan_dailies(Step::contact_sheet);
   if (wanted.may(Step::movie)) planner.plan_dailies(Step::movie);
   return planner.finish(snapshot, timeline_last);

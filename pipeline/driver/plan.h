@@ -54,6 +54,13 @@ struct Decision {
   std::string reason;
 };
 
+/// Names of noisy frames.
+struct NoisyFiles {
+  std::string frame;
+  std::vector<std::string> before, after;
+  std::vector<std::string> all() const;
+};
+
 /// Compares files with the key they should have. The first that does not match gives the reason.
 Decision decide(const std::vector<std::string>& files, const Key& key, const Lookup& lookup);
 
@@ -67,6 +74,13 @@ Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_foam(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup);
+/// Noisy frames that a frame is denoised by, the nearest first on either side. A neighbour is one
+/// of the frames wanted or lies there as the shot has it now; none counts beyond one that does not.
+NoisyFiles denoise_inputs(const Wanted& wanted, int frame, const Lookup& lookup);
+std::optional<Decision> decide_denoise(const Wanted& wanted, int frame, const Lookup& lookup);
+/// Frames to denoise: those wanted, and beside them those that lie there already and have them for
+/// neighbours now.
+std::vector<int> denoised_frames(const Wanted& wanted, const Lookup& lookup);
 /// Contact sheet or movie of all wanted frames.
 std::optional<Decision> decide_dailies(const Wanted& wanted, Step step, const Lookup& lookup);
 

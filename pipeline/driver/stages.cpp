@@ -14,6 +14,7 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "render/kept_parts.h"
+#include "render/noisy_frame.h"
 #include "render/renderer.h"
 #include "render/view_transform.h"
 #include "surfacing/foam.h"
@@ -197,6 +198,8 @@ class ShotStages final : public Stages {
     options.parts = parts_;
     options.checkpoint.file = folder / layout::frame_samples(shot_.name, frame);
     options.checkpoint.inputs = digest_of(attributes);
+    const bool later = shot_.render.denoise && shot_.render.denoise_frames > 0;
+    if (later) options.denoised = Denoised::later;
     const Film film = render_frame(shot_, frame, geometry, options, &stats, progress);
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
@@ -205,7 +208,9 @@ class ShotStages final : public Stages {
       all.emplace_back("relative_mse", fmt::format("{:.3g}", stats.relative_mse));
     all.emplace_back("photons", fmt::format("{}", shot_.render.photons));
     StageReport report;
-    report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, all));
+    const std::string file =
+        later ? layout::noisy(shot_.name, frame) : layout::image(shot_.name, frame);
+    report.files.push_back(write_exr(folder / file, film, all));
     fs::remove(options.checkpoint.file);
     report.json = json{
         {"camera_samples", stats.camera_samples},
@@ -215,6 +220,21 @@ class ShotStages final : public Stages {
          stats.cpu_s}}.dump();
     report.line = fmt::format("camera_samples={} rays={} relative_mse={:.2g}", stats.camera_samples,
                               stats.rays, stats.relative_mse);
+    return report;
+  }
+
+  StageReport denoise(const fs::path& folder, int frame, const NoisyFiles& noisy,
+                      const Attributes& attributes) override {
+    const auto paths = [&](const std::vector<std::string>& files) {
+      std::vector<fs::path> out;
+      for (const std::string& file : files) out.push_back(folder / file);
+      return out;
+    };
+    const Film film = denoised_film(folder / noisy.frame, paths(noisy.before), paths(noisy.after));
+    StageReport report;
+    report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, attributes));
+    report.json = json{{"before", noisy.before.size()}, {"after", noisy.after.size()}}.dump();
+    report.line = fmt::format("before={} after={}", noisy.before.size(), noisy.after.size());
     return report;
   }
 

@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/shot.h"
+#include "pipeline/driver/plan.h"
 #include "sim/simulator.h"
 
 namespace drench {
@@ -52,6 +53,9 @@ class Stages {
   virtual StageReport render(const std::filesystem::path& folder, int frame,
                              const Attributes& attributes,
                              const std::function<void(double)>& progress) = 0;
+  /// Makes a frame's image of noisy frames.
+  virtual StageReport denoise(const std::filesystem::path& folder, int frame,
+                              const NoisyFiles& noisy, const Attributes& attributes) = 0;
   virtual StageReport contact_sheet(const std::filesystem::path& folder,
                                     const std::vector<int>& frames) = 0;
   /// @param keep_going  asked between frames; false throws Stopped.

@@ -152,6 +152,13 @@ StageKey render_key(const Shot& shot) {
   return builder.finish();
 }
 
+StageKey denoise_key(const Shot& shot) {
+  return StageKeyBuilder("denoise", build_id::render, {})
+      .settings(stage_settings_digest(shot, Stage::denoise))
+      .part("denoise_frames", std::to_string(shot.render.denoise_frames))
+      .finish();
+}
+
 StageKey dailies_key(const Shot& shot) {
   return StageKeyBuilder("dailies", build_id::dailies, {})
       .number("fps", shot.timeline.fps)
@@ -171,6 +178,8 @@ std::string_view step_name(Step step) {
       return "foam";
     case Step::render:
       return "render";
+    case Step::denoise:
+      return "denoise";
     case Step::contact_sheet:
       return "contact sheet";
     case Step::movie:
@@ -181,6 +190,10 @@ std::string_view step_name(Step step) {
 
 bool Wanted::may(Step step) const {
   return std::find(steps.begin(), steps.end(), step) != steps.end();
+}
+
+bool Wanted::wants(int frame) const {
+  return std::binary_search(frames.begin(), frames.end(), frame);
 }
 
 Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
@@ -206,6 +219,8 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.has_foam = wanted.fluid && shot.foam.present;
   if (wanted.has_foam) wanted.foam = foam_key(shot);
   wanted.render = render_key(shot);
+  if (shot.render.denoise) wanted.denoise_frames = shot.render.denoise_frames;
+  if (wanted.denoise_frames > 0) wanted.denoise = denoise_key(shot);
   if (wanted.may(Step::contact_sheet) || wanted.may(Step::movie))
     wanted.dailies = dailies_key(shot);  // who shows nothing needs no OpenColorIO
   wanted.has_ffmpeg = find_ffmpeg().has_value();
@@ -244,6 +259,11 @@ std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
   if (wanted.has_foam) files.push_back(layout::foam(frame));
   for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
   return files;
+}
+
+std::string render_file(const Wanted& wanted, int frame) {
+  return wanted.denoise_frames > 0 ? layout::noisy(wanted.shot, frame)
+                                   : layout::image(wanted.shot, frame);
 }
 
 InputDigests sequence_inputs(const Wanted& wanted, int first, int last) {

@@ -8,6 +8,8 @@
 //                   f - 1 and f and of foam f - 1)    foam is made in order, frame by frame
 //   render(f)   = H(stage, f, digests of meshes and
 //                   of foam)
+//   denoise(f)  = H(stage, f, digests of noisy         as they were rendered: no frame depends on
+//                   frames f, f - 1, f + 1, ...)         one that is denoised
 
 #include <map>
 #include <string>
@@ -18,7 +20,7 @@
 
 namespace drench {
 
-enum class Step { simulate, mesh, foam, render, contact_sheet, movie };
+enum class Step { simulate, mesh, foam, render, denoise, contact_sheet, movie };
 std::string_view step_name(Step step);
 
 /// What a stage depends on besides the files of the stage before.
@@ -41,10 +43,12 @@ struct Wanted {
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
   bool obstacles_move = false;     // equal particles then do not make equal meshes
   std::vector<std::string> probe;  // names of the probes: one file each for all frames
-  StageKey simulate, mesh, foam, render, dailies;  // dailies: contact sheet and movie
+  int denoise_frames = 0;          // before and after one that it is denoised by; 0: no such step
+  StageKey simulate, mesh, foam, render, denoise, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;
 
   bool may(Step step) const;
+  bool wants(int frame) const;
 };
 
 /// Hashes the settings and the files that the shot names (cloth meshes, maps, textures).
@@ -63,6 +67,8 @@ std::vector<std::string> mesh_files(const Wanted& wanted, int frame);
 std::vector<std::string> foam_inputs(const Wanted& wanted, int frame);
 /// Files that rendering a frame reads.
 std::vector<std::string> render_inputs(const Wanted& wanted, int frame);
+/// The file that rendering a frame makes: the image, or a noisy frame to be denoised later.
+std::string render_file(const Wanted& wanted, int frame);
 
 /// A key and what it is made of.
 struct Key {

@@ -88,7 +88,8 @@ void change(const Parameter& p, void* field, const std::filesystem::path& file) 
 
 std::set<Stage> changed_stages(const Shot& before, const Shot& after) {
   std::set<Stage> changed;
-  for (const Stage stage : {Stage::simulate, Stage::mesh, Stage::foam, Stage::render}) {
+  for (const Stage stage :
+       {Stage::simulate, Stage::mesh, Stage::foam, Stage::render, Stage::denoise}) {
     if (stage_settings_digest(before, stage) != stage_settings_digest(after, stage)) {
       changed.insert(stage);
     }
@@ -102,6 +103,7 @@ std::set<Stage> stages_of(unsigned bits) {
   if (bits & shot_table::mesh) stages.insert(Stage::mesh);
   if (bits & shot_table::foam) stages.insert(Stage::foam);
   if (bits & shot_table::render) stages.insert(Stage::render);
+  if (bits & shot_table::denoise) stages.insert(Stage::denoise);
   return stages;
 }
 
@@ -151,7 +153,9 @@ TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
       "wind",   "sink",      "cloth.pin",    "coupling",      "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     const bool holds_water = p.section == "ground" && (p.key == "present" || p.key == "height");
-    if (looks.contains(p.section)) {
+    if (p.key == "denoise_frames") {
+      EXPECT_EQ(p.stages, shot_table::denoise);
+    } else if (looks.contains(p.section)) {
       EXPECT_EQ(p.stages, shot_table::render | (holds_water ? shot_table::mesh : 0u)) << p.key;
     }
     if (physics.contains(p.section)) {

@@ -81,6 +81,11 @@ Wanted toy_wanted(const ToySettings& settings) {
   if (settings.foam) wanted.steps.push_back(Step::foam);
   if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
   wanted.render = toy_key("camera", settings.camera, "1");
+  wanted.denoise_frames = settings.denoise_frames;
+  if (settings.denoise_frames > 0) {
+    wanted.steps.push_back(Step::denoise);
+    wanted.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
+  }
   wanted.dailies = toy_key("dailies", "", "1");
   return wanted;
 }
@@ -132,9 +137,22 @@ StageReport ToyStages::render(const fs::path& folder, int frame, const Attribute
       settings_.fluid ? layout::fluid_mesh(frame) : layout::cloth("flag", frame);
   StageReport report;
   const std::string foam = settings_.foam ? text_of(folder / layout::foam(frame)) : "";
-  report.files.push_back(write_file_whole(folder / layout::image("toy", frame),
+  report.files.push_back(write_file_whole(folder / render_file(toy_wanted(settings_), frame),
                                           settings_.camera + " " + text_of(folder / input) + foam));
   log(Step::render, frame, false);
+  return report;
+}
+
+/// All of what it is given, in order.
+StageReport ToyStages::denoise(const fs::path& folder, int frame, const NoisyFiles& noisy,
+                               const Attributes&) {
+  log(Step::denoise, frame, true);
+  if (hook) hook(Step::denoise, frame);
+  std::string all;
+  for (const std::string& file : noisy.all()) all += file + " " + text_of(folder / file);
+  StageReport report;
+  report.files.push_back(write_file_whole(folder / layout::image("toy", frame), all));
+  log(Step::denoise, frame, false);
   return report;
 }
 

@@ -25,6 +25,7 @@ struct ToySettings {
   bool fluid = true;
   bool foam = false;
   bool obstacles_move = false;
+  int denoise_frames = 0;
   double foam_rate = 0.25;
   std::vector<Step> steps{Step::simulate, Step::mesh, Step::render, Step::contact_sheet};
 };
@@ -47,6 +48,8 @@ class ToyStages : public Stages {
   StageReport foam(const std::filesystem::path& folder, int frame) override;
   StageReport render(const std::filesystem::path& folder, int frame, const Attributes& attributes,
                      const std::function<void(double)>& progress) override;
+  StageReport denoise(const std::filesystem::path& folder, int frame, const NoisyFiles& noisy,
+                      const Attributes& attributes) override;
   StageReport contact_sheet(const std::filesystem::path& folder,
                             const std::vector<int>& frames) override;
   StageReport movie(const std::filesystem::path& folder, const std::vector<int>& frames,
