@@ -8,6 +8,8 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <tuple>
+#include <utility>
 
 #include "render/motion_match.h"
 
@@ -20,6 +22,7 @@ using Plane = NoisyPicture::Plane;
 constexpr int kTile = 32;        // pixels a side of what is worked on at once
 constexpr int kReach = 7;        // of the window
 constexpr int kReachBeside = 4;  // of that in a frame before or after
+constexpr int kReachGuide = 3;   // of that in which a guide is smoothed
 constexpr int kPatch = 3;        // of the patches compared
 constexpr int kPad = kReach + kPatch;
 constexpr int kPadded = kTile + 2 * kPad;
@@ -27,6 +30,7 @@ constexpr int kCompared = kTile + 2 * kPatch;
 /// Patches this many standard deviations apart (squared) count little.
 constexpr float kBandwidth2 = 1;
 constexpr float kLeastVariance = 1e-10f;
+constexpr float kLeastGuideVariance = 1e-6f;
 /// Ridge of a feature without noise, in units of its square.
 constexpr float kRidge = 1e-4f;
 constexpr int kMostFeatures = 9;               // with the two of the place in the picture
@@ -351,6 +355,94 @@ class Sources {
   std::vector<Source> list_;
 };
 
+/// How far apart patches of 3 x 3 pixels of a guide are, in units of their noise and less what that
+/// explains; single pixels would be judged by their own noise, which the mean then kept.
+class GuideLikeness {
+ public:
+  GuideLikeness(const Source& here, const Source& there, size_t f)
+      : here_(*here.picture),
+        there_(*there.picture),
+        match_(there.match),
+        f_(f),
+        scale_(there.picture->unit(f) / here.picture->unit(f)) {}
+
+  size_t pixel(int x, int y) const {
+    return size_t(std::clamp(y, 0, here_.height - 1)) * size_t(here_.width) +
+           size_t(std::clamp(x, 0, here_.width - 1));
+  }
+  size_t across(size_t p) const { return match_ ? size_t(match_->pixel[p]) : p; }
+  float value(size_t q) const { return scale_ * there_.feature[f_][q]; }
+  float variance(size_t q) const { return scale_ * scale_ * there_.feature_variance[f_][q]; }
+
+  float weight(int x, int y, int u, int v) const {
+    if (match_ && match_->same[pixel(u, v)] == 0) return 0;
+    float unlike = 0;
+    for (int j = -1; j <= 1; ++j)
+      for (int i = -1; i <= 1; ++i) {
+        const size_t p = pixel(x + i, y + j), q = across(pixel(u + i, v + j));
+        const float noise = here_.feature_variance[f_][p], its = variance(q);
+        const float d = here_.feature[f_][p] - value(q);
+        unlike += (d * d - (noise + std::min(noise, its))) /
+                  (9 * (kLeastGuideVariance + kBandwidth2 * (noise + its)));
+      }
+    return std::exp(-std::max(0.f, unlike));
+  }
+
+ private:
+  const NoisyPicture &here_, &there_;
+  const PixelMatch* match_;
+  size_t f_;
+  float scale_;
+};
+
+/// Mean of a guide over the pixels around each, of all sources, where patches look alike, and the
+/// mean's variance.
+std::pair<Plane, Plane> smooth_guide(const std::vector<Source>& sources, size_t f) {
+  const NoisyPicture& picture = *sources[0].picture;
+  const int width = picture.width, height = picture.height;
+  std::pair<Plane, Plane> out{picture.feature[f], picture.feature_variance[f]};
+  tbb::parallel_for(0, height, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      double total = 0, mean = 0, scatter = 0;
+      for (const Source& source : sources) {
+        const GuideLikeness guide(sources[0], source, f);
+        for (int v = std::max(y - kReachGuide, 0); v <= std::min(y + kReachGuide, height - 1); ++v)
+          for (int u = std::max(x - kReachGuide, 0); u <= std::min(x + kReachGuide, width - 1);
+               ++u) {
+            const double weight = guide.weight(x, y, u, v);
+            const size_t q = guide.across(guide.pixel(u, v));
+            total += weight;
+            mean += weight * guide.value(q);
+            scatter += weight * weight * guide.variance(q);
+          }
+      }
+      const size_t p = size_t(y) * size_t(width) + size_t(x);
+      out.first[p] = float(mean / total);
+      out.second[p] = float(scatter / (total * total));
+    }
+  });
+  return out;
+}
+
+/// Smooths the guides of all sources: those of the picture that is denoised by all frames, those of
+/// its neighbours by each alone.
+void smooth_guides(const std::vector<Source>& sources, NoisyPicture& picture,
+                   Neighbours& neighbours) {
+  std::vector<NoisyPicture*> frames{&picture};
+  for (std::vector<NoisyPicture>* side : {&neighbours.before, &neighbours.after})
+    for (NoisyPicture& frame : *side) frames.push_back(&frame);
+  std::vector<std::pair<Plane, Plane>> smooth;
+  const size_t guides = picture.feature.size();
+  for (size_t k = 0; k < frames.size(); ++k)
+    for (size_t f = 0; f < guides; ++f)
+      smooth.push_back(
+          smooth_guide(k == 0 ? sources : std::vector<Source>{{frames[k], nullptr, 0}}, f));
+  for (size_t k = 0; k < frames.size(); ++k)
+    for (size_t f = 0; f < guides; ++f)
+      std::tie(frames[k]->feature[f], frames[k]->feature_variance[f]) =
+          std::move(smooth[k * guides + f]);
+}
+
 void prepare(NoisyPicture& picture) {
   tame_outliers(picture);
   smooth_variance(picture);
@@ -363,6 +455,7 @@ std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
   for (std::vector<NoisyPicture>* side : {&neighbours.before, &neighbours.after})
     for (NoisyPicture& frame : *side) prepare(frame);
   const Sources sources(picture, neighbours);
+  if (sources.list().size() > 1) smooth_guides(sources.list(), picture, neighbours);
   std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
   const int columns = (picture.width + kTile - 1) / kTile;
   const int rows = (picture.height + kTile - 1) / kTile;

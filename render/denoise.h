@@ -44,7 +44,9 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 ///
 /// Pixels of neighbours in time join the window, led there by their motion, in a smaller window of
 /// 9 x 9 since the same place comes first; a pixel that shows something else there counts nothing.
-/// What does not move as its surface does, a refraction say, is told by its patches. Neighbours are
+/// What does not move as its surface does, a refraction say, is told by its patches. Guides are
+/// smoothed first then, since a change of their noise from frame to frame would show: by a mean
+/// over what their own variance cannot tell apart. Neighbours are
 /// taken as they were rendered, so that a frame depends on those alone.
 /// @return the three colours
 std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture, Neighbours neighbours = {});

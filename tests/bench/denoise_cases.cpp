@@ -16,7 +16,7 @@ namespace drench::bench {
 
 namespace {
 
-constexpr int kReference = 1600;             // samples
+constexpr int kReference = 800;              // samples
 constexpr int kFirst = 1001, kMeasured = 3;  // frames that are compared
 constexpr int kRadius = 2;                   // frames beside them
 constexpr float kFps = 24;

@@ -121,6 +121,39 @@ TEST(DenoiseFrames, IsNotMisledByMotionThatIsNotTheSurfaces) {
   EXPECT_LT(quality(refracted, 1).error, 1.05 * quality(refracted, 0).error);
 }
 
+/// Samples of water either mirror or refract: what a pixel shows and its guide are off together.
+/// The guides' noise is not taken for detail, and an edge of theirs is not lost for it.
+TEST(DenoiseFrames, IsNotMisledByGuidesWhoseNoiseIsThatOfThePicture) {
+  const auto truth = [](int x) { return x < kSize / 2 ? 0.5f : 0.55f; };
+  const auto frame = [&](int number) {
+    std::mt19937 random{unsigned(number)};
+    std::normal_distribution<float> scatter(0, kNoise);
+    NoisyPicture picture = frame_of([&](int, int x, int) { return Seen{truth(x), 0}; }, number);
+    for (size_t p = 0; p < kSize * kSize; ++p) {
+      const bool left = p % kSize < kSize / 2;
+      float mean = 0;
+      for (auto& half : picture.half) {
+        const float off = scatter(random);
+        for (auto& colour : half) colour[p] = truth(left ? 0 : kSize) + off;
+        mean += off / 2;
+      }
+      picture.feature[0][p] = (left ? 0.f : 1.f) + mean;
+      picture.feature_variance[0][p] = kNoise * kNoise / 2;
+    }
+    return picture;
+  };
+  const auto rms = [&](const NoisyPicture::Plane& out) {
+    double sum = 0;
+    for (int p = 0; p < kSize * kSize; ++p)
+      sum += std::pow(out[size_t(p)] - truth(p % kSize), 2) / (kSize * kSize);
+    return std::sqrt(sum);
+  };
+  const double alone = rms(denoise(frame(1))[1]),
+               with = rms(denoise(frame(1), {{frame(0)}, {frame(2)}})[1]);
+  EXPECT_LT(with, 0.75 * alone);
+  EXPECT_LT(with, 0.15 * kNoise);
+}
+
 /// A square that stands before a wall and is faint against the noise moves 6 pixels a frame.
 Seen square_before_wall(int frame, int x, int y) {
   const int left = 20 + 6 * frame;
