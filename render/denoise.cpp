@@ -24,6 +24,7 @@ constexpr int kReach = 7;        // of the window
 constexpr int kReachBeside = 4;  // of that in a frame before or after
 constexpr int kReachGuide = 3;   // of that in which a guide is smoothed
 constexpr int kPatch = 3;        // of the patches compared
+constexpr int kGuidePad = kReachGuide + 1;
 constexpr int kPad = kReach + kPatch;
 constexpr int kPadded = kTile + 2 * kPad;
 constexpr int kCompared = kTile + 2 * kPatch;
@@ -37,9 +38,10 @@ constexpr int kMostFeatures = 9;               // with the two of the place in t
 constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
 constexpr int kRows = kMostTerms + 3;          // and the colours
 
-/// An outlier is this many times brighter than all but three of the 24 pixels around it, and its
+/// An outlier is this many times brighter than all but a few of the 24 pixels around it, and its
 /// own samples do not know its brightness to this part.
 constexpr float kOutlier = 4, kUnsure = 0.25f;
+constexpr int kFew = 6;
 
 using TileRow = std::array<float, kTile>;
 
@@ -291,9 +293,9 @@ void tame_outliers(NoisyPicture& picture) {
     around.clear();
     for (const size_t q : window)
       if (q != p) around.push_back(bright[q]);
-    if (around.size() < 4) return;
-    std::nth_element(around.begin(), around.begin() + 3, around.end(), std::greater<>());
-    const float most = kOutlier * around[3];
+    if (around.size() <= kFew) return;
+    std::nth_element(around.begin(), around.begin() + kFew, around.end(), std::greater<>());
+    const float most = kOutlier * around[kFew];
     if (!(bright[p] > most)) return;
     const float factor = most / bright[p];
     for (auto& half : picture.half)
@@ -355,70 +357,85 @@ class Sources {
   std::vector<Source> list_;
 };
 
-/// How far apart patches of 3 x 3 pixels of a guide are, in units of their noise and less what that
-/// explains; single pixels would be judged by their own noise, which the mean then kept.
-class GuideLikeness {
- public:
-  GuideLikeness(const Source& here, const Source& there, size_t f)
-      : here_(*here.picture),
-        there_(*there.picture),
-        match_(there.match),
-        f_(f),
-        scale_(there.picture->unit(f) / here.picture->unit(f)) {}
-
-  size_t pixel(int x, int y) const {
-    return size_t(std::clamp(y, 0, here_.height - 1)) * size_t(here_.width) +
-           size_t(std::clamp(x, 0, here_.width - 1));
-  }
-  size_t across(size_t p) const { return match_ ? size_t(match_->pixel[p]) : p; }
-  float value(size_t q) const { return scale_ * there_.feature[f_][q]; }
-  float variance(size_t q) const { return scale_ * scale_ * there_.feature_variance[f_][q]; }
-
-  float weight(int x, int y, int u, int v) const {
-    if (match_ && match_->same[pixel(u, v)] == 0) return 0;
-    float unlike = 0;
-    for (int j = -1; j <= 1; ++j)
-      for (int i = -1; i <= 1; ++i) {
-        const size_t p = pixel(x + i, y + j), q = across(pixel(u + i, v + j));
-        const float noise = here_.feature_variance[f_][p], its = variance(q);
-        const float d = here_.feature[f_][p] - value(q);
-        unlike += (d * d - (noise + std::min(noise, its))) /
-                  (9 * (kLeastGuideVariance + kBandwidth2 * (noise + its)));
+/// One guide of a source, where its pixels are in the picture that is denoised; beyond that
+/// picture's edge its edge pixels, which count nothing there.
+struct GuidePlanes {
+  GuidePlanes(const NoisyPicture& picture, const Source& source, size_t f)
+      : stride(picture.width + 2 * kGuidePad) {
+    const NoisyPicture& from = *source.picture;
+    const float scale = from.unit(f) / picture.unit(f);
+    for (int v = -kGuidePad; v < picture.height + kGuidePad; ++v)
+      for (int u = -kGuidePad; u < picture.width + kGuidePad; ++u) {
+        const int x = std::clamp(u, 0, picture.width - 1), y = std::clamp(v, 0, picture.height - 1);
+        const size_t p = size_t(y) * size_t(picture.width) + size_t(x);
+        const size_t q = source.match ? size_t(source.match->pixel[p]) : p;
+        value.push_back(scale * from.feature[f][q]);
+        variance.push_back(scale * scale * from.feature_variance[f][q]);
+        const float same = source.match ? source.match->same[p] : 1.f;
+        counts.push_back(u == x && v == y ? same : 0.f);
       }
-    return std::exp(-std::max(0.f, unlike));
+  }
+  size_t at(int x, int y) const {
+    return size_t(y + kGuidePad) * size_t(stride) + size_t(x + kGuidePad);
   }
 
- private:
-  const NoisyPicture &here_, &there_;
-  const PixelMatch* match_;
-  size_t f_;
-  float scale_;
+  int stride;
+  Plane value, variance, counts;
+};
+
+/// Sums for a row of pixels.
+struct GuideRow {
+  explicit GuideRow(int width)
+      : total(size_t(width), 0.f), mean(total), scatter(total), unlike(size_t(width) + 2) {}
+
+  /// Adds the pixels at an offset, by how far apart patches of 3 x 3 pixels are in units of their
+  /// noise and less what that explains; single pixels would be judged by their own noise, which the
+  /// mean then kept.
+  void add(const GuidePlanes& here, const GuidePlanes& there, int y, int dx, int dy) {
+    std::fill(unlike.begin(), unlike.end(), 0.f);
+    for (int j = -1; j <= 1; ++j) {
+      const size_t p = here.at(-1, y + j), q = there.at(dx - 1, y + dy + j);
+      const float *a = &here.value[p], *b = &there.value[q];
+      const float *va = &here.variance[p], *vb = &there.variance[q];
+      for (size_t x = 0; x < unlike.size(); ++x) {
+        const float d = a[x] - b[x];
+        unlike[x] += (d * d - (va[x] + std::min(va[x], vb[x]))) /
+                     (9 * (kLeastGuideVariance + kBandwidth2 * (va[x] + vb[x])));
+      }
+    }
+    const size_t q = there.at(dx, y + dy);
+    const float *value = &there.value[q], *variance = &there.variance[q],
+                *counts = &there.counts[q];
+    for (size_t x = 0; x < total.size(); ++x) {
+      const float far = std::clamp(unlike[x] + unlike[x + 1] + unlike[x + 2], 0.f, 16.f);
+      float weight = 1 - far / 16;  // to the 16th: nearly exp(-far), and quick
+      for (int k = 0; k < 4; ++k) weight *= weight;
+      weight *= counts[x];
+      total[x] += weight;
+      mean[x] += weight * value[x];
+      scatter[x] += weight * weight * variance[x];
+    }
+  }
+
+  Plane total, mean, scatter, unlike;
 };
 
 /// Mean of a guide over the pixels around each, of all sources, where patches look alike, and the
 /// mean's variance.
 std::pair<Plane, Plane> smooth_guide(const std::vector<Source>& sources, size_t f) {
   const NoisyPicture& picture = *sources[0].picture;
-  const int width = picture.width, height = picture.height;
+  std::vector<GuidePlanes> planes;
+  for (const Source& source : sources) planes.emplace_back(picture, source, f);
   std::pair<Plane, Plane> out{picture.feature[f], picture.feature_variance[f]};
-  tbb::parallel_for(0, height, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      double total = 0, mean = 0, scatter = 0;
-      for (const Source& source : sources) {
-        const GuideLikeness guide(sources[0], source, f);
-        for (int v = std::max(y - kReachGuide, 0); v <= std::min(y + kReachGuide, height - 1); ++v)
-          for (int u = std::max(x - kReachGuide, 0); u <= std::min(x + kReachGuide, width - 1);
-               ++u) {
-            const double weight = guide.weight(x, y, u, v);
-            const size_t q = guide.across(guide.pixel(u, v));
-            total += weight;
-            mean += weight * guide.value(q);
-            scatter += weight * weight * guide.variance(q);
-          }
-      }
-      const size_t p = size_t(y) * size_t(width) + size_t(x);
-      out.first[p] = float(mean / total);
-      out.second[p] = float(scatter / (total * total));
+  tbb::parallel_for(0, picture.height, [&](int y) {
+    GuideRow row(picture.width);
+    for (const GuidePlanes& there : planes)
+      for (int dy = -kReachGuide; dy <= kReachGuide; ++dy)
+        for (int dx = -kReachGuide; dx <= kReachGuide; ++dx) row.add(planes[0], there, y, dx, dy);
+    const size_t first = size_t(y) * size_t(picture.width);
+    for (size_t x = 0; x < row.total.size(); ++x) {
+      out.first[first + x] = row.mean[x] / row.total[x];
+      out.second[first + x] = row.scatter[x] / (row.total[x] * row.total[x]);
     }
   });
   return out;

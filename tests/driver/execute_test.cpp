@@ -344,7 +344,9 @@ TEST(Execute, MakesPartOfTheFramesButSimulatesAllBeforeThem) {
   const Made stages(settings, folder);
   EXPECT_EQ(stages.frames(Step::simulate), (std::vector<int>{2, 3, 4, 5, 6, 7, 8}));
   EXPECT_EQ(stages.frames(Step::mesh), settings.frames);
-  EXPECT_EQ(stages.frames(Step::render), settings.frames);
+  std::vector<int> rendered = stages.frames(Step::render);  // two at once, in either order
+  std::sort(rendered.begin(), rendered.end());
+  EXPECT_EQ(rendered, settings.frames);
 }
 
 TEST(Execute, RunsAStageAloneOnWhatLiesThere) {
