@@ -472,7 +472,7 @@ std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
   for (std::vector<NoisyPicture>* side : {&neighbours.before, &neighbours.after})
     for (NoisyPicture& frame : *side) prepare(frame);
   const Sources sources(picture, neighbours);
-  if (sources.list().size() > 1) smooth_guides(sources.list(), picture, neighbours);
+  smooth_guides(sources.list(), picture, neighbours);
   std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
   const int columns = (picture.width + kTile - 1) / kTile;
   const int rows = (picture.height + kTile - 1) / kTile;

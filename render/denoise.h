@@ -37,16 +37,16 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 /// First-order regression on the features, in a window of 15 x 15 pixels around each, with weights
 /// by which patches look alike in the other half: Bitterli et al. 2016, "Nonlinearly Weighted
 /// First-order Regression for Denoising Monte Carlo Renderings", equations 3 and 8; the distance of
-/// patches is that of Rousselle et al. 2012, equation 4. One bandwidth, and features that are noisy
-/// weigh less (ridge) in place of being filtered first. A lone pixel that far outshines all around
-/// it, by a light that few of its samples found, is brought down to them first: spread over its
-/// window it would be a white square. The same bits for any thread count.
+/// patches is that of Rousselle et al. 2012, equation 4. One bandwidth. Features are smoothed
+/// first, by a mean over what their own variance cannot tell apart: a sample of water mirrors or
+/// refracts, so that their noise is that of the picture. What noise is left weighs them less
+/// (ridge). A pixel that far outshines nearly all around it, by a light that few of its samples
+/// found, is brought down to them first: spread over its window it would be a white square. The
+/// same bits for any thread count.
 ///
 /// Pixels of neighbours in time join the window, led there by their motion, in a smaller window of
 /// 9 x 9 since the same place comes first; a pixel that shows something else there counts nothing.
-/// What does not move as its surface does, a refraction say, is told by its patches. Guides are
-/// smoothed first then, since a change of their noise from frame to frame would show: by a mean
-/// over what their own variance cannot tell apart. Neighbours are
+/// What does not move as its surface does, a refraction say, is told by its patches. Neighbours are
 /// taken as they were rendered, so that a frame depends on those alone.
 /// @return the three colours
 std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture, Neighbours neighbours = {});
