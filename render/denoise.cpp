@@ -39,9 +39,10 @@ constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
 constexpr int kRows = kMostTerms + 3;          // and the colours
 
 /// An outlier is this many times brighter than all but a few of the 24 pixels around it, and its
-/// own samples do not know its brightness to this part.
-constexpr float kOutlier = 4, kUnsure = 0.25f;
-constexpr int kFew = 6;
+/// own samples do not know its brightness to this part; many may lie together that one or two
+/// samples found each.
+constexpr float kOutlier = 4, kUnsure = 0.25f, kLuck = 0.9f;
+constexpr size_t kFew = 3, kMany = 12;
 
 using TileRow = std::array<float, kTile>;
 
@@ -289,13 +290,15 @@ void tame_outliers(NoisyPicture& picture) {
   for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
     float variance = 0;
     for (const Plane& v : picture.variance) variance += v[p] / 3;
-    if (variance < kUnsure * kUnsure * bright[p] * bright[p]) return;
+    const float part2 = variance / (bright[p] * bright[p]);
+    if (!(part2 >= kUnsure * kUnsure)) return;
+    const size_t few = part2 < kLuck * kLuck ? kFew : kMany;
     around.clear();
     for (const size_t q : window)
       if (q != p) around.push_back(bright[q]);
-    if (around.size() <= kFew) return;
-    std::nth_element(around.begin(), around.begin() + kFew, around.end(), std::greater<>());
-    const float most = kOutlier * around[kFew];
+    if (around.size() <= few) return;
+    std::nth_element(around.begin(), around.begin() + long(few), around.end(), std::greater<>());
+    const float most = kOutlier * std::max(around[few], 0.f);
     if (!(bright[p] > most)) return;
     const float factor = most / bright[p];
     for (auto& half : picture.half)

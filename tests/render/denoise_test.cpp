@@ -94,6 +94,22 @@ TEST(Denoise, TakesAwayLoneOutliersOnly) {
   EXPECT_NEAR(denoise(sure)[1][star], 100, 1);
 }
 
+// A glint that few samples found in a part of the pixels around: no blot where their windows meet.
+TEST(Denoise, TakesAwayOutliersThatLieTogether) {
+  const auto truth = [](int, int) { return 1.f; };
+  NoisyPicture picture = made(truth, none, kNoise, 11);
+  std::mt19937 random(12);
+  for (int y = 20; y < 40; ++y)
+    for (int x = 20; x < 40; ++x) {
+      if (random() % 10 != 0) continue;
+      for (int c = 0; c < 3; ++c) {
+        picture.half[random() % 2][c][size_t(y * kSize + x)] += 400;
+        picture.variance[c][size_t(y * kSize + x)] = 1e5f;
+      }
+    }
+  EXPECT_LT(rms(denoise(picture), truth), 0.5 * kNoise);
+}
+
 /// A guide that is itself noise must not bring it in.
 TEST(Denoise, TrustsNoisyFeaturesLess) {
   const auto truth = [](int, int) { return 1.f; };
