@@ -43,6 +43,8 @@ class ClothBsdf {
     return (side > 0 ? reflectance_ : transmittance_) * (density * terminator(incoming, cos, side));
   }
 
+  /// Unit, to the side that `Irradiance::front` is on.
+  const V3f& front() const { return geometric_; }
   /// Adds light on the real surface from the direction `incoming`.
   void receive(Irradiance& light, const V3f& incoming, const V3f& power) const {
     (dot(incoming, geometric_) > 0 ? light.front : light.back) += power;

@@ -472,10 +472,14 @@ class PathTracer {
   template <class Bsdf>
   void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
     Irradiance light;
-    settings_.photons->for_each_near(surface.position, surface.geometric_normal,
-                                     [&](const Photon& photon, float share) {
-                                       bsdf.receive(light, -photon.direction, photon.power * share);
-                                     });
+    const V3f &at = surface.position, &normal = surface.geometric_normal;
+    if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
+      light = settings_.photons->irradiance(at, normal, bsdf.front());
+    else
+      settings_.photons->for_each_near(at, normal,
+                                       [&](const V3f& flight, const V3f& power, float share) {
+                                         bsdf.receive(light, -flight, power * share);
+                                       });
     film_.deposit(state.throughput * bsdf.radiance(light), scene_.lights().caustics_group());
   }
 

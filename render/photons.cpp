@@ -276,29 +276,49 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-uint32_t PhotonMap::bucket_of(const Imath::V3i& cell) const {
-  uint64_t key = key_of(cell) * 0x9e3779b97f4a7c15ull;
-  return uint32_t(key ^ key >> 32) & mask_;
-}
-
 PhotonMap::PhotonMap(std::vector<Photon> photons) {
   if (photons.empty()) return;
+  size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
   radius_ = choose_radius(photons, reach_);
-  reach_.min -= V3f(radius_), reach_.max += V3f(radius_);
+  reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
-  crowd_ = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(photons.size())));
-  while (size_t{mask_} + 1 < photons.size()) mask_ = 2 * mask_ + 1;
-  first_.assign(size_t{mask_} + 2, 0);
+  crowd_ = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(size_)));
+  mask_ = 63;  // the least with which neighbouring rows stay apart
+  while (size_t{mask_} + 1 < size_) mask_ = 2 * mask_ + 1;
+  first_.assign(size_t{mask_} + size_t(cell_of(reach_.max).x) + 3, 0);
   for (const Photon& p : photons) ++first_[bucket_of(cell_of(p.position)) + 1];
   for (size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
   std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-  photon_.resize(photons.size());
-  for (const Photon& p : photons) photon_[next[bucket_of(cell_of(p.position))]++] = p;
-  for (int axis = 0; axis < 3; ++axis) {
-    place_[axis].resize(photons.size() + 8);
-    for (size_t k = 0; k < photons.size(); ++k) place_[axis][k] = photon_[k].position[axis];
+  pack_.resize((size_ + 7) / 8);
+  for (const Photon& p : photons) {
+    const uint32_t place = next[bucket_of(cell_of(p.position))]++, k = place % 8;
+    PhotonPack& pack = pack_[place / 8];
+    pack.x[k] = p.position.x, pack.y[k] = p.position.y, pack.z[k] = p.position.z;
+    pack.red[k] = p.power.x, pack.green[k] = p.power.y, pack.blue[k] = p.power.z;
+    pack.normal[k] = pack_unit(p.normal);
+    pack.flight[k] = pack_unit(p.direction);
   }
+}
+
+Irradiance PhotonMap::irradiance(const V3f& point, const V3f& normal, const V3f& front) const {
+  __m256 sum[2][3] = {};
+  for_each_pack_near(point, normal, [&](const PhotonPack& p, __m256 share) {
+    const __m256 along = unpack_unit<0>(p.flight) * front.x + unpack_unit<1>(p.flight) * front.y +
+                         unpack_unit<2>(p.flight) * front.z;
+    const __m256 there = _mm256_cmp_ps(along, _mm256_setzero_ps(), _CMP_LT_OQ);
+    const __m256 shares[2] = {_mm256_and_ps(there, share), _mm256_andnot_ps(there, share)};
+    const std::array<float, 8>* const power[3] = {&p.red, &p.green, &p.blue};
+    for (int side = 0; side < 2; ++side)
+      for (int c = 0; c < 3; ++c) sum[side][c] += shares[side] * _mm256_load_ps(power[c]->data());
+  });
+  const auto total = [&](int side) {
+    V3f out(0);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 8; ++k) out[c] += sum[side][c][k];
+    return out;
+  };
+  return {total(0), total(1)};
 }
 
 bool can_trace_photons(const Scene& scene) {

@@ -11,12 +11,12 @@
 
 #include <immintrin.h>
 
-#include <algorithm>
 #include <array>
-#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "render/bsdf_cloth.h"
 #include "render/scene.h"
 
 namespace drench {
@@ -28,43 +28,55 @@ struct Photon {
   V3f power;      // W; of one that came through water divided by the squared index, as radiance is
 };
 
+/// Eight photons as packs, four lines of the cache in a row.
+struct alignas(64) PhotonPack {
+  std::array<float, 8> x, y, z;            // m
+  std::array<float, 8> red, green, blue;   // of the power
+  std::array<uint32_t, 8> normal, flight;  // unit, to a thousandth: see pack_unit
+};
+
+/// A unit vector in three times ten bits.
+inline uint32_t pack_unit(const V3f& v) {
+  const auto bits = [](float c) { return uint32_t(int(std::lrint(c * 511))) & 1023; };
+  return bits(v.x) | bits(v.y) << 10 | bits(v.z) << 20;
+}
+/// Component `axis` of eight vectors, times 511.
+template <int axis>
+__m256 unpack_unit(const std::array<uint32_t, 8>& packed) {
+  const __m256i v = _mm256_load_si256(reinterpret_cast<const __m256i*>(packed.data()));
+  return _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(v, 22 - 10 * axis), 22));
+}
+
 class PhotonMap {
  public:
   PhotonMap() = default;
   explicit PhotonMap(std::vector<Photon> photons);
 
-  bool empty() const { return photon_.empty(); }
-  size_t size() const { return photon_.size(); }
+  bool empty() const { return size_ == 0; }
+  size_t size() const { return size_; }
   float radius() const { return radius_; }  // m
 
-  /// Calls f(photon, share) for photons near a point of a surface: the sum of share x power is the
-  /// irradiance, W/m^2. Weighed by Epanechnikov's kernel over a disc, which is smaller where
-  /// photons crowd: there fewer do, and its blur shows most.
+  /// Calls f(direction of flight, power, share) for photons near a point of a surface: the sum of
+  /// share x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel over a disc, which is
+  /// smaller where photons crowd: there fewer do, and its blur shows most.
   template <class F>
-  void for_each_near(const V3f& point, const V3f& normal, F f) const {
-    if (!reach_.intersects(point)) return;
-    const uint32_t middle = bucket_of(cell_of(point));
-    const uint32_t count = first_[middle + 1] - first_[middle];
-    const float share = count > crowd_ ? float(crowd_) / float(count) : 1.f;
-    const float r2 = radius_ * radius_ * share, r = std::sqrt(r2), scale = 2 / (kPi * r2);
-    const Imath::V3i low = cell_of(point - V3f(r)), high = cell_of(point + V3f(r));
-    std::array<uint32_t, 8> seen;  // cells may share a bucket
-    size_t buckets = 0;
-    Imath::V3i c;
-    for (c.z = low.z; c.z <= high.z; ++c.z)
-      for (c.y = low.y; c.y <= high.y; ++c.y)
-        for (c.x = low.x; c.x <= high.x; ++c.x) {
-          const uint32_t bucket = bucket_of(c);
-          const auto end = seen.begin() + ptrdiff_t(buckets);
-          if (first_[bucket] == first_[bucket + 1] || std::find(seen.begin(), end, bucket) != end)
-            continue;
-          if (buckets < seen.size()) seen[buckets++] = bucket;
-          for_each_in(bucket, point, normal, r2, [&](const Photon& photon, float square) {
-            if (std::abs(dot(photon.normal, normal)) >= kSameSurface)
-              f(photon, scale * (1 - square / r2));
-          });
-        }
+  void for_each_near(const V3f& point, const V3f& normal, const F& f) const {
+    for_each_pack_near(point, normal, [&](const PhotonPack& p, __m256 share) {
+      alignas(32) float shares[8], flight[3][8];
+      _mm256_store_ps(shares, share);
+      _mm256_store_ps(flight[0], unpack_unit<0>(p.flight) * (1 / 511.f));
+      _mm256_store_ps(flight[1], unpack_unit<1>(p.flight) * (1 / 511.f));
+      _mm256_store_ps(flight[2], unpack_unit<2>(p.flight) * (1 / 511.f));
+      for (unsigned k = 0; k < 8; ++k)
+        if (shares[k] > 0)
+          f(V3f(flight[0][k], flight[1][k], flight[2][k]), V3f(p.red[k], p.green[k], p.blue[k]),
+            shares[k]);
+    });
   }
+
+  /// The irradiance that they sum up to, W/m^2, on the side that `front` points to and on the
+  /// other.
+  Irradiance irradiance(const V3f& point, const V3f& normal, const V3f& front) const;
 
  private:
   static constexpr float kSameSurface = 0.7f;  // cosine between normals
@@ -72,45 +84,78 @@ class PhotonMap {
   static constexpr float kCrowd = 4;           // times the photons of the median one's disc
   static constexpr uint32_t kFewest = 400;     // photons of a crowded cell: noise above blur
 
-  Imath::V3i cell_of(const V3f& p) const {
-    return {int(std::floor(p.x * inverse_edge_)), int(std::floor(p.y * inverse_edge_)),
-            int(std::floor(p.z * inverse_edge_))};
+  /// Also false for a point that is not finite.
+  bool reaches(const V3f& p) const {
+    const V3f &low = reach_.min, &high = reach_.max;
+    return p.x >= low.x && p.y >= low.y && p.z >= low.z && p.x <= high.x && p.y <= high.y &&
+           p.z <= high.z;
   }
-  uint32_t bucket_of(const Imath::V3i& cell) const;
+  /// From 0 on within `reach_`.
+  Imath::V3i cell_of(const V3f& p) const { return Imath::V3i((p - reach_.min) * inverse_edge_); }
+  /// Buckets of the cells along x are a row; rows of neighbours have no bucket in common.
+  uint32_t row_of(int y, int z) const {
+    return (uint32_t(y) * 0x9e3779b1u + uint32_t(z) * 0x85ebca77u) & mask_;
+  }
+  uint32_t bucket_of(const Imath::V3i& cell) const {
+    return row_of(cell.y, cell.z) + uint32_t(cell.x);
+  }
 
-  /// Calls f(photon, distance^2) for the photons of a bucket within the disc.
+  /// Calls f(pack, shares) with a share of 0 for photons that are not near.
   template <class F>
-  void for_each_in(uint32_t bucket, const V3f& point, const V3f& normal, float radius2, F f) const {
-    const __m256 r2 = _mm256_set1_ps(radius2);
-    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius2);
-    const uint32_t last = first_[bucket + 1];
-    for (uint32_t k = first_[bucket]; k < last; k += 8) {
-      const auto away = [&](int axis) {
-        return _mm256_loadu_ps(place_[axis].data() + k) - _mm256_set1_ps(point[axis]);
-      };
-      const __m256 x = away(0), y = away(1), z = away(2);
-      const __m256 square = x * x + y * y + z * z;
-      const __m256 off = x * normal.x + y * normal.y + z * normal.z;
-      const __m256 near = _mm256_and_ps(_mm256_cmp_ps(square, r2, _CMP_LT_OQ),
-                                        _mm256_cmp_ps(off * off, thick, _CMP_LE_OQ));
-      unsigned bits = unsigned(_mm256_movemask_ps(near));
-      if (last - k < 8) bits &= (1u << (last - k)) - 1;
-      alignas(32) float squares[8];
-      _mm256_store_ps(squares, square);
-      for (; bits != 0; bits &= bits - 1) {
-        const unsigned lane = unsigned(std::countr_zero(bits));
-        f(photon_[k + lane], squares[lane]);
+  void for_each_pack_near(const V3f& point, const V3f& normal, const F& f) const {
+    if (!reaches(point)) return;
+    const uint32_t middle = bucket_of(cell_of(point));
+    const uint32_t count = first_[middle + 1] - first_[middle];
+    const float share = count > crowd_ ? float(crowd_) / float(count) : 1.f;
+    const float r2 = radius_ * radius_ * share, r = std::sqrt(r2);
+    const Imath::V3i low = cell_of(point - V3f(r)), high = cell_of(point + V3f(r));
+    for (int z = low.z; z <= high.z; ++z)
+      for (int y = low.y; y <= high.y; ++y) {
+        const uint32_t row = row_of(y, z);
+        for_each_pack_of(first_[row + uint32_t(low.x)], first_[row + uint32_t(high.x) + 1], point,
+                         normal, r2, f);
       }
+  }
+
+  /// Of the photons from `first` to `last`.
+  template <class F>
+  void for_each_pack_of(uint32_t first, uint32_t last, const V3f& point, const V3f& normal,
+                        float radius2, const F& f) const {
+    const __m256 one = _mm256_set1_ps(1), inverse_r2 = one / radius2;
+    const __m256 scale = _mm256_set1_ps(2 / (kPi * radius2));
+    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius2);
+    const __m256 same = _mm256_set1_ps(511 * kSameSurface * 511 * kSameSurface);
+    for (uint32_t at = first & ~7u; at < last; at += 8) {
+      const PhotonPack& p = pack_[at / 8];
+      const __m256 x = _mm256_load_ps(p.x.data()) - point.x;
+      const __m256 y = _mm256_load_ps(p.y.data()) - point.y;
+      const __m256 z = _mm256_load_ps(p.z.data()) - point.z;
+      const __m256 square = (x * x + y * y + z * z) * inverse_r2;
+      const __m256 off = x * normal.x + y * normal.y + z * normal.z;
+      const __m256 near = _mm256_and_ps(_mm256_cmp_ps(square, one, _CMP_LT_OQ),
+                                        _mm256_cmp_ps(off * off, thick, _CMP_LE_OQ));
+      const __m256i place = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
+                                             _mm256_set1_epi32(int(at - first)));
+      const __m256i here =
+          _mm256_andnot_si256(_mm256_srai_epi32(place, 31),
+                              _mm256_cmpgt_epi32(_mm256_set1_epi32(int(last - first)), place));
+      const __m256 counts = _mm256_and_ps(near, _mm256_castsi256_ps(here));
+      if (_mm256_testz_ps(counts, counts)) continue;
+      const __m256 cosine = unpack_unit<0>(p.normal) * normal.x +
+                            unpack_unit<1>(p.normal) * normal.y +
+                            unpack_unit<2>(p.normal) * normal.z;
+      const __m256 faces = _mm256_cmp_ps(cosine * cosine, same, _CMP_GE_OQ);
+      f(p, _mm256_and_ps(_mm256_and_ps(counts, faces), scale * (one - square)));
     }
   }
 
-  Imath::Box3f reach_;  // of the photons and a radius around them; empty without any
+  Imath::Box3f reach_;  // of the photons and two radii around them; empty without any
   float radius_ = 0, inverse_edge_ = 0;  // cells are two radii wide
   uint32_t mask_ = 0;
-  uint32_t crowd_ = 0;                       // photons in a cell beyond which the disc shrinks
-  std::vector<uint32_t> first_;              // of each bucket, and the number of photons
-  std::vector<Photon> photon_;               // by bucket
-  std::array<std::vector<float>, 3> place_;  // of each, and room for a pack to be read
+  uint32_t crowd_ = 0;            // photons in a cell beyond which the disc shrinks
+  size_t size_ = 0;               // number of photons
+  std::vector<uint32_t> first_;   // of each bucket, and the number of photons
+  std::vector<PhotonPack> pack_;  // of all photons by bucket
 };
 
 /// Whether photons find the light that lamps send through dielectric bodies: there are lamps, none

@@ -28,7 +28,8 @@ double irradiance(const PhotonMap& map, double s, int n = 40) {
     for (int j = 0; j < n; ++j)
       map.for_each_near(
           V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
-          V3f(0, 1, 0), [&](const Photon& p, float share) { sum += double(p.power.x) * share; });
+          V3f(0, 1, 0),
+          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
   return sum / n / n;
 }
 
@@ -183,9 +184,9 @@ TEST(Photons, AreNoneFarBrighterThanOthers) {
   double most = 0, sum = 0, count = 0;
   for (int k = 0; k < 10000; ++k)
     map.for_each_near(V3f(0.02f * float(k % 100 - 50), 0, 0.02f * float(k / 100 - 50)),
-                      V3f(0, 1, 0), [&](const Photon& p, float) {
-                        most = std::max(most, double(p.power.x));
-                        sum += double(p.power.x), ++count;
+                      V3f(0, 1, 0), [&](const V3f&, const V3f& power, float) {
+                        most = std::max(most, double(power.x));
+                        sum += double(power.x), ++count;
                       });
   ASSERT_GT(count, 1000);
   EXPECT_LT(most, 20 * sum / count);
@@ -201,9 +202,9 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
     std::vector<double> values;
     for (int k = 0; k < 2200; ++k) {
       double sum = 0;
-      map.for_each_near(V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)),
-                        V3f(0, 1, 0),
-                        [&](const Photon& p, float share) { sum += double(p.power.x) * share; });
+      map.for_each_near(
+          V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)), V3f(0, 1, 0),
+          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
       values.push_back(sum);
     }
     return values;
