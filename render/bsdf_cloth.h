@@ -58,17 +58,18 @@ class ClothBsdf {
   /// leave either side a random part of a pixel's even set of directions.
   Scatter sample(const V2f& u) const {
     Scatter out;
-    const float p = reflect_probability_, side = u.x < p ? 1.f : -1.f;
-    const float x = side > 0 ? u.x / p : (u.x - p) / (1 - p);
+    const bool reflect = u.x < reflect_probability_;
+    const float side = reflect ? 1.f : -1.f;
+    const float probability = reflect ? reflect_probability_ : 1 - reflect_probability_;
+    const float x = (u.x - (reflect ? 0 : reflect_probability_)) / probability;
     out.direction =
         Basis(shading_ * side).world(sample_cosine({std::min(x, kOneMinusEpsilon), u.y}));
     const float cos = dot(out.direction, shading_) * side;
     // The smooth hemisphere reaches a little through the real surface: nothing comes from there.
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
-    const float probability = side > 0 ? reflect_probability_ : 1 - reflect_probability_;
     out.pdf = cos / kPi * probability;
-    out.weight = (side > 0 ? reflectance_ : transmittance_) *
-                 (terminator(out.direction, cos, side) / probability);
+    const V3f& share = reflect ? reflectance_ : transmittance_;
+    out.weight = share * (terminator(out.direction, cos, side) / probability);
     return out;
   }
 

@@ -104,13 +104,13 @@ SunLight make_sun(const MapSun& sun) {
 
 }  // namespace
 
-float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
+float ShapeLight::intersect(const V3f& origin, const V3f& direction, float reach) const {
   const V3f to_center = center - origin;
   if (type != LightType::sphere) {
-    const float facing = dot(direction, normal);
-    if (!(facing < 0)) return kInfinity;  // it shines along its normal only
-    const float t = dot(to_center, normal) / facing;
-    if (!(t > 0)) return kInfinity;
+    const float facing = dot(direction, normal), height = dot(to_center, normal);
+    if (!(facing < 0 && height < 0)) return kInfinity;  // it shines along its normal only
+    const float t = height / facing;
+    if (!(t > 0 && t < reach)) return kInfinity;
     const V3f p = direction * t - to_center;
     if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : kInfinity;
     return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
@@ -120,7 +120,7 @@ float ShapeLight::intersect(const V3f& origin, const V3f& direction) const {
   const float inside2 = radius * radius - dot(nearest, nearest);
   if (!(inside2 >= 0) || dot(to_center, to_center) <= radius * radius) return kInfinity;
   const float t = along - std::sqrt(inside2);
-  return t > 0 ? t : kInfinity;
+  return t > 0 && t < reach ? t : kInfinity;
 }
 
 LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
@@ -230,7 +230,7 @@ uint32_t Lights::group_named(const std::string& name) {
 Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
   Hit hit{-1, distance};
   for (size_t k = 0; k < shapes_.size(); ++k) {
-    const float t = shapes_[k].intersect(origin, direction);
+    const float t = shapes_[k].intersect(origin, direction, hit.distance);
     if (t < hit.distance) hit = {int(k), t};
   }
   return hit;
@@ -245,6 +245,7 @@ float Lights::importance(size_t index, const V3f& from) const {
 
 float Lights::choice_probability(size_t index, const V3f& from) const {
   const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
+  if (count == 1) return 1;
   float total = 0;
   for (size_t k = 0; k < count; ++k) total += importance(k, from);
   return total > 0 ? importance(index, from) / total : 0;
@@ -256,14 +257,19 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
 
 LightSample Lights::sample_first(size_t count, const V3f& from, float time, float u_light,
                                  const V2f& u) const {
-  float total = 0;
-  for (size_t k = 0; k < count; ++k) total += importance(k, from);
-  if (!(total > 0)) return {};
+  if (count == 0) return {};
   size_t chosen = 0;
-  float weight = importance(0, from), target = u_light * total;
-  while (target >= weight && chosen + 1 < count) {
-    target -= weight;
-    weight = importance(++chosen, from);
+  float probability = 1;
+  if (count > 1) {
+    float total = 0;
+    for (size_t k = 0; k < count; ++k) total += importance(k, from);
+    if (!(total > 0)) return {};
+    float weight = importance(0, from), target = u_light * total;
+    while (target >= weight && chosen + 1 < count) {
+      target -= weight;
+      weight = importance(++chosen, from);
+    }
+    probability = weight / total;
   }
   LightSample out;
   if (chosen < shapes_.size()) {
@@ -281,7 +287,7 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float time, floa
     const DirectionSample d = environment_->sample(u);
     out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf, environment_group_};
   }
-  out.pdf *= weight / total;
+  out.pdf *= probability;
   return out;
 }
 

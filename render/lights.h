@@ -22,8 +22,8 @@ struct ShapeLight {
   float area = 0, radius = 0;
   uint32_t group = 0;
 
-  /// Distance along the ray of its emitting side, or infinity.
-  float intersect(const V3f& origin, const V3f& direction) const;
+  /// Distance along the ray of its emitting side, if it is less than `reach`, or infinity.
+  float intersect(const V3f& origin, const V3f& direction, float reach) const;
   LightSample sample(const V3f& from, const V2f& u) const;
   /// Density of `sample` for a direction that does hit it at `distance`.
   float pdf(const V3f& from, const V3f& direction, float distance) const;

@@ -68,7 +68,7 @@ class PathTracer {
  private:
   void walk(PathState& state) {
     for (bool going = true; going; ++state.vertices) {
-      if (!finite(state.ray.direction) || !finite(state.ray.origin)) return;
+      if (!finite(state.ray.direction + state.ray.origin)) return;
       const Hit hit = scene_.intersect(
           state.ray, state.vertices == 0 ? Coherence::coherent : Coherence::incoherent,
           film_.world());
@@ -346,8 +346,9 @@ class PathTracer {
                          surface.material->alpha, eta, albedo);
     const Bodies beyond = state.in ^ surface.body;
     film_.record_albedo(state.survival);
-    add_direct(state, surface, beyond, bsdf);
-    const Scatter next = bsdf.sample(point(state, kScatterDirection), number(state, kScatterSide));
+    const VertexNumbers u = numbers(state);
+    add_direct(state, surface, beyond, u, bsdf);
+    const Scatter next = bsdf.sample(u[kScatterDirection], u[kScatterSide].x);
     return follow(state, surface, next, bsdf.through(next.direction) ? beyond : state.in);
   }
 
@@ -358,10 +359,11 @@ class PathTracer {
                          MetalFresnel(material.reflectance_at(surface.uv), material.edge),
                          *material.albedo_outside[0]);
     state.has_photons = false;
-    add_direct(state, surface, state.in, bsdf);
+    const VertexNumbers u = numbers(state);
+    add_direct(state, surface, state.in, u, bsdf);
     state.survival *= bsdf.albedo();
     if (material.alpha > 0) film_.record_albedo(state.survival);  // else it shows other things
-    return follow(state, surface, bsdf.sample(point(state, kScatterDirection)), state.in);
+    return follow(state, surface, bsdf.sample(u[kScatterDirection]), state.in);
   }
 
   /// One lobe is followed; lights are sampled for both, and photons gathered by the diffuse one.
@@ -376,14 +378,15 @@ class PathTracer {
     const CoatedBase base = bsdf.base();
     const bool photons = gathers_photons(surface);
     if (photons) add_caustics(state, surface, base);
-    add_direct(state, surface, state.in, coat, base);
-    const bool follow_coat = number(state, kScatterSide) < bsdf.coat_share();
-    const V2f u = point(state, kScatterDirection);
+    const VertexNumbers u = numbers(state);
+    add_direct(state, surface, state.in, u, coat, base);
+    const bool follow_coat = u[kScatterSide].x < bsdf.coat_share();
     state.interfaces = 0;
     state.has_photons = photons && !follow_coat;
     state.survival *= bsdf.albedo();
     film_.record_albedo(state.survival);
-    return follow(state, surface, follow_coat ? coat.sample(u) : base.sample(u), state.in);
+    const V2f& to = u[kScatterDirection];
+    return follow(state, surface, follow_coat ? coat.sample(to) : base.sample(to), state.in);
   }
 
   /// Continues along a direction drawn from a surface, in the bodies that are there.
@@ -406,8 +409,9 @@ class PathTracer {
     state.interfaces = 0;
     state.has_photons = gathers_photons(surface);
     if (state.has_photons) add_caustics(state, surface, bsdf);
-    add_direct(state, surface, state.in, bsdf);
-    const Scatter next = sample_scatter(state, surface, bsdf);
+    const VertexNumbers u = numbers(state);
+    const Scatter next = sample_scatter(state, surface, u, bsdf);  // while the light is drawn
+    add_direct(state, surface, state.in, u, bsdf);
     state.survival *= bsdf.albedo();
     return follow_from_sheet(state, surface, next);
   }
@@ -420,14 +424,15 @@ class PathTracer {
     film_.record_albedo(state.survival * bsdf.albedo());
     const bool photons = gathers_photons(surface);
     if (photons) add_caustics(state, surface, bsdf.soft());
-    add_direct(state, surface, state.in, bsdf.soft(), bsdf.glints());
-    const bool glint = number(state, kScatterSide) < bsdf.glint_share();
-    const V2f u = point(state, kScatterDirection);
+    const VertexNumbers u = numbers(state);
+    add_direct(state, surface, state.in, u, bsdf.soft(), bsdf.glints());
+    const bool glint = u[kScatterSide].x < bsdf.glint_share();
     state.interfaces = 0;
     state.has_photons = photons && !glint;
     state.survival *= bsdf.albedo();
+    const V2f& to = u[kScatterDirection];
     return follow_from_sheet(state, surface,
-                             glint ? bsdf.glints().sample(u) : bsdf.soft().sample(u));
+                             glint ? bsdf.glints().sample(to) : bsdf.soft().sample(to));
   }
 
   /// Continues on either side of a sheet.
@@ -449,9 +454,9 @@ class PathTracer {
 
   /// The next direction: drawn from the surface, or in water from a mixture with the guide. Its
   /// density is the surface's own in either case: light samples are weighed against that one.
-  Scatter sample_scatter(const PathState& state, const Surface& surface,
+  Scatter sample_scatter(const PathState& state, const Surface& surface, const VertexNumbers& u,
                          const ClothBsdf& bsdf) const {
-    const V2f uv = point(state, kScatterDirection);
+    const V2f& uv = u[kScatterDirection];
     if constexpr (!kWater) return bsdf.sample(uv);
     if (state.in != scene_.fluid() || state.in == 0 ||
         (state.has_photons && scene_.lights().meshes().empty()) ||
@@ -462,7 +467,7 @@ class PathTracer {
                                     state.has_photons ? Aim::meshes : Aim::all);
     const float share = guide.share(surface.position);
     if (share == 0) return bsdf.sample(uv);
-    return sample_mixed(bsdf, guide, share, surface.position, number(state, kScatterSide), uv);
+    return sample_mixed(bsdf, guide, share, surface.position, u[kScatterSide].x, uv);
   }
 
   bool gathers_photons(const Surface& surface) const {
@@ -487,11 +492,11 @@ class PathTracer {
   /// side is in
   template <class... Lobe>
   void add_direct(const PathState& state, const Surface& surface, Bodies beyond,
-                  const Lobe&... lobe) {
+                  const VertexNumbers& u, const Lobe&... lobe) {
     if (settings_.estimator == Estimator::bsdf_only) return;
     if (!samples_lights(state.in) && !samples_lights(beyond)) return;
-    const LightSample light = scene_.lights().sample(
-        surface.position, state.ray.time, number(state, kLightChoice), point(state, kLightPoint));
+    const LightSample light =
+        scene_.lights().sample(surface.position, state.ray.time, u[kLightChoice].x, u[kLightPoint]);
     if (!(light.pdf > 0)) return;
     if (film_.world() == World::plate && !scene_.in_plate(light)) return;
     Bodies in = state.in;
@@ -545,8 +550,8 @@ class PathTracer {
   float number(const PathState& state, VertexDimension which) const {
     return sampler_.one(dimension(state, which));
   }
-  V2f point(const PathState& state, VertexDimension which) const {
-    return sampler_.two(dimension(state, which));
+  VertexNumbers numbers(const PathState& state) const {
+    return sampler_.four(dimension(state, kLightChoice));
   }
 
   const Scene& scene_;

@@ -1,6 +1,8 @@
 #pragma once
 // A path on its way, for path.cpp.
 
+#include <array>
+
 #include "render/scene.h"
 
 namespace drench {
@@ -22,6 +24,8 @@ enum VertexDimension : uint32_t {
   kVertexDimensions
 };
 inline constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
+/// The points of all of them but roulette's, of which it is rarely asked.
+using VertexNumbers = std::array<V2f, kRoulette>;
 /// One for every sheet with gaps, apart from those, so that gaps shift nothing.
 inline constexpr uint32_t kFirstGapDimension = 1u << 24;
 

@@ -19,7 +19,8 @@ class PixelSum {
       batch_[whole_][c] += radiance[c];
     }
     alpha_ += alpha;
-    if (++samples_ % size_ == 0 && ++whole_ == kMost) merge();
+    // size_ is a power of two
+    if ((++samples_ & (size_ - 1)) == 0 && ++whole_ == kMost) merge();
   }
 
   int samples() const { return samples_; }

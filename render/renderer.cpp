@@ -17,6 +17,7 @@
 #include "render/options.h"
 #include "render/path.h"
 #include "render/photons.h"
+#include "render/sampler.h"
 
 namespace drench {
 
@@ -67,15 +68,37 @@ struct Job {
   int rows() const { return (height + kTile - 1) / kTile; }
 };
 
-/// One more camera sample of a pixel, the next in its order.
-void add_sample(const Job& job, int x, int y, PixelSum& sum, uint64_t& rays, PathRecord* record) {
-  const Sampler sampler(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2,
-                        uint32_t(sum.samples()));
-  const V2f film =
-      V2f(float(x) + 0.5f, float(y) + 0.5f) + job.filter.offset(sampler.two(kFilterDimension));
-  const PathSample sample = job.trace(job.scene, job.path, sampler, film, rays, record);
-  sum.add(sample.radiance, sample.alpha);
-}
+/// Where on the film the samples of a pixel lie: known for eight at a time, long before each is
+/// traced.
+class FilmPoints {
+ public:
+  FilmPoints(const Job& job, int x, int y)
+      : job_(job),
+        center_(float(x) + 0.5f, float(y) + 0.5f),
+        first_(job.order, job.seed, uint32_t(x), uint32_t(y), job.slots_log2, 0) {}
+
+  Sampler sampler(int sample) const { return first_.at(uint32_t(sample)); }
+  V2f operator[](int sample) {
+    const int k = sample % kAtOnce;
+    if (sample - k != from_) fill(sample - k);
+    return point_[size_t(k)];
+  }
+
+ private:
+  static constexpr int kAtOnce = 8;
+
+  void fill(int from) {
+    from_ = from;
+    point_ = first_.two_of_eight(uint32_t(from), kFilterDimension);
+    for (V2f& p : point_) p = center_ + job_.filter.offset(p);
+  }
+
+  const Job& job_;
+  V2f center_;
+  Sampler first_;
+  int from_ = -1;
+  std::array<V2f, kAtOnce> point_;
+};
 
 /// Calls back with the finished share of the samples that are expected, one tile at a time.
 class Progress {
@@ -112,8 +135,12 @@ uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
   for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
     for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
-      for (int s = sums.pixel[pixel].samples(); s < sums.plan.wanted(pixel); ++s, ++added) {
-        add_sample(job, x + job.window.x, y + job.window.y, sums.pixel[pixel], rays, recorded);
+      PixelSum& sum = sums.pixel[pixel];
+      FilmPoints film(job, x + job.window.x, y + job.window.y);
+      for (int s = sum.samples(); s < sums.plan.wanted(pixel); ++s, ++added) {
+        const PathSample sample =
+            job.trace(job.scene, job.path, film.sampler(s), film[s], rays, recorded);
+        sum.add(sample.radiance, sample.alpha);
         if (!recorded) continue;
         sums.layers.add(pixel, record);
         sums.plate.add(pixel, record.matte);

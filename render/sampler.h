@@ -2,6 +2,7 @@
 // Owen-scrambled Sobol points: the first two Sobol dimensions, padded for every event of a path.
 // Hash-based Owen scrambling after Burley 2020, "Practical Hash-based Owen Scrambling".
 
+#include <array>
 #include <cstdint>
 
 #include "render/vector.h"
@@ -35,10 +36,9 @@ inline uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
   return x;
 }
 
-/// Second Sobol dimension of the index whose bit reversal is `reversed`, itself bit-reversed: the
-/// Pascal matrix mod 2, which is a Kronecker power of ((1,1),(0,1)) and so takes five steps.
-inline uint32_t sobol_second_reversed(uint32_t reversed) {
-  uint32_t x = reverse_bits(reversed);
+/// Second Sobol dimension of an index, bit-reversed (the first is the index itself): the Pascal
+/// matrix mod 2, which is a Kronecker power of ((1,1),(0,1)) and so takes five steps.
+inline uint32_t sobol_second_reversed(uint32_t x) {
   x ^= (x >> 16) & 0x0000ffffu;
   x ^= (x >> 8) & 0x00ff00ffu;
   x ^= (x >> 4) & 0x0f0f0f0fu;
@@ -47,7 +47,8 @@ inline uint32_t sobol_second_reversed(uint32_t reversed) {
   return x;
 }
 
-inline float unit_float(uint32_t bits) { return float(bits >> 8) * 0x1p-24f; }
+/// By way of a signed number, which packs convert in one instruction.
+inline float unit_float(uint32_t bits) { return float(int32_t(bits >> 8)) * 0x1p-24f; }
 
 /// Interleaves the low 16 bits of x and y: pixels near each other get indices near each other.
 inline uint64_t morton(uint32_t x, uint32_t y) {
@@ -71,7 +72,7 @@ enum class PixelOrder {
 /// bounce's light, ...), so a skipped event shifts nothing.
 class Sampler {
  public:
-  /// @param slots_log2  samples of a pixel take 2^slots_log2 consecutive points
+  /// @param slots_log2  samples of a pixel take 2^slots_log2 consecutive points, 32 at most
   Sampler(PixelOrder order, uint32_t seed, uint32_t x, uint32_t y, uint32_t slots_log2,
           uint32_t sample) {
     const uint64_t pixel = morton(x, y);
@@ -85,24 +86,66 @@ class Sampler {
     }
   }
 
-  /// One number in [0, 1) for a dimension.
+  /// Of a sample of the same pixel, from that of its sample 0.
+  Sampler at(uint32_t sample) const {
+    Sampler out = *this;
+    out.reversed_index_ |= reverse_bits(sample);
+    return out;
+  }
+
+  /// One number in [0, 1) for a dimension: the first of `two`.
   float one(uint32_t dimension) const {
-    const uint32_t key = hash_bits(seed_ + dimension * 0x9e3779b9u);
-    return unit_float(reverse_bits(scramble_reversed(
-        reverse_bits(scramble_reversed(reversed_index_, key)), key * 0x68bc21ebu)));
+    const uint32_t key = key_of(dimension);
+    return unit_float(coordinate(shuffled_index(key), key, kFirst));
   }
 
   /// A point in [0, 1)^2 for a dimension: an Owen-scrambled (0, 2)-sequence.
   V2f two(uint32_t dimension) const {
-    const uint32_t key = hash_bits(seed_ + dimension * 0x9e3779b9u);
-    const uint32_t index = scramble_reversed(reversed_index_, key);  // shuffled, bit-reversed
-    const uint32_t first = reverse_bits(index);                      // Sobol values, bit-reversed
-    const uint32_t second = sobol_second_reversed(index);
-    return {unit_float(reverse_bits(scramble_reversed(first, key * 0x68bc21ebu))),
-            unit_float(reverse_bits(scramble_reversed(second, key * 0x02e5be93u)))};
+    const uint32_t key = key_of(dimension), index = shuffled_index(key);
+    return {unit_float(coordinate(index, key, kFirst)),
+            unit_float(coordinate(sobol_second_reversed(index), key, kSecond))};
+  }
+
+  /// `two` of four dimensions from `first` on, at little more than the cost of one: eight numbers
+  /// are a pack.
+  std::array<V2f, 4> four(uint32_t first) const {
+    std::array<uint32_t, 8> bits;
+    for (uint32_t k = 0; k < 8; ++k) {
+      const uint32_t key = key_of(first + k / 2), index = shuffled_index(key);
+      bits[k] =
+          coordinate(k % 2 ? sobol_second_reversed(index) : index, key, k % 2 ? kSecond : kFirst);
+    }
+    std::array<V2f, 4> out;
+    for (uint32_t k = 0; k < 8; ++k) out[k / 2][int(k % 2)] = unit_float(bits[k]);
+    return out;
+  }
+
+  /// `two` of a dimension for eight samples of the pixel from `first` on, from its sample 0.
+  std::array<V2f, 8> two_of_eight(uint32_t first, uint32_t dimension) const {
+    std::array<uint32_t, 8> x, y;
+    const uint32_t key = key_of(dimension);
+    for (uint32_t k = 0; k < 8; ++k) {
+      const uint32_t index = at(first + k).shuffled_index(key);
+      x[k] = coordinate(index, key, kFirst);
+      y[k] = coordinate(sobol_second_reversed(index), key, kSecond);
+    }
+    std::array<V2f, 8> out;
+    for (uint32_t k = 0; k < 8; ++k) out[k] = {unit_float(x[k]), unit_float(y[k])};
+    return out;
   }
 
  private:
+  static constexpr uint32_t kFirst = 0x68bc21eb, kSecond = 0x02e5be93;  // seeds, any odd numbers
+
+  uint32_t key_of(uint32_t dimension) const { return hash_bits(seed_ + dimension * 0x9e3779b9u); }
+  uint32_t shuffled_index(uint32_t key) const {
+    return reverse_bits(scramble_reversed(reversed_index_, key));
+  }
+  /// Scrambles a Sobol value, which is given bit-reversed.
+  static uint32_t coordinate(uint32_t reversed, uint32_t key, uint32_t seed) {
+    return reverse_bits(scramble_reversed(reversed, key * seed));
+  }
+
   uint32_t reversed_index_ = 0, seed_ = 0;
 };
 

@@ -27,24 +27,32 @@ RTCRay embree_ray(const Ray& ray, float reach) {
   return {o.x, o.y, o.z, 0, d.x, d.y, d.z, ray.time, reach, 0xffffffffu, 0, 0};
 }
 
-/// The slab test of a ray against boxes, grown by its own rounding.
-struct InverseDirection {
-  V3f inverse;
+/// The slab test of a ray against boxes, grown by its own rounding: x, y, z and z again as a pack.
+class BoxTest {
+ public:
+  explicit BoxTest(const Ray& ray)
+      : origin_(pack(ray.origin)), inverse_(_mm_div_ps(_mm_set1_ps(1), pack(ray.direction))) {}
 
-  explicit InverseDirection(const V3f& d) : inverse(1 / d.x, 1 / d.y, 1 / d.z) {}
-
-  bool meets(const Imath::Box3f& box, const V3f& origin, float reach) const {
-    float from = 0, to = reach;
-    for (int c = 0; c < 3; ++c) {
-      const float a = (box.min[c] - origin[c]) * inverse[c];
-      const float b = (box.max[c] - origin[c]) * inverse[c];
-      if (std::isnan(a) || std::isnan(b)) continue;  // 0 x infinity: it runs in a side's plane
-      const float near = a < b ? a : b, far = a < b ? b : a;
-      from = near > from ? near : from;
-      to = far < to ? far : to;
-    }
-    return from <= to * (1 + 8 * 0x1p-24f);
+  bool meets(const Imath::Box3f& box, float reach) const {
+    const __m128 a = along(box.min), b = along(box.max), whole = _mm_set1_ps(reach);
+    // 0 x infinity: the ray runs in the plane of a side, which does not bound it.
+    const __m128 bounded = _mm_cmpord_ps(a, b);
+    __m128 near = _mm_and_ps(_mm_min_ps(a, b), bounded);
+    __m128 far = _mm_blendv_ps(whole, _mm_min_ps(_mm_max_ps(a, b), whole), bounded);
+    near = _mm_max_ps(near, _mm_movehl_ps(near, near));
+    near = _mm_max_ss(near, _mm_movehdup_ps(near));
+    far = _mm_min_ps(far, _mm_movehl_ps(far, far));
+    far = _mm_min_ss(far, _mm_movehdup_ps(far));
+    return std::max(_mm_cvtss_f32(near), 0.f) <= _mm_cvtss_f32(far) * (1 + 8 * 0x1p-24f);
   }
+
+ private:
+  static __m128 pack(const V3f& v) { return _mm_setr_ps(v.x, v.y, v.z, v.z); }
+  __m128 along(const V3f& corner) const {
+    return _mm_mul_ps(_mm_sub_ps(pack(corner), origin_), inverse_);
+  }
+
+  __m128 origin_, inverse_;
 };
 
 /// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
@@ -60,11 +68,6 @@ void keep_off_edges(const V3f& a, const V3f& b, const V3f& c, const Hit& hit, Su
 }
 
 }  // namespace
-
-V3f Surface::leave(const V3f& direction) const {
-  const float reach = dot(absolute(geometric_normal), error);
-  return position + geometric_normal * (dot(direction, geometric_normal) > 0 ? reach : -reach);
-}
 
 Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
              const RenderOptions& options)
@@ -253,9 +256,9 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
   if (objects_.empty()) return hit;
   RTCRayHit query{embree_ray(ray, hit.distance), {}};
-  const InverseDirection inverse(ray.direction);
+  const BoxTest box(ray);
   for (size_t k = 0; k < objects_.size(); ++k) {
-    if (!inverse.meets(objects_[k].bounds, ray.origin, query.ray.tfar)) continue;
+    if (!box.meets(objects_[k].bounds, query.ray.tfar)) continue;
     if (world == World::plate && objects_[k].matte == Matte::none) continue;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree_intersect(objects_[k].scene.get(), query, coherence);
@@ -273,9 +276,9 @@ bool Scene::occluded(const Ray& ray, float distance, World world, Gaps gaps) con
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
   if (objects_.empty()) return false;
   RTCRay query = embree_ray(ray, reach);
-  const InverseDirection inverse(ray.direction);
+  const BoxTest box(ray);
   for (const SceneObject& object : objects_) {
-    if (!inverse.meets(object.bounds, ray.origin, reach)) continue;
+    if (!box.meets(object.bounds, reach)) continue;
     if (world == World::plate && object.matte == Matte::none) continue;
     if (gaps == Gaps::open && materials_[object.material].gap > 0) continue;
     embree_occluded(object.scene.get(), query);

@@ -75,7 +75,10 @@ struct Surface {
   bool small = false;    // a sphere of foam: too small for a density of photons
 
   /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error.
-  V3f leave(const V3f& direction) const;
+  V3f leave(const V3f& direction) const {
+    const float reach = dot(absolute(geometric_normal), error);
+    return position + geometric_normal * (dot(direction, geometric_normal) > 0 ? reach : -reach);
+  }
 };
 
 class Scene {

@@ -173,7 +173,7 @@ TileTime measure_tiles(const Shot& shot, const FrameGeometry& geometry) {
 
 void emit_share(const Emit& emit, const std::string& name, Shot shot, const FrameGeometry& geometry,
                 double needed) {
-  constexpr int kRuns = 5;
+  constexpr int kRuns = 11;
   shot.render.width = 192;
   shot.render.height = 108;
   shot.render.samples = 16;

@@ -65,7 +65,23 @@ TEST(Sampler, SecondDimensionIsSobols) {
     uint32_t expected = 0, column = 1u << 31;
     for (uint32_t i = index; i; i >>= 1, column ^= column >> 1)
       if (i & 1) expected ^= column;
-    EXPECT_EQ(reverse_bits(sobol_second_reversed(reverse_bits(index))), expected);
+    EXPECT_EQ(reverse_bits(sobol_second_reversed(index)), expected);
+  }
+}
+
+TEST(Sampler, GivesPacksOfTheSamePoints) {
+  for (const auto order : {PixelOrder::morton, PixelOrder::separate}) {
+    const Sampler pixel(order, 3, 700, 50000, 10, 0);
+    for (uint32_t s = 0; s < 1000; s += 8) {
+      const std::array<V2f, 8> of_eight = pixel.two_of_eight(s, 9);
+      for (uint32_t k = 0; k < 8; ++k) {
+        const Sampler sampler(order, 3, 700, 50000, 10, s + k);
+        EXPECT_EQ(of_eight[k], sampler.two(9));
+        const std::array<V2f, 4> four = pixel.at(s + k).four(20);
+        for (uint32_t d = 0; d < 4; ++d) EXPECT_EQ(four[d], sampler.two(20 + d));
+        EXPECT_EQ(four[1].x, sampler.one(21));
+      }
+    }
   }
 }
 
