@@ -420,12 +420,13 @@ void Executor::make_image(int frame) {
 }
 
 void Executor::render_frames() {
+  const bool denoises = wanted_.may(Step::render) && wanted_.denoise_frames > 0;
   while (const std::optional<int> frame = to_render_.pop()) {
     if (!wanted_.may(Step::render)) continue;
     make_image(*frame);
-    if (wanted_.denoise_frames > 0) denoise_beside(*frame);
+    if (denoises) denoise_beside(*frame);
   }
-  if (--renderers_ == 0 && wanted_.denoise_frames > 0 && !stopping()) denoise_rest();
+  if (--renderers_ == 0 && denoises && !stopping()) denoise_rest();
 }
 
 /// Whether nothing of this run can change what a wanted frame is denoised by.

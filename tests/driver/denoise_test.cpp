@@ -115,6 +115,18 @@ TEST(DenoiseStep, TakesNoNeighbourOfAnOldSimulation) {
   EXPECT_EQ(stages.frames(Step::denoise), std::vector<int>{5});
 }
 
+/// No frame is denoised, and none missed, by a run that renders none.
+TEST(DenoiseStep, IsPartOfRenderingAlone) {
+  const TemporaryFolder folder;
+  for (const Step step : {Step::simulate, Step::mesh}) {
+    ToySettings settings = neighbourly();
+    settings.steps = {step};
+    ToyStages stages(settings);
+    EXPECT_FALSE(make_toy(settings, stages, folder.path()).nothing_to_do()) << step_name(step);
+    EXPECT_TRUE(stages.frames(Step::denoise).empty()) << step_name(step);
+  }
+}
+
 TEST(DenoiseStep, OfAnotherRadiusRendersNothing) {
   const TemporaryFolder folder, wide;
   make_ranges(folder, {{}}, 1);
