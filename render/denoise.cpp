@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <tuple>
 #include <utility>
@@ -34,6 +35,8 @@ constexpr float kLeastVariance = 1e-10f;
 constexpr float kLeastGuideVariance = 1e-6f;
 /// Ridge of a feature without noise, in units of its square.
 constexpr float kRidge = 1e-4f;
+/// Weight from which a neighbour's colour is one that a fit may have.
+constexpr float kCounts = 0.01f;
 constexpr int kMostFeatures = 9;               // with the two of the place in the picture
 constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
 constexpr int kRows = kMostTerms + 3;          // and the colours
@@ -156,6 +159,27 @@ struct NormalEquations {
   std::array<TileRow, kMostFeatures> noise;  // variance of features, weighed
 };
 
+/// The least and the most of each colour in a row's windows, of what counts there.
+struct Range {
+  std::array<TileRow, 3> low, high;
+
+  void clear() {
+    for (TileRow& row : low) row.fill(std::numeric_limits<float>::max());
+    for (TileRow& row : high) row.fill(std::numeric_limits<float>::lowest());
+  }
+  void add(size_t c, const float* colour, const float* weight) {
+    for (size_t x = 0; x < kTile; ++x) {
+      const bool counts = weight[x] > kCounts;
+      low[c][x] = counts && colour[x] < low[c][x] ? colour[x] : low[c][x];
+      high[c][x] = counts && colour[x] > high[c][x] ? colour[x] : high[c][x];
+    }
+  }
+  /// A fit beside a glint may lead anywhere; no colour lies beyond those it comes from.
+  float bound(size_t c, size_t x, float colour) const {
+    return std::max(0.f, std::clamp(colour, low[c][x], std::max(low[c][x], high[c][x])));
+  }
+};
+
 /// Solves for one pixel by Cholesky's factors. @return the constants: the colours at the pixel
 std::array<float, 3> solve(const NormalEquations& equations, int x, int terms) {
   double a[kMostTerms][kRows];
@@ -220,6 +244,7 @@ class TileDenoiser {
     for (auto& row : equations_.sum)
       for (TileRow& sum : row) sum.fill(0);
     for (TileRow& noise : equations_.noise) noise.fill(0);
+    range_.clear();
     size_t k = 0;
     for (const TileInput& other : tile_)
       for_each_offset(other.reach, [&](int dx, int dy) {
@@ -228,7 +253,7 @@ class TileDenoiser {
     for (int x = 0; x < std::min(kTile, picture_.width - x0_); ++x) {
       const std::array<float, 3> colour = solve(equations_, x, terms_);
       const size_t pixel = size_t(y0_ + y) * size_t(picture_.width) + size_t(x0_ + x);
-      for (size_t c = 0; c < 3; ++c) out[c][pixel] += 0.5f * std::max(0.f, colour[c]);
+      for (size_t c = 0; c < 3; ++c) out[c][pixel] += 0.5f * range_.bound(c, size_t(x), colour[c]);
     }
   }
 
@@ -249,6 +274,7 @@ class TileDenoiser {
     for (size_t c = 0; c < 3; ++c) {
       const float* there = other.half[half][c].row(dx, y + dy);
       std::copy(there, there + kTile, term[size_t(terms_) + c].begin());
+      range_.add(c, there, weight);
     }
     for (size_t i = 0; i < size_t(terms_); ++i) {
       TileRow weighed;
@@ -265,6 +291,7 @@ class TileDenoiser {
   std::vector<TileInput> tile_;     // of each source
   std::vector<TileWeight> weight_;  // of each offset in each
   NormalEquations equations_;
+  Range range_;
 };
 
 /// Calls with each pixel and the pixels within `reach` of it.

@@ -111,6 +111,19 @@ TEST(Denoise, TakesAwayOutliersThatLieTogether) {
 }
 
 /// A guide that is itself noise must not bring it in.
+/// Where a pixel's feature lies beyond those around it a fit led below what is there, and left
+/// holes beside glints.
+TEST(Denoise, StaysWithinTheColoursItComesFrom) {
+  const auto lone = [](int x, int y) { return x % 16 == 8 && y % 16 == 8; };
+  const auto steps = [](int x, int y) { return float((7 * x + 3 * y) % 16) / 16; };
+  const auto truth = [&](int x, int y) { return lone(x, y) ? 0.2f : 0.2f + 5 * steps(x, y); };
+  const auto feature = [&](int x, int y) { return lone(x, y) ? 0.f : 1 + steps(x, y); };
+  NoisyPicture picture = made(truth, feature, 0.01f, 9);
+  for (auto& variance : picture.variance) std::fill(variance.begin(), variance.end(), 100.f);
+  const auto out = denoise(picture);
+  EXPECT_GT(*std::min_element(out[1].begin(), out[1].end()), 0.15f);
+}
+
 TEST(Denoise, TrustsNoisyFeaturesLess) {
   const auto truth = [](int, int) { return 1.f; };
   std::mt19937 random(6);
