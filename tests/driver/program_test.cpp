@@ -360,7 +360,7 @@ TEST(Program, StopsOnRequestWithinTenSecondsAndContinues) {
 
 // Stopped within a frame, it keeps the frame's samples; continuing gives the same bits.
 TEST(Program, ContinuesWithinAFrame) {
-  const std::vector<std::string> long_frame{"--frames",  "1003", "--set", "render.samples=2048",
+  const std::vector<std::string> long_frame{"--frames",  "1003", "--set", "render.samples=8192",
                                             "--threads", "1"};
   const TinyShot undisturbed, shot;
   ASSERT_EQ(undisturbed.run("run", long_frame).code, done);
