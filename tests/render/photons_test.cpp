@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "tests/render/support.h"
 
 namespace drench::test {
@@ -169,6 +171,41 @@ TEST(Photons, LeaveFoamToPaths) {
     pool.foam.radius.push_back(0.004f);
   }
   expect_photons_as_paths(shot, pool);
+}
+
+// Whatever the cells and packs they lie in: every photon of the disc counts once, none else, on the
+// side that it comes from. Against all of them one by one.
+TEST(Photons, AreAllFoundOnce) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-1, 1);
+  for (const int count : {1, 7, 60, 3000}) {
+    std::vector<Photon> photons;
+    for (int k = 0; k < count; ++k)
+      photons.push_back({V3f(place(random), 0.1f * place(random), place(random)),
+                         V3f(0, k % 3 ? -1.f : 1.f, 0), V3f(0, k % 2 ? -1.f : 1.f, 0),
+                         V3f(1 + place(random))});
+    const PhotonMap map(photons);
+    const float r2 = map.radius() * map.radius();
+    for (int k = 0; k < 2000; ++k) {
+      const V3f at = k % 2 ? photons[size_t(k) % photons.size()].position
+                           : V3f(1.2f * place(random), 0, 1.2f * place(random));
+      double side[2] = {0, 0}, near = 0;
+      for (const Photon& p : photons) {
+        const V3f off = p.position - at;
+        const double square = dot(off, off) / r2;
+        if (square < 1 && off.y * off.y <= 0.25f * r2)
+          side[p.direction.y < 0 ? 0 : 1] += double(p.power.x) * 2 * (1 - square) / (kPi64 * r2);
+      }
+      map.for_each_near(at, V3f(0, 1, 0), [&](const V3f&, const V3f& power, float share) {
+        near += double(power.x) * share;
+      });
+      const Irradiance found = map.irradiance(at, V3f(0, 1, 0), V3f(0, 1, 0));
+      const double slack = 1e-4 * (1 + side[0] + side[1]);
+      ASSERT_NEAR(found.front.x, side[0], slack) << count << " " << k;
+      ASSERT_NEAR(found.back.x, side[1], slack) << count << " " << k;
+      ASSERT_NEAR(near, side[0] + side[1], slack) << count << " " << k;
+    }
+  }
 }
 
 // Smooth normals on coarse triangles: no photon far brighter than the others, which would be a
