@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <tuple>
 #include <utility>
 
 #include "render/motion_match.h"
+#include "render/outliers.h"
 
 namespace drench {
 
@@ -40,12 +40,6 @@ constexpr float kCounts = 0.01f;
 constexpr int kMostFeatures = 9;               // with the two of the place in the picture
 constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
 constexpr int kRows = kMostTerms + 3;          // and the colours
-
-/// An outlier is this many times brighter than all but a few of the 24 pixels around it, and its
-/// own samples do not know its brightness to this part; many may lie together that one or two
-/// samples found each.
-constexpr float kOutlier = 4, kUnsure = 0.25f, kLuck = 0.9f;
-constexpr size_t kFew = 3, kMany = 12;
 
 using TileRow = std::array<float, kTile>;
 
@@ -294,46 +288,6 @@ class TileDenoiser {
   Range range_;
 };
 
-/// Calls with each pixel and the pixels within `reach` of it.
-template <class Visit>
-void for_each_window(int width, int height, int reach, const Visit& visit) {
-  std::vector<size_t> window;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      window.clear();
-      for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
-        for (int u = std::max(x - reach, 0); u <= std::min(x + reach, width - 1); ++u)
-          window.push_back(size_t(v) * size_t(width) + size_t(u));
-      visit(size_t(y) * size_t(width) + size_t(x), window);
-    }
-}
-
-void tame_outliers(NoisyPicture& picture) {
-  Plane bright(picture.variance[0].size(), 0.f);
-  for (size_t p = 0; p < bright.size(); ++p)
-    for (const auto& half : picture.half)
-      for (const Plane& colour : half) bright[p] += colour[p] / 6;
-  std::vector<float> around;
-  for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
-    float variance = 0;
-    for (const Plane& v : picture.variance) variance += v[p] / 3;
-    const float part2 = variance / (bright[p] * bright[p]);
-    if (!(part2 >= kUnsure * kUnsure)) return;
-    const size_t few = part2 < kLuck * kLuck ? kFew : kMany;
-    around.clear();
-    for (const size_t q : window)
-      if (q != p) around.push_back(bright[q]);
-    if (around.size() <= few) return;
-    std::nth_element(around.begin(), around.begin() + long(few), around.end(), std::greater<>());
-    const float most = kOutlier * std::max(around[few], 0.f);
-    if (!(bright[p] > most)) return;
-    const float factor = most / bright[p];
-    for (auto& half : picture.half)
-      for (Plane& colour : half) colour[p] *= factor;
-    for (Plane& v : picture.variance) v[p] *= factor * factor;
-  });
-}
-
 /// Mean of the 3 x 3 pixels around each: the few samples of one tell its variance badly.
 void smooth_variance(NoisyPicture& picture) {
   for (Plane& variance : picture.variance) {
@@ -490,20 +444,21 @@ void smooth_guides(const std::vector<Source>& sources, NoisyPicture& picture,
           std::move(smooth[k * guides + f]);
 }
 
-void prepare(NoisyPicture& picture) {
-  tame_outliers(picture);
+/// @return glints, which are not in it any more
+std::vector<Plane> prepare(NoisyPicture& picture) {
+  std::vector<Plane> glints = tame_outliers(picture);
   smooth_variance(picture);
+  return glints;
 }
 
 }  // namespace
 
 std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
-  prepare(picture);
+  std::vector<Plane> out = prepare(picture);
   for (std::vector<NoisyPicture>* side : {&neighbours.before, &neighbours.after})
     for (NoisyPicture& frame : *side) prepare(frame);
   const Sources sources(picture, neighbours);
   smooth_guides(sources.list(), picture, neighbours);
-  std::vector<Plane> out(3, Plane(size_t(picture.width) * size_t(picture.height), 0.f));
   const int columns = (picture.width + kTile - 1) / kTile;
   const int rows = (picture.height + kTile - 1) / kTile;
   tbb::parallel_for(

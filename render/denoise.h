@@ -40,8 +40,7 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 /// patches is that of Rousselle et al. 2012, equation 4. One bandwidth. Features are smoothed
 /// first, by a mean over what their own variance cannot tell apart: a sample of water mirrors or
 /// refracts, so that their noise is that of the picture. What noise is left weighs them less
-/// (ridge). A pixel that far outshines nearly all around it, by a light that few of its samples
-/// found, is brought down to them first: spread over its window it would be a white square. The
+/// (ridge). Outliers are brought down first, and glints put back where they were (outliers.h). The
 /// same bits for any thread count.
 ///
 /// Pixels of neighbours in time join the window, led there by their motion, in a smaller window of

@@ -110,7 +110,30 @@ TEST(Denoise, TakesAwayOutliersThatLieTogether) {
   EXPECT_LT(rms(denoise(picture), truth), 0.5 * kNoise);
 }
 
-/// A guide that is itself noise must not bring it in.
+/// A lamp that a drop shows in eight pixels, which each know it badly: it is no white square, and
+/// what light it has stays. Two samples that found one beside each other, as likely by luck, do
+/// not.
+TEST(Denoise, KeepsGlintsWhereTheyAre) {
+  const auto truth = [](int, int) { return 1.f; };
+  const auto brighten = [](NoisyPicture& picture, int x, int y) {
+    const size_t p = size_t(y * kSize + x);
+    for (int c = 0; c < 3; ++c) {
+      for (auto& half : picture.half) half[c][p] += 300;
+      picture.variance[c][p] = 160 * 160;
+    }
+  };
+  NoisyPicture glint = made(truth, none, kNoise, 12);
+  NoisyPicture luck = glint;
+  for (int x = 30; x < 34; ++x)
+    for (int y = 40; y < 42; ++y) brighten(glint, x, y);
+  const auto lit = [](int x, int y) {
+    return x >= 30 && x < 34 && y >= 40 && y < 42 ? 301.f : 1.f;
+  };
+  EXPECT_LT(rms(denoise(glint), lit), 0.2 * kNoise);
+  brighten(luck, 30, 40);
+  EXPECT_LT(rms(denoise(luck), truth), 0.2 * kNoise);
+}
+
 /// Where a pixel's feature lies beyond those around it a fit led below what is there, and left
 /// holes beside glints.
 TEST(Denoise, StaysWithinTheColoursItComesFrom) {
@@ -124,6 +147,7 @@ TEST(Denoise, StaysWithinTheColoursItComesFrom) {
   EXPECT_GT(*std::min_element(out[1].begin(), out[1].end()), 0.15f);
 }
 
+/// A guide that is itself noise must not bring it in.
 TEST(Denoise, TrustsNoisyFeaturesLess) {
   const auto truth = [](int, int) { return 1.f; };
   std::mt19937 random(6);
