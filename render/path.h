@@ -2,10 +2,12 @@
 // The path loop, compiled once for every set of features and chosen once for a frame.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "render/matte.h"
 #include "render/photons.h"
+#include "render/sampler.h"
 
 namespace drench {
 
@@ -50,10 +52,20 @@ struct PathSettings {
   const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
 };
 
-/// One camera sample. `film` in pixels; `rays` counts rays traced; `record`, unless null, is
-/// filled; without it shadow catchers are seen as any object.
-using PathFunction = PathSample (*)(const Scene&, const PathSettings&, const Sampler&,
-                                    const V2f& film, uint64_t& rays, PathRecord* record);
+/// A camera sample to trace.
+struct CameraSample {
+  Sampler sampler;
+  V2f film;                      // pixels
+  PathRecord* record = nullptr;  // filled; without it shadow catchers are seen as any object
+  PathSample found;
+};
+
+/// Camera samples that are on their way at once.
+inline constexpr size_t kPathsAtOnce = 4;
+
+/// Traces that many samples or fewer; `rays` counts rays traced.
+using PathFunction = void (*)(const Scene&, const PathSettings&, std::span<CameraSample>,
+                              uint64_t& rays);
 
 /// @param features  any of Feature, combined
 PathFunction path_function(unsigned features);

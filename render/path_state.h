@@ -39,7 +39,6 @@ struct PathState {
   V3f vertex;          // where the ray comes from, before its offset
   float bsdf_pdf = 0;  // density of its direction; 0: lights ahead have not been sampled from here
   Bodies in = 0;
-  bool specular_only = true;
   int vertices = 0, diffuse = 0;
   // Gaps of cloth: how far the ray came from its vertex to the last one, how many sheets with gaps
   // it met, and whether it came through one from where no fluid was.

@@ -125,26 +125,35 @@ class Progress {
   double expected_ = 1, share_ = 0;
 };
 
+void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
+  sums.pixel[pixel].add(sample.found.radiance, sample.found.alpha);
+  if (!sample.record) return;
+  sums.layers.add(pixel, *sample.record);
+  sums.plate.add(pixel, sample.record->matte);
+  sums.layers.clear(*sample.record);
+}
+
 /// Brings the pixels of a tile to the numbers of samples that are planned. @return those added
 uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
-  PathRecord record = sums.layers.blank();
-  PathRecord* const recorded = sums.layers.records() ? &record : nullptr;
+  std::vector<PathRecord> record(kPathsAtOnce, sums.layers.blank());
+  const bool records = sums.layers.records();
+  std::vector<CameraSample> samples;
   uint64_t added = 0;
   const int x0 = tile % job.columns() * kTile, y0 = tile / job.columns() * kTile;
   for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
     for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
-      PixelSum& sum = sums.pixel[pixel];
       FilmPoints film(job, x + job.window.x, y + job.window.y);
-      for (int s = sum.samples(); s < sums.plan.wanted(pixel); ++s, ++added) {
-        const PathSample sample =
-            job.trace(job.scene, job.path, film.sampler(s), film[s], rays, recorded);
-        sum.add(sample.radiance, sample.alpha);
-        if (!recorded) continue;
-        sums.layers.add(pixel, record);
-        sums.plate.add(pixel, record.matte);
-        sums.layers.clear(record);
+      const int wanted = sums.plan.wanted(pixel);
+      for (int s = sums.pixel[pixel].samples(); s < wanted; s = sums.pixel[pixel].samples()) {
+        samples.clear();
+        for (size_t k = 0; k < kPathsAtOnce && s + int(k) < wanted; ++k)
+          samples.push_back(
+              {film.sampler(s + int(k)), film[s + int(k)], records ? &record[k] : nullptr, {}});
+        job.trace(job.scene, job.path, samples, rays);
+        for (const CameraSample& sample : samples) add_sample(sample, pixel, sums);
+        added += samples.size();
       }
     }
   return added;

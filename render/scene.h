@@ -100,6 +100,9 @@ class Scene {
   bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
   /// Whether the fluid is where a ray starts that came through a gap of cloth.
   bool fluid_beyond(const Ray& ray) const;
+  /// Asks for what `surface` will read, first which vertices and then these.
+  void prefetch_triangle(const Hit& hit) const;
+  void prefetch_vertices(const Hit& hit) const;
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
