@@ -313,24 +313,6 @@ void map_normal(Surface& s, const V3f& along_u, const V3f& along_v) {
 
 }  // namespace
 
-void Scene::prefetch_triangle(const Hit& hit) const {
-  if (hit.kind != Hit::Kind::object) return;
-  const SceneObject& object = objects_[hit.index];
-  if (object.sphere.empty()) __builtin_prefetch(&object.triangle[hit.triangle]);
-}
-
-void Scene::prefetch_vertices(const Hit& hit) const {
-  if (hit.kind != Hit::Kind::object) return;
-  const SceneObject& object = objects_[hit.index];
-  if (!object.sphere.empty()) return;
-  const auto& t = object.triangle[hit.triangle];
-  for (const uint32_t vertex : {t.x, t.y, t.z}) {
-    __builtin_prefetch(&object.position[vertex]);
-    __builtin_prefetch(&object.normal[vertex]);
-    if (object.moves()) __builtin_prefetch(&object.position_close[vertex]);
-  }
-}
-
 template <bool moving>
 Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   Surface s;

@@ -101,8 +101,20 @@ class Scene {
   /// Whether the fluid is where a ray starts that came through a gap of cloth.
   bool fluid_beyond(const Ray& ray) const;
   /// Asks for what `surface` will read, first which vertices and then these.
-  void prefetch_triangle(const Hit& hit) const;
-  void prefetch_vertices(const Hit& hit) const;
+  void prefetch_triangle(const Hit& hit) const {
+    const SceneObject* object = triangles_hit(hit);
+    if (object) __builtin_prefetch(&object->triangle[hit.triangle]);
+  }
+  void prefetch_vertices(const Hit& hit) const {
+    const SceneObject* object = triangles_hit(hit);
+    if (!object) return;
+    const auto& t = object->triangle[hit.triangle];
+    for (const uint32_t vertex : {t.x, t.y, t.z}) {
+      __builtin_prefetch(&object->position[vertex]);
+      __builtin_prefetch(&object->normal[vertex]);
+      if (object->moves()) __builtin_prefetch(&object->position_close[vertex]);
+    }
+  }
   template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
@@ -163,6 +175,11 @@ class Scene {
   bool has_mattes() const;
   bool moves_visibly(const TriangleMesh& mesh) const;
   bool moves_visibly(const FoamFrame& foam) const;
+  /// Null if it is no object of triangles.
+  const SceneObject* triangles_hit(const Hit& hit) const {
+    if (hit.kind != Hit::Kind::object || !objects_[hit.index].sphere.empty()) return nullptr;
+    return &objects_[hit.index];
+  }
   /// The nearest point of one object.
   Hit meet(uint32_t object, const Ray& ray, float reach) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
