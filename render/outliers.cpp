@@ -14,9 +14,12 @@ using Plane = NoisyPicture::Plane;
 /// found each.
 constexpr float kLuck = 4, kUnsure = 0.25f, kOneSample = 0.9f;
 constexpr size_t kFew = 3, kHalf = 12;
-/// A glint is this many times brighter than half of what is around it, with its noise. It and what
-/// touches it know their brightness to this part, which takes three samples.
+/// A glint is this many times brighter than half of what is around it, with its noise; if few of
+/// its samples found it, which then lie loosely together, than half of what is farther around. So
+/// it is over the mean of the picture: before black anything would be. It and what touches it know
+/// their brightness to this part, which takes three samples.
 constexpr float kGlint = 16, kSeen = 0.5f;
+constexpr int kBlock = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
 /// The value that only `few` of a list are above.
 float beyond(std::vector<float>& list, size_t few) {
@@ -27,18 +30,26 @@ float beyond(std::vector<float>& list, size_t few) {
 struct Outlier {
   float factor = 1;  // takes it down to what is around it
   bool glint = false;
+  bool lone = false;  // of a glint: one sample knows of it
 };
 
 class Brightness {
  public:
   explicit Brightness(const NoisyPicture& picture)
-      : width_(size_t(picture.width)), mean_(picture.variance[0].size(), 0.f), scatter_(mean_) {
+      : width_(picture.width),
+        height_(picture.height),
+        columns_((width_ + kBlock - 1) / kBlock),
+        mean_(picture.variance[0].size(), 0.f),
+        scatter_(mean_) {
     for (size_t p = 0; p < mean_.size(); ++p) {
       for (const auto& half : picture.half)
         for (const Plane& colour : half) mean_[p] += colour[p] / 6;
       for (const Plane& variance : picture.variance) scatter_[p] += variance[p] / 3;
       scatter_[p] = std::sqrt(scatter_[p]);
     }
+    for (int y = 0; y < height_; y += kBlock)
+      for (int x = 0; x < width_; x += kBlock) block_.push_back(median_of_block(x, y));
+    for (const float median : block_) picture_ += median / float(block_.size());
   }
 
   Outlier judge(size_t p, const std::vector<size_t>& window) {
@@ -50,9 +61,13 @@ class Brightness {
       noisy_.push_back(mean_[q] + scatter_[q]);
     }
     const bool one_sample = !(scatter_[p] < kOneSample * mean_[p]);
-    if (!one_sample && mean_[p] > kGlint * beyond(noisy_, kHalf))
-      return {beyond(around_, kHalf) / mean_[p], seen(p, window)};
+    const float usual = beyond(around_, kHalf);
+    if (!one_sample && mean_[p] > kGlint * std::max(beyond(noisy_, kHalf), picture_))
+      return {usual / mean_[p], seen(p, window)};
     if (scatter_[p] < kUnsure * mean_[p]) return {};
+    const float far = std::max(farther_around(p), picture_);
+    if (mean_[p] > kGlint * far)
+      return {std::min(usual, far) / mean_[p], seen(p, window), one_sample};
     const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
@@ -62,17 +77,41 @@ class Brightness {
   bool seen(size_t p, const std::vector<size_t>& window) const {
     float sum = 0, square = 0;
     for (const size_t q : window) {
-      if (apart(p % width_, q % width_) > 1 || apart(p / width_, q / width_) > 1) continue;
+      if (!touch(p, q)) continue;
       sum += mean_[q];
       square += scatter_[q] * scatter_[q];
     }
     return square < kSeen * kSeen * sum * sum;
   }
 
-  static size_t apart(size_t a, size_t b) { return a > b ? a - b : b - a; }
+  float median_of_block(int x0, int y0) {
+    noisy_.clear();
+    for (int y = y0; y < std::min(y0 + kBlock, height_); ++y)
+      for (int x = x0; x < std::min(x0 + kBlock, width_); ++x) {
+        const size_t p = size_t(y) * size_t(width_) + size_t(x);
+        noisy_.push_back(mean_[p] + scatter_[p]);
+      }
+    return beyond(noisy_, noisy_.size() / 2);
+  }
+  float farther_around(size_t p) {
+    const int column = int(p % size_t(width_)) / kBlock, row = int(p / size_t(width_)) / kBlock;
+    noisy_.clear();
+    for (int r = row - 1; r <= row + 1; ++r)
+      for (int c = column - 1; c <= column + 1; ++c)
+        if (r >= 0 && c >= 0 && c < columns_ && r * kBlock < height_)
+          noisy_.push_back(block_[size_t(r * columns_ + c)]);
+    return beyond(noisy_, noisy_.size() / 2);
+  }
+  bool touch(size_t p, size_t q) const {
+    const auto apart = [](size_t a, size_t b) { return a > b ? a - b : b - a; };
+    const size_t width = size_t(width_);
+    return apart(p % width, q % width) <= 1 && apart(p / width, q / width) <= 1;
+  }
 
-  size_t width_;
-  Plane mean_, scatter_;  // over colours; of a half's mean
+  int width_, height_, columns_;  // columns of blocks
+  Plane mean_, scatter_;          // over colours; of a half's mean
+  Plane block_;                   // medians of the blocks, with noise
+  float picture_ = 0;             // their mean
   std::vector<float> around_, noisy_;
 };
 
@@ -81,12 +120,28 @@ class Brightness {
 std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   Brightness bright(picture);
   std::vector<Plane> glints(3, Plane(picture.variance[0].size(), 0.f));
+  // One that one sample knows of shares with what it touches, or it would be a dot.
+  const auto put = [&](size_t p, size_t c, float light, bool share) {
+    if (!share) {
+      glints[c][p] += light;
+      return;
+    }
+    const int x = int(p % size_t(picture.width)), y = int(p / size_t(picture.width));
+    for (int dy = -1; dy <= 1; ++dy)
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int u = std::clamp(x + dx, 0, picture.width - 1);
+        const int v = std::clamp(y + dy, 0, picture.height - 1);
+        const float part = float((2 - std::abs(dx)) * (2 - std::abs(dy))) / 16;
+        glints[c][size_t(v) * size_t(picture.width) + size_t(u)] += part * light;
+      }
+  };
   for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
-    const auto [factor, glint] = bright.judge(p, window);
+    const Outlier outlier = bright.judge(p, window);
+    const float factor = outlier.factor;
     if (factor == 1) return;
     for (size_t c = 0; c < 3; ++c) {
       Plane &first = picture.half[0][c], &second = picture.half[1][c];
-      if (glint) glints[c][p] = (1 - factor) * 0.5f * (first[p] + second[p]);
+      if (outlier.glint) put(p, c, (1 - factor) * 0.5f * (first[p] + second[p]), outlier.lone);
       first[p] *= factor, second[p] *= factor;
       picture.variance[c][p] *= factor * factor;
     }

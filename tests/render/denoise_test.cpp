@@ -134,6 +134,35 @@ TEST(Denoise, KeepsGlintsWhereTheyAre) {
   EXPECT_LT(rms(denoise(luck), truth), 0.2 * kNoise);
 }
 
+/// A moving drop's glint, of which single samples lie loosely together, has no dark rim and no
+/// square around it, and keeps some of its light.
+TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
+  NoisyPicture picture = made([](int, int) { return 1.f; }, none, kNoise, 14);
+  std::mt19937 random(15);
+  const auto within = [](int x, int y, int reach) {
+    return std::abs(x - 30) <= 5 + reach && std::abs(y - 40) <= 4 + reach;
+  };
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      if (!within(x, y, 0) || random() % 5 > 1) continue;
+      const size_t half = random() % 2;
+      for (size_t c = 0; c < 3; ++c) {
+        picture.half[half][c][size_t(y * kSize + x)] += 150;
+        picture.variance[c][size_t(y * kSize + x)] = 75 * 75;
+      }
+    }
+  const auto out = denoise(picture);
+  double light = 0;
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      const float value = out[1][size_t(y * kSize + x)];
+      EXPECT_GT(value, 0.8f) << x << ' ' << y;
+      if (!within(x, y, 1)) EXPECT_LT(value, 1.2f) << x << ' ' << y;
+      light += value - 1;
+    }
+  EXPECT_GT(light, 100);
+}
+
 /// Where a pixel's feature lies beyond those around it a fit led below what is there, and left
 /// holes beside glints.
 TEST(Denoise, StaysWithinTheColoursItComesFrom) {
