@@ -30,7 +30,6 @@ float beyond(std::vector<float>& list, size_t few) {
 struct Outlier {
   float factor = 1;  // takes it down to what is around it
   bool glint = false;
-  bool lone = false;  // of a glint: one sample knows of it
 };
 
 class Brightness {
@@ -66,8 +65,7 @@ class Brightness {
       return {usual / mean_[p], seen(p, window)};
     if (scatter_[p] < kUnsure * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
-    if (mean_[p] > kGlint * far)
-      return {std::min(usual, far) / mean_[p], seen(p, window), one_sample};
+    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], seen(p, window)};
     const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
@@ -120,28 +118,12 @@ class Brightness {
 std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   Brightness bright(picture);
   std::vector<Plane> glints(3, Plane(picture.variance[0].size(), 0.f));
-  // One that one sample knows of shares with what it touches, or it would be a dot.
-  const auto put = [&](size_t p, size_t c, float light, bool share) {
-    if (!share) {
-      glints[c][p] += light;
-      return;
-    }
-    const int x = int(p % size_t(picture.width)), y = int(p / size_t(picture.width));
-    for (int dy = -1; dy <= 1; ++dy)
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int u = std::clamp(x + dx, 0, picture.width - 1);
-        const int v = std::clamp(y + dy, 0, picture.height - 1);
-        const float part = float((2 - std::abs(dx)) * (2 - std::abs(dy))) / 16;
-        glints[c][size_t(v) * size_t(picture.width) + size_t(u)] += part * light;
-      }
-  };
   for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
-    const Outlier outlier = bright.judge(p, window);
-    const float factor = outlier.factor;
+    const auto [factor, glint] = bright.judge(p, window);
     if (factor == 1) return;
     for (size_t c = 0; c < 3; ++c) {
       Plane &first = picture.half[0][c], &second = picture.half[1][c];
-      if (outlier.glint) put(p, c, (1 - factor) * 0.5f * (first[p] + second[p]), outlier.lone);
+      if (glint) glints[c][p] = (1 - factor) * 0.5f * (first[p] + second[p]);
       first[p] *= factor, second[p] *= factor;
       picture.variance[c][p] *= factor * factor;
     }

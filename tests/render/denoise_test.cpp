@@ -119,7 +119,7 @@ TEST(Denoise, KeepsGlintsWhereTheyAre) {
     const size_t p = size_t(y * kSize + x);
     for (int c = 0; c < 3; ++c) {
       for (auto& half : picture.half) half[c][p] += 300;
-      picture.variance[c][p] = 160 * 160;
+      picture.variance[c][p] = 170 * 170;
     }
   };
   NoisyPicture glint = made(truth, none, kNoise, 12);
