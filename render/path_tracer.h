@@ -482,10 +482,11 @@ class PathTracer {
   void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
     Irradiance light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
+    const unsigned hand = sampler_.turn(settings_.photons->hands_log2());
     if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
-      light = settings_.photons->irradiance(at, normal, bsdf.front());
+      light = settings_.photons->irradiance(hand, at, normal, bsdf.front());
     else
-      settings_.photons->for_each_near(at, normal,
+      settings_.photons->for_each_near(hand, at, normal,
                                        [&](const V3f& flight, const V3f& power, float share) {
                                          bsdf.receive(light, -flight, power * share);
                                        });

@@ -15,7 +15,7 @@ namespace {
 
 /// Sampling dimensions of a photon; each interface takes two.
 enum PhotonDimension : uint32_t {
-  kStart,
+  kStart,  // within its stretch of the area
   kStartPoint,
   kLamp,
   kLampPoint,
@@ -27,6 +27,10 @@ enum PhotonDimension : uint32_t {
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
 constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
+constexpr float kCrowd = 4;              // times the photons of the median one's disc
+constexpr uint32_t kFewest = 400;        // photons of a crowded cell: noise above blur
+constexpr unsigned kMostHands = 3;       // log2: any eight samples in a row see all photons
+constexpr double kHand = 4;              // photons of the median one's disc in a hand, at least
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// The smooth bodies' triangles by area; those on sheets let light pass and start none.
@@ -48,16 +52,21 @@ class InterfacePoints {
   /// m^2, at shutter open
   float area() const { return upto_.empty() ? 0.f : float(upto_.back()); }
 
+  /// The triangle at a share of the area.
+  size_t triangle_at(double u) const {
+    const auto found = std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back());
+    return std::min(size_t(found - upto_.begin()), upto_.size() - 1);
+  }
   struct Start {
     Hit hit;
     float area_ratio;  // of the triangle at this time over shutter open
   };
-  Start sample(float u, const V2f& uv, float time) const {
-    const size_t t =
-        size_t(std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back()) - upto_.begin());
-    const size_t drawn = std::min(t, upto_.size() - 1);
-    const auto after = std::upper_bound(first_.begin(), first_.end(), drawn);
-    const size_t bit = size_t(after - first_.begin()) - 1, triangle = drawn - first_[bit];
+  /// @param u     share of the area
+  /// @param from  where the search begins: no triangle behind that of u. Becomes that of u
+  Start sample(double u, const V2f& uv, float time, size_t& from) const {
+    while (from + 1 < upto_.size() && upto_[from] <= u * upto_.back()) ++from;
+    const auto after = std::upper_bound(first_.begin(), first_.end(), from);
+    const size_t bit = size_t(after - first_.begin()) - 1, triangle = from - first_[bit];
     const uint32_t index = scene_.bodies()[bit];
     const SceneObject& body = scene_.object(index);
     const float root = std::sqrt(uv.x);  // uniform on the triangle
@@ -101,11 +110,14 @@ class PhotonTracer {
   PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count)
       : scene_(scene), starts_(starts), count_(count) {}
 
-  /// The photon, if it starts and comes to lie on something.
-  bool trace(const Sampler& sampler, Photon& photon, uint64_t& rays) const {
+  /// A photon, if it starts and comes to lie on something. In their order they start along the
+  /// bodies' surface: an even spread, and neighbours in memory one after the other.
+  /// @param from  triangle of the photon before, or one before that of this
+  bool trace(uint32_t number, const Sampler& sampler, size_t& from, Photon& photon,
+             uint64_t& rays) const {
     Flight flight;
     Surface surface;
-    if (!start(sampler, flight, surface, rays)) return false;
+    if (!start(number, sampler, from, flight, surface, rays)) return false;
     while (cross_interface(sampler, flight, surface)) {
       const Hit hit = next(sampler, flight, surface, rays);
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
@@ -124,11 +136,12 @@ class PhotonTracer {
 
  private:
   /// From a lamp to a point of a body that it reaches.
-  bool start(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
+  bool start(uint32_t number, const Sampler& sampler, size_t& from, Flight& flight,
+             Surface& surface, uint64_t& rays) const {
     const ShutterCurve& curve = scene_.camera().curve();
     flight.ray.time = curve.time(sampler.one(kTime), curve.rolls() ? sampler.one(kRow) : 0.f);
-    const auto [hit, area_ratio] =
-        starts_.sample(sampler.one(kStart), sampler.two(kStartPoint), flight.ray.time);
+    const auto [hit, area_ratio] = starts_.sample((number + double(sampler.one(kStart))) / count_,
+                                                  sampler.two(kStartPoint), flight.ray.time, from);
     surface = scene_.surface<true>(flight.ray, hit);
     const LightSample light =
         scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
@@ -276,34 +289,55 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-PhotonMap::PhotonMap(std::vector<Photon> photons) {
+PhotonMap::PhotonMap(std::vector<Photon> photons, int samples) {
   if (photons.empty()) return;
   size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
   radius_ = choose_radius(photons, reach_);
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
-  crowd_ = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(size_)));
+  while (hands_log2_ < kMostHands && int(2 * hands()) <= samples &&
+         wanted_count(size_) >= kHand * 2 * hands())
+    ++hands_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
-  while (size_t{mask_} + 1 < size_) mask_ = 2 * mask_ + 1;
-  first_.assign(size_t{mask_} + size_t(cell_of(reach_.max).x) + 3, 0);
-  for (const Photon& p : photons) ++first_[bucket_of(cell_of(p.position)) + 1];
+  while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
+  choose_radii(photons);
+  deal(photons);
+}
+
+void PhotonMap::choose_radii(const std::vector<Photon>& photons) {
+  std::vector<uint32_t> count(size_t{mask_} + size_t(cell_of(reach_.max).x) + 2);
+  for (const Photon& p : photons) ++count[bucket_of(cell_of(p.position))];
+  const uint32_t crowd = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(size_)));
+  for (const uint32_t c : count)
+    radius2_.push_back(radius_ * radius_ * (c > crowd ? float(crowd) / float(c) : 1.f));
+}
+
+void PhotonMap::deal(const std::vector<Photon>& photons) {
+  const auto bucket = [&](size_t k) {
+    return k % hands() * buckets() + bucket_of(cell_of(photons[k].position));
+  };
+  first_.assign(hands() * buckets() + 1, 0);
+  for (size_t k = 0; k < size_; ++k) ++first_[bucket(k) + 1];
   for (size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
   std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
   pack_.resize((size_ + 7) / 8);
-  for (const Photon& p : photons) {
-    const uint32_t place = next[bucket_of(cell_of(p.position))]++, k = place % 8;
+  for (size_t j = 0; j < size_; ++j) {
+    const Photon& p = photons[j];
+    const V3f power = p.power * float(hands());
+    const uint32_t place = next[bucket(j)]++, k = place % 8;
     PhotonPack& pack = pack_[place / 8];
     pack.x[k] = p.position.x, pack.y[k] = p.position.y, pack.z[k] = p.position.z;
-    pack.red[k] = p.power.x, pack.green[k] = p.power.y, pack.blue[k] = p.power.z;
+    pack.red[k] = power.x, pack.green[k] = power.y, pack.blue[k] = power.z;
     pack.normal[k] = pack_unit(p.normal);
     pack.flight[k] = pack_unit(p.direction);
   }
 }
 
-Irradiance PhotonMap::irradiance(const V3f& point, const V3f& normal, const V3f& front) const {
+Irradiance PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& normal,
+                                 const V3f& front) const {
   __m256 sum[2][3] = {};
-  for_each_pack_near(point, normal, [&](const PhotonPack& p, __m256 share) {
+  for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
     const __m256 along = unpack_unit<0>(p.flight) * front.x + unpack_unit<1>(p.flight) * front.y +
                          unpack_unit<2>(p.flight) * front.z;
     const __m256 there = _mm256_cmp_ps(along, _mm256_setzero_ps(), _CMP_LT_OQ);
@@ -325,7 +359,8 @@ bool can_trace_photons(const Scene& scene) {
   return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
-PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint64_t& rays) {
+PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
+                        uint64_t& rays) {
   constexpr uint32_t chunk = 4096;
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
@@ -335,17 +370,18 @@ PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, uint6
   tbb::parallel_for(size_t{0}, found.size(), [&](size_t c) {
     const FlushDenormals flush;
     uint64_t chunk_rays = 0;
+    size_t from = starts.triangle_at(double(c) * chunk / count);
     for (uint32_t k = uint32_t(c) * chunk; k < std::min(count, (uint32_t(c) + 1) * chunk); ++k) {
       const Sampler sampler(PixelOrder::separate, seed ^ kSeed, 0, 0, 0, k);
       Photon photon;
-      if (tracer.trace(sampler, photon, chunk_rays)) found[c].push_back(photon);
+      if (tracer.trace(k, sampler, from, photon, chunk_rays)) found[c].push_back(photon);
     }
     traced += chunk_rays;
   });
   rays += traced;
   std::vector<Photon> all;
   for (const std::vector<Photon>& part : found) all.insert(all.end(), part.begin(), part.end());
-  return PhotonMap(std::move(all));
+  return PhotonMap(std::move(all), samples);
 }
 
 }  // namespace drench

@@ -302,7 +302,8 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   uint64_t photon_rays = 0;
   PhotonMap photons;
   if (shot.render.photons > 0 && can_trace_photons(scene)) {
-    photons = trace_photons(scene, seed, photon_count(shot.render), photon_rays);
+    photons =
+        trace_photons(scene, seed, photon_count(shot.render), shot.render.samples, photon_rays);
     path.photons = &photons;
   }
   const FilmWindow window = window_of(shot.render);

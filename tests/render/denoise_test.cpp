@@ -157,7 +157,7 @@ TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
     for (int x = 0; x < kSize; ++x) {
       const float value = out[1][size_t(y * kSize + x)];
       EXPECT_GT(value, 0.8f) << x << ' ' << y;
-      if (!within(x, y, 1)) EXPECT_LT(value, 1.2f) << x << ' ' << y;
+      EXPECT_TRUE(value < 1.2f || within(x, y, 1)) << x << ' ' << y;
       light += value - 1;
     }
   EXPECT_GT(light, 100);

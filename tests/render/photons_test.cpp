@@ -23,14 +23,23 @@ Light sun(const V3d& direction, double angle_deg) {
   return light;
 }
 
+/// Calls f(direction of flight, power, share) for the photons near a point, whosever hand.
+template <class F>
+void for_each_near(const PhotonMap& map, const V3f& at, const F& f) {
+  for (unsigned hand = 0; hand < map.hands(); ++hand)
+    map.for_each_near(hand, at, V3f(0, 1, 0),
+                      [&](const V3f& flight, const V3f& power, float share) {
+                        f(flight, power, share / float(map.hands()));
+                      });
+}
+
 /// Of the photons that lie in the square of half size s around the origin, W/m^2.
 double irradiance(const PhotonMap& map, double s, int n = 40) {
   double sum = 0;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
-      map.for_each_near(
-          V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
-          V3f(0, 1, 0),
+      for_each_near(
+          map, V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
           [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
   return sum / n / n;
 }
@@ -39,7 +48,7 @@ PhotonMap photons_of(const Shot& shot, const TriangleMesh& fluid, uint32_t count
                      uint32_t seed = 1) {
   const Scene scene(shot, 1001, {fluid, {}}, {});
   uint64_t rays = 0;
-  PhotonMap map = trace_photons(scene, seed, count, rays);
+  PhotonMap map = trace_photons(scene, seed, count, 64, rays);
   EXPECT_GT(rays, count / 8);
   return map;
 }
@@ -178,15 +187,16 @@ TEST(Photons, LeaveFoamToPaths) {
 TEST(Photons, AreAllFoundOnce) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> place(-1, 1);
-  for (const int count : {1, 7, 60, 3000}) {
+  for (const int count : {1, 7, 60, 3000, 100000}) {
     std::vector<Photon> photons;
     for (int k = 0; k < count; ++k)
       photons.push_back({V3f(place(random), 0.1f * place(random), place(random)),
                          V3f(0, k % 3 ? -1.f : 1.f, 0), V3f(0, k % 2 ? -1.f : 1.f, 0),
                          V3f(1 + place(random))});
-    const PhotonMap map(photons);
+    const PhotonMap map(photons, 64);
+    EXPECT_EQ(map.hands(), count == 100000 ? 4 : 1);
     const float r2 = map.radius() * map.radius();
-    for (int k = 0; k < 2000; ++k) {
+    for (int k = 0; k < (count > 3000 ? 100 : 2000); ++k) {
       const V3f at = k % 2 ? photons[size_t(k) % photons.size()].position
                            : V3f(1.2f * place(random), 0, 1.2f * place(random));
       double side[2] = {0, 0}, near = 0;
@@ -196,10 +206,15 @@ TEST(Photons, AreAllFoundOnce) {
         if (square < 1 && off.y * off.y <= 0.25f * r2)
           side[p.direction.y < 0 ? 0 : 1] += double(p.power.x) * 2 * (1 - square) / (kPi64 * r2);
       }
-      map.for_each_near(at, V3f(0, 1, 0), [&](const V3f&, const V3f& power, float share) {
+      for_each_near(map, at, [&](const V3f&, const V3f& power, float share) {
         near += double(power.x) * share;
       });
-      const Irradiance found = map.irradiance(at, V3f(0, 1, 0), V3f(0, 1, 0));
+      Irradiance found;
+      for (unsigned hand = 0; hand < map.hands(); ++hand) {
+        const Irradiance part = map.irradiance(hand, at, V3f(0, 1, 0), V3f(0, 1, 0));
+        found.front += part.front * (1 / float(map.hands()));
+        found.back += part.back * (1 / float(map.hands()));
+      }
       const double slack = 1e-4 * (1 + side[0] + side[1]);
       ASSERT_NEAR(found.front.x, side[0], slack) << count << " " << k;
       ASSERT_NEAR(found.back.x, side[1], slack) << count << " " << k;
@@ -220,11 +235,11 @@ TEST(Photons, AreNoneFarBrighterThanOthers) {
   const PhotonMap map = photons_of(shot, drop, 200000);
   double most = 0, sum = 0, count = 0;
   for (int k = 0; k < 10000; ++k)
-    map.for_each_near(V3f(0.02f * float(k % 100 - 50), 0, 0.02f * float(k / 100 - 50)),
-                      V3f(0, 1, 0), [&](const V3f&, const V3f& power, float) {
-                        most = std::max(most, double(power.x));
-                        sum += double(power.x), ++count;
-                      });
+    for_each_near(map, V3f(0.02f * float(k % 100 - 50), 0, 0.02f * float(k / 100 - 50)),
+                  [&](const V3f&, const V3f& power, float) {
+                    most = std::max(most, double(power.x));
+                    sum += double(power.x), ++count;
+                  });
   ASSERT_GT(count, 1000);
   EXPECT_LT(most, 20 * sum / count);
 }
@@ -239,8 +254,8 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
     std::vector<double> values;
     for (int k = 0; k < 2200; ++k) {
       double sum = 0;
-      map.for_each_near(
-          V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)), V3f(0, 1, 0),
+      for_each_near(
+          map, V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)),
           [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
       values.push_back(sum);
     }
