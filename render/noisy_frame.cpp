@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "pipeline/contract/error.h"
+#include "render/oidn.h"
 
 namespace drench {
 
@@ -72,6 +73,11 @@ NoisyPicture read_picture(const std::filesystem::path& file, int width, int heig
 
 }  // namespace
 
+std::vector<Plane> denoised_by(Denoiser denoiser, NoisyPicture picture, Neighbours neighbours) {
+  if (denoiser == Denoiser::oidn) return OpenImageDenoise().denoise(picture);
+  return denoise(std::move(picture), std::move(neighbours));
+}
+
 void put_clean(Film& film, const std::vector<Plane>& clean) {
   FilmLayer noisy{"noisy", {"R", "G", "B"}, FilmLayer::Precision::half, {}};
   for (size_t p = 0; p < clean[0].size(); ++p)
@@ -125,7 +131,7 @@ NoisyPicture picture_of(const Film& film) {
 
 Film denoised_film(const std::filesystem::path& frame,
                    const std::vector<std::filesystem::path>& before,
-                   const std::vector<std::filesystem::path>& after) {
+                   const std::vector<std::filesystem::path>& after, Denoiser denoiser) {
   Film film = read_layers(frame);
   NoisyPicture picture = picture_of(film);
   Neighbours neighbours;
@@ -135,7 +141,7 @@ Film denoised_film(const std::filesystem::path& frame,
     neighbours.after.push_back(read_picture(file, film.width, film.height));
   std::erase_if(film.layer, [](const FilmLayer& layer) { return layer.name.starts_with(kPrefix); });
   std::erase_if(film.header, [](const auto& entry) { return entry.first == kUnits; });
-  put_clean(film, denoise(std::move(picture), std::move(neighbours)));
+  put_clean(film, denoised_by(denoiser, std::move(picture), std::move(neighbours)));
   return film;
 }
 

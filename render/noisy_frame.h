@@ -14,6 +14,10 @@
 
 namespace drench {
 
+/// @throws Error if Open Image Denoise is asked for and not there; it leaves out the neighbours.
+std::vector<NoisyPicture::Plane> denoised_by(Denoiser denoiser, NoisyPicture picture,
+                                             Neighbours neighbours = {});
+
 /// Puts the denoised beauty in the place of the noisy one, which becomes the layer "noisy".
 void put_clean(Film& film, const std::vector<NoisyPicture::Plane>& clean);
 
@@ -28,6 +32,7 @@ NoisyPicture picture_of(const Film& film);
 /// @throws Error if one cannot be read, holds no such layers or is of another size.
 Film denoised_film(const std::filesystem::path& frame,
                    const std::vector<std::filesystem::path>& before,
-                   const std::vector<std::filesystem::path>& after);
+                   const std::vector<std::filesystem::path>& after,
+                   Denoiser denoiser = Denoiser::regression);
 
 }  // namespace drench

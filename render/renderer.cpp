@@ -221,12 +221,14 @@ FilmWindow window_of(const RenderSettings& r) {
 }
 
 /// Denoises the beauty, or adds what that takes.
-void denoise_film(const Sums& sums, Denoised denoised, Film& film) {
+void denoise_film(const Sums& sums, Denoised denoised, Denoiser denoiser, Film& film) {
   NoisyPicture picture = noisy_picture(sums.beauty());
   picture.width = film.width;
   picture.height = film.height;
   sums.layers.add_features(picture, sums.pixel);
-  if (denoised == Denoised::alone) return put_clean(film, denoise(std::move(picture)));
+  if (denoised == Denoised::alone) {
+    return put_clean(film, denoised_by(denoiser, std::move(picture)));
+  }
   sums.layers.add_motion(picture);
   add_picture(film, std::move(picture));
 }
@@ -327,7 +329,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   render_passes(job, options.checkpoint, sums, rays, report);
   if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
-  if (shot.render.denoise) denoise_film(sums, options.denoised, film);
+  if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
     *stats = {report.samples(), rays, picture_error(sums.beauty()),
               process_cpu_seconds() - cpu_start};

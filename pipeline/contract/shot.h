@@ -340,6 +340,10 @@ enum class Background { sky, clear };
 /// shows through, undistorted.
 enum class RefractionAlpha { opaque, transparent };
 
+/// What takes noise away; regression: Drench's own, by neighbouring frames, too; oidn: Open Image
+/// Denoise where it is installed, each frame alone.
+enum class Denoiser { regression, oidn };
+
 struct RenderSettings {
   int width = 960, height = 540;       // pixels
   V2i crop_min{0, 0}, crop_max{0, 0};  // pixels of it to render, from the top left; max is beyond
@@ -347,7 +351,8 @@ struct RenderSettings {
   double error = 0;                    // relative MSE to sample until; 0: all samples everywhere
   bool denoise = false;                // of the beauty, by its layers' help
   int denoise_frames = 1;              // before and after that help, too
-  int depth = 8;                       // diffuse bounces; specular ones end by roulette
+  Denoiser denoiser = Denoiser::regression;
+  int depth = 8;  // diffuse bounces; specular ones end by roulette
   bool motion_blur = true;
   Background background = Background::sky;
   RefractionAlpha refraction_alpha = RefractionAlpha::opaque;

@@ -191,6 +191,11 @@ std::vector<Parameter> film_rows() {
           "render", "denoise_frames", "", {0, 3}, denoise,
           "before and after a frame that denoise looks at, too, so that it does not flicker; 0: "
           "each frame alone, and no files of noisy frames"),
+      row<&RenderSettings::denoiser>("render", "denoiser", "", none, denoise,
+                                     "regression, or oidn: Open Image Denoise, loaded from where "
+                                     "LD_LIBRARY_PATH says; it sees "
+                                     "each frame alone, and alpha is still denoised by regression")
+          .one_of({"regression", "oidn"}),
       row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,

@@ -420,7 +420,7 @@ void Executor::make_image(int frame) {
 }
 
 void Executor::render_frames() {
-  const bool denoises = wanted_.may(Step::render) && wanted_.denoise_frames > 0;
+  const bool denoises = wanted_.may(Step::render) && wanted_.denoised_later;
   while (const std::optional<int> frame = to_render_.pop()) {
     if (!wanted_.may(Step::render)) continue;
     make_image(*frame);

@@ -272,7 +272,7 @@ void Planner::plan_render() {
 }
 
 void Planner::plan_denoise() {
-  if (wanted_.denoise_frames == 0) return;
+  if (!wanted_.denoised_later) return;
   for (const int frame : denoised_frames(wanted_, lookup_)) {
     Action input = Action::skip;
     const auto end = rendered_.upper_bound(frame + wanted_.denoise_frames);

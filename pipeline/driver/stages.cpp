@@ -230,7 +230,8 @@ class ShotStages final : public Stages {
       for (const std::string& file : files) out.push_back(folder / file);
       return out;
     };
-    const Film film = denoised_film(folder / noisy.frame, paths(noisy.before), paths(noisy.after));
+    const Film film = denoised_film(folder / noisy.frame, paths(noisy.before), paths(noisy.after),
+                                    shot_.render.denoiser);
     StageReport report;
     report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, attributes));
     report.json = json{{"before", noisy.before.size()}, {"after", noisy.after.size()}}.dump();

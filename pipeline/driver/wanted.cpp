@@ -1,5 +1,6 @@
 #include "pipeline/driver/wanted.h"
 
+#include <fmt/format.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "render/oidn.h"
 #include "render/view_transform.h"
 
 namespace drench {
@@ -138,7 +140,15 @@ StageKey mesh_key(const Shot& shot) {
   return builder.finish();
 }
 
-StageKey render_key(const Shot& shot) {
+/// The release of the library that denoises; "" without one.
+/// @throws Error if it is not there, before anything is made
+std::string denoiser_release(const Shot& shot) {
+  if (!shot.render.denoise || shot.render.denoiser != Denoiser::oidn) return "";
+  return fmt::format("oidn {}", OpenImageDenoise().version());
+}
+
+/// @param denoiser  "" if rendering does not denoise, or by what is built in
+StageKey render_key(const Shot& shot, const std::string& denoiser) {
   StageKeyBuilder builder(
       "render", build_id::render,
       sections_of(shot, {"obstacle", "camera", "light", "material", "ground", "render"}));
@@ -149,13 +159,15 @@ StageKey render_key(const Shot& shot) {
   for (const Material& material : shot.material)
     builder.file(material.texture).file(material.normal_map);
   add_obstacle_meshes(shot, builder);
+  if (!denoiser.empty()) builder.part("denoiser", denoiser);
   return builder.finish();
 }
 
-StageKey denoise_key(const Shot& shot) {
+StageKey denoise_key(const Shot& shot, const std::string& denoiser) {
   return StageKeyBuilder("denoise", build_id::render, {})
       .settings(stage_settings_digest(shot, Stage::denoise))
       .part("denoise_frames", std::to_string(shot.render.denoise_frames))
+      .part("denoiser", denoiser)
       .finish();
 }
 
@@ -218,9 +230,12 @@ Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
   wanted.mesh = mesh_key(shot);
   wanted.has_foam = wanted.fluid && shot.foam.present;
   if (wanted.has_foam) wanted.foam = foam_key(shot);
-  wanted.render = render_key(shot);
-  if (shot.render.denoise) wanted.denoise_frames = shot.render.denoise_frames;
-  if (wanted.denoise_frames > 0) wanted.denoise = denoise_key(shot);
+  const std::string denoiser = wanted.may(Step::render) ? denoiser_release(shot) : "";
+  wanted.denoised_later = shot.render.denoise && shot.render.denoise_frames > 0;
+  wanted.render = render_key(shot, wanted.denoised_later ? "" : denoiser);
+  if (wanted.denoised_later) wanted.denoise = denoise_key(shot, denoiser);
+  if (wanted.denoised_later && shot.render.denoiser == Denoiser::regression)
+    wanted.denoise_frames = shot.render.denoise_frames;
   if (wanted.may(Step::contact_sheet) || wanted.may(Step::movie))
     wanted.dailies = dailies_key(shot);  // who shows nothing needs no OpenColorIO
   wanted.has_ffmpeg = find_ffmpeg().has_value();
@@ -262,8 +277,8 @@ std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
 }
 
 std::string render_file(const Wanted& wanted, int frame) {
-  return wanted.denoise_frames > 0 ? layout::noisy(wanted.shot, frame)
-                                   : layout::image(wanted.shot, frame);
+  return wanted.denoised_later ? layout::noisy(wanted.shot, frame)
+                               : layout::image(wanted.shot, frame);
 }
 
 InputDigests sequence_inputs(const Wanted& wanted, int first, int last) {

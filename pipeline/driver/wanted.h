@@ -43,7 +43,8 @@ struct Wanted {
   std::map<int, Digest> sequence;  // by frame: of the files that obstacles have for every frame
   bool obstacles_move = false;     // equal particles then do not make equal meshes
   std::vector<std::string> probe;  // names of the probes: one file each for all frames
-  int denoise_frames = 0;          // before and after one that it is denoised by; 0: no such step
+  bool denoised_later = false;     // by a step of its own, of files of noisy frames
+  int denoise_frames = 0;          // before and after one that it is denoised by
   StageKey simulate, mesh, foam, render, denoise, dailies;  // dailies: contact sheet and movie
   bool has_ffmpeg = false;
 

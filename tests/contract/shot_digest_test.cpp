@@ -153,7 +153,7 @@ TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
       "wind",   "sink",      "cloth.pin",    "coupling",      "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     const bool holds_water = p.section == "ground" && (p.key == "present" || p.key == "height");
-    if (p.key == "denoise_frames") {
+    if (p.key == "denoise_frames" || p.key == "denoiser") {
       EXPECT_EQ(p.stages, shot_table::denoise);
     } else if (looks.contains(p.section)) {
       EXPECT_EQ(p.stages, shot_table::render | (holds_water ? shot_table::mesh : 0u)) << p.key;

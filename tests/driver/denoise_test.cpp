@@ -1,6 +1,8 @@
 // Frames denoised by their neighbours: the same bits in whatever order, ranges and pieces they are
 // made, and nothing rendered because a neighbour came.
 
+#include <dlfcn.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -201,6 +203,46 @@ TEST(DenoiseStep, OfARealShotHasTheSameBitsByRanges) {
   EXPECT_EQ(images(at_once).size(), 8u);
   EXPECT_EQ(images(ranges), images(at_once));
   EXPECT_EQ(images(single), images(at_once));
+}
+
+/// With a library that stands for Open Image Denoise (oidn_double.cpp): each frame alone, and
+/// nothing is rendered when the denoiser changes, unless rendering denoises.
+TEST(DenoiseStep, ByAnotherDenoiserRendersNothing) {
+  const TinyShot shot(3);
+  const auto run = [&](const std::string& denoiser, const std::string& frames) {
+    const Ended ended =
+        run_program(DRENCH_PROGRAM,
+                    shot.words("run", {"--set", "render.denoise=true", "--set", "render.samples=16",
+                                       "--set", "render.denoiser=\"" + denoiser + "\"", "--set",
+                                       "render.denoise_frames=" + frames}),
+                    shot.folder(), {"LD_LIBRARY_PATH=" OIDN_DOUBLE_FOLDER});
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return shot.digests();
+  };
+  const Digests built_in = run("regression", "1"), oidn = run("oidn", "1"),
+                alone = run("oidn", "0");
+  for (const char* frame : {"1001", "1002", "1003"}) {
+    const std::string noisy = fmt::format("noisy/tiny.{}.exr", frame),
+                      image = fmt::format("render/tiny.{}.exr", frame);
+    EXPECT_EQ(built_in.at(noisy), oidn.at(noisy));
+    EXPECT_NE(built_in.at(image), oidn.at(image));
+    EXPECT_NE(alone.at(image), oidn.at(image)) << "its header names no noisy files";
+  }
+  EXPECT_EQ(run("oidn", "0"), alone);
+  EXPECT_EQ(run("regression", "1"), built_in);
+}
+
+TEST(DenoiseStep, NamesAMissingDenoiserBeforeAnythingIsMade) {
+  if (void* library = dlopen("libOpenImageDenoise.so", RTLD_NOW)) {
+    dlclose(library);
+    GTEST_SKIP() << "Open Image Denoise is installed";
+  }
+  const TinyShot shot(3);
+  const Ended ended = shot.run("run", {"--set", "render.denoise=true", "--set", "render.samples=16",
+                                       "--set", "render.denoiser=\"oidn\""});
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("LD_LIBRARY_PATH"), std::string::npos) << ended.err;
+  EXPECT_FALSE(std::filesystem::exists(shot.out() / "sim"));
 }
 
 }  // namespace

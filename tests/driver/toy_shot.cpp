@@ -82,7 +82,8 @@ Wanted toy_wanted(const ToySettings& settings) {
   if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
   wanted.render = toy_key("camera", settings.camera, "1");
   wanted.denoise_frames = settings.denoise_frames;
-  if (settings.denoise_frames > 0) {
+  wanted.denoised_later = settings.denoise_frames > 0;
+  if (wanted.denoised_later) {
     wanted.steps.push_back(Step::denoise);
     wanted.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
   }
