@@ -66,11 +66,8 @@ std::pair<V3f, V3f> Scene::yarns_along(const Hit& hit, float time) const {
   const SceneObject& object = objects_[hit.index];
   if (object.uv.empty()) return {V3f(0), V3f(0)};
   const auto& t = object.triangle[hit.triangle];
-  const auto at = [&](uint32_t v) {
-    const V3f& open = object.position[v];
-    return object.moves() ? open + (object.position_close[v] - open) * time : open;
-  };
-  const V3f e = at(t.y) - at(t.x), f = at(t.z) - at(t.x);
+  const V3f corner = object.at(t.x, time);
+  const V3f e = object.at(t.y, time) - corner, f = object.at(t.z, time) - corner;
   const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
   return {e * q.y - f * p.y, f * p.x - e * q.x};  // either may run the other way
 }

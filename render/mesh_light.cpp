@@ -17,11 +17,12 @@ MeshLight::MeshLight(const Faces& faces, const V3f& radiance) : faces_(faces), r
   double sum = 0;
   Imath::Box3f bounds;
   for (uint32_t t = 0; t < area.size(); ++t) {
-    const Corners open = corners(t, 0), close = corners(t, 1);
-    area[t] = length(cross(open.b - open.a, open.c - open.a)) / 2;
+    const auto [a, b, c] = corners(t, 0);
+    area[t] = length(cross(b - a, c - a)) / 2;
     sum += double(area[t]);
-    for (const Corners& k : {open, close})
-      for (const V3f& p : {k.a, k.b, k.c}) bounds.extendBy(p);
+    for (const V3f* position : faces.position)
+      for (const uint32_t v : {faces.triangle[t].x, faces.triangle[t].y, faces.triangle[t].z})
+        bounds.extendBy(position[v]);
   }
   by_area_ = AliasTable(area);
   center_ = bounds.center();
@@ -31,9 +32,12 @@ MeshLight::MeshLight(const Faces& faces, const V3f& radiance) : faces_(faces), r
 
 MeshLight::Corners MeshLight::corners(uint32_t triangle, float time) const {
   const auto& t = faces_.triangle[triangle];
+  const size_t segments = faces_.position.size() - 1;
+  const float place = time * float(segments);
+  const size_t k = segments == 0 ? 0 : std::min(size_t(place), segments - 1);
   const auto at = [&](uint32_t v) {
-    const V3f& p = faces_.position[v];
-    return faces_.position_close ? p + (faces_.position_close[v] - p) * time : p;
+    const V3f& p = faces_.position[k][v];
+    return segments == 0 ? p : p + (faces_.position[k + 1][v] - p) * (place - float(k));
   };
   return {at(t.x), at(t.y), at(t.z)};
 }

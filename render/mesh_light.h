@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "render/environment.h"
 #include "render/light_sample.h"
@@ -15,8 +16,7 @@ class MeshLight {
  public:
   struct Faces {
     std::span<const Imath::Vec3<uint32_t>> triangle;
-    const V3f* position = nullptr;        // m, at shutter open
-    const V3f* position_close = nullptr;  // at shutter close; null if it stands still
+    std::vector<const V3f*> position;  // m, at even times of the shutter; one if it stands still
   };
 
   /// @param faces  outlives the light

@@ -85,11 +85,7 @@ class InterfacePoints {
   };
   static Corners corners(const SceneObject& body, size_t triangle, float time) {
     const auto& t = body.triangle[triangle];
-    const auto at = [&](uint32_t v) {
-      const V3f p = body.position[v];
-      return body.moves() ? p + (body.position_close[v] - p) * time : p;
-    };
-    return {at(t.x), at(t.y), at(t.z)};
+    return {body.at(t.x, time), body.at(t.y, time), body.at(t.z, time)};
   }
 
   const Scene& scene_;

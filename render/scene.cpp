@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "pipeline/contract/error.h"
 #include "render/kept_parts.h"
 #include "render/path.h"
+#include "render/turn.h"
 
 namespace drench {
 
@@ -102,7 +104,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
     add_object(geometry.fluid, "fluid", "fluid surface", add_material(shot, shot.fluid.material),
                Matte::none);
   if (!geometry.foam.position.empty()) add_foam(geometry.foam);
-  for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, obstacle);
+  for (const ObstacleFrame& obstacle : geometry.obstacle) add_obstacle(shot, frame, obstacle);
   for (const ClothFrame& cloth : geometry.cloth) {
     if (cloth.mesh.triangle.empty()) continue;
     std::string material = "cotton";
@@ -139,13 +141,18 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
   return uint32_t(materials_.size() - 1);
 }
 
-void Scene::add_obstacle(const Shot& shot, const ObstacleFrame& obstacle) {
+void Scene::add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   Matte matte = Matte::none;
+  std::optional<Turn> turn;
   for (const Obstacle& o : shot.obstacle)
-    if (o.name == obstacle.name) material = o.material, matte = o.matte;
+    if (o.name == obstacle.name) {
+      material = o.material, matte = o.matte;
+      if (o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1) turn.emplace(o, frame);
+    }
   const std::string what = fmt::format("obstacle '{}'", obstacle.name);
-  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material), matte);
+  add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material), matte,
+             turn ? &*turn : nullptr);
   check_yarns(objects_.back(), what);
   add_wetness(objects_.back(), obstacle.mesh, what);
 }
@@ -189,10 +196,7 @@ void Scene::find_mesh_lights() {
   for (SceneObject& object : objects_) {
     const V3f& emission = materials_[object.material].emission;
     if (is_black(emission) || object.triangle.empty()) continue;
-    object.light =
-        lights_.add_mesh({object.triangle, object.position.data(),
-                          object.position_close.empty() ? nullptr : object.position_close.data()},
-                         emission, object.name);
+    object.light = lights_.add_mesh({object.triangle, object.keys()}, emission, object.name);
   }
 }
 
@@ -334,21 +338,18 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
     return s;
   }
   const auto& t = object.triangle[hit.triangle];
-  V3f a = object.position[t.x], b = object.position[t.y], c = object.position[t.z];
-  if constexpr (moving)
-    if (object.moves()) {
-      a += (object.position_close[t.x] - a) * ray.time;
-      b += (object.position_close[t.y] - b) * ray.time;
-      c += (object.position_close[t.z] - c) * ray.time;
-    }
+  const auto at = [&](uint32_t v) { return moving ? object.at(v, ray.time) : object.position[v]; };
+  const V3f a = at(t.x), b = at(t.y), c = at(t.z);
   const float w = 1 - hit.u - hit.v;
   s.position = a * w + b * hit.u + c * hit.v;
   const V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
   if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(a, b, c, hit, s);
   s.geometric_normal = normalized(cross(b - a, c - a));
-  s.shading_normal =
-      normalized(object.normal[t.x] * w + object.normal[t.y] * hit.u + object.normal[t.z] * hit.v);
+  const auto normal = [&](uint32_t v) {
+    return moving ? object.normal_at(v, ray.time) : object.normal[v];
+  };
+  s.shading_normal = normalized(normal(t.x) * w + normal(t.y) * hit.u + normal(t.z) * hit.v);
   if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;

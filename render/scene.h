@@ -26,11 +26,18 @@ struct Medium {
   float ior = 1;
 };
 
+class Turn;
+
 /// One mesh, or many spheres, at shutter open and, if it moves, at shutter close.
 struct SceneObject {
+  struct Key {
+    std::vector<V3f> position, normal;
+  };
+
   std::string name, material_name;
   std::vector<Imath::Vec3<uint32_t>> triangle;
-  std::vector<V3f> position, position_close;     // m; the last entry is padding for Embree
+  std::vector<V3f> position, position_close;  // m; the last entry is padding for Embree
+  std::vector<Key> key;  // at even times of the shutter, of what does not move straight; else empty
   std::vector<Imath::V4f> sphere, sphere_close;  // m: centre and radius; in place of triangles
   std::vector<V3f> normal;                       // unit, per vertex; empty: flat
   std::vector<V2f> uv;                           // may be empty
@@ -46,6 +53,33 @@ struct SceneObject {
   EmbreeScene scene;  // its own, so that motion keys and robustness are paid for by this mesh only
 
   bool moves() const { return !position_close.empty() || !sphere_close.empty(); }
+  /// Positions at even times of the shutter; one if it stands.
+  std::vector<const V3f*> keys() const {
+    std::vector<const V3f*> out;
+    for (const Key& k : key) out.push_back(k.position.data());
+    if (out.empty()) out.push_back(position.data());
+    if (key.empty() && !position_close.empty()) out.push_back(position_close.data());
+    return out;
+  }
+  /// Where a vertex is at a time of the shutter, m.
+  V3f at(uint32_t vertex, float time) const {
+    const V3f& open = position[vertex];
+    if (position_close.empty()) return open;
+    if (key.empty()) return open + (position_close[vertex] - open) * time;
+    return between(&Key::position, vertex, time);
+  }
+  /// Not of unit length. Surfaces that move straight keep theirs.
+  V3f normal_at(uint32_t vertex, float time) const {
+    return key.empty() ? normal[vertex] : between(&Key::normal, vertex, time);
+  }
+
+ private:
+  V3f between(std::vector<V3f> Key::*column, uint32_t vertex, float time) const {
+    const float at = time * float(key.size() - 1);
+    const size_t k = std::min(size_t(at), key.size() - 2);
+    const V3f &a = (key[k].*column)[vertex], &b = (key[k + 1].*column)[vertex];
+    return a + (b - a) * (at - float(k));
+  }
 };
 
 /// What a ray met first.
@@ -155,10 +189,16 @@ class Scene {
   unsigned features() const { return features_; }
 
  private:
-  void add_obstacle(const Shot& shot, const ObstacleFrame& obstacle);
+  static constexpr float kVisibleMotion = 0.1f;  // pixels over the shutter
+
+  void add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                  uint32_t material, Matte matte);
+                  uint32_t material, Matte matte, const Turn* turn = nullptr);
+  /// Straight segments that its course over the shutter takes; 0: its velocity says enough.
+  int segments_of(const TriangleMesh& mesh, const Turn& turn) const;
+  void turn_object(SceneObject& object, const TriangleMesh& mesh, const Turn& turn,
+                   int segments) const;
   void check_yarns(const SceneObject& object, const std::string& what) const;
   void find_fabrics();
   void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);

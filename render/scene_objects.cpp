@@ -15,7 +15,6 @@ namespace drench {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kVisibleMotion = 0.1f;  // pixels
 /// Of foam: froth scatters light many times and absorbs next to none.
 constexpr float kFoamReflectance = 0.9f;
 
@@ -76,8 +75,8 @@ std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
 /// Of the vertices over the shutter; the last entry is padding.
 Imath::Box3f bounds_of(const SceneObject& object) {
   Imath::Box3f box;
-  for (const std::vector<V3f>* positions : {&object.position, &object.position_close})
-    for (size_t k = 0; k + 1 < positions->size(); ++k) box.extendBy((*positions)[k]);
+  for (const V3f* positions : object.keys())
+    for (size_t k = 0; k + 1 < object.position.size(); ++k) box.extendBy(positions[k]);
   for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
     for (const Imath::V4f& s : *spheres) {
       box.extendBy(V3f(s.x, s.y, s.z) - V3f(s.w));
@@ -120,9 +119,10 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
 }
 
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                       uint32_t material, Matte matte) {
+                       uint32_t material, Matte matte, const Turn* turn) {
   check_mesh(mesh, what);
-  const bool moves = moves_visibly(mesh);
+  const int segments = turn ? segments_of(mesh, *turn) : 0;
+  const bool moves = segments > 0 || moves_visibly(mesh);
   const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);
   if (std::optional<SceneObject> kept = moves ? std::nullopt : parts_->take(contents)) {
     kept->material = material;
@@ -151,7 +151,9 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
     moved.push_back(V3f(0));
     return moved;
   };
-  if (moves) {
+  if (segments > 0) {
+    turn_object(object, mesh, *turn, segments);
+  } else if (moves) {
     object.position = at(open_);
     object.position_close = at(close_);
   } else {
@@ -203,12 +205,11 @@ void Scene::add_foam(const FoamFrame& foam) {
 EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
   EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
-  rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
-  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                             object.position.data(), 0, sizeof(V3f), vertices);
-  if (object.moves())
-    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 1, RTC_FORMAT_FLOAT3,
-                               object.position_close.data(), 0, sizeof(V3f), vertices);
+  const std::vector<const V3f*> keys = object.keys();
+  rtcSetGeometryTimeStepCount(geometry.get(), unsigned(keys.size()));
+  for (unsigned k = 0; k < keys.size(); ++k)
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, k, RTC_FORMAT_FLOAT3,
+                               keys[k], 0, sizeof(V3f), vertices);
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              object.triangle.data(), 0, 3 * sizeof(uint32_t),
                              object.triangle.size());

@@ -86,7 +86,7 @@ TEST(MeshLight, IsDrawnByAreaWhereItIsAtTheTime) {
   const TriangleMesh mesh = square(0.5f);
   std::vector<V3f> close = mesh.position;
   for (V3f& p : close) p = p * 3 + V3f(0, 1, 0);
-  const MeshLight light({mesh.triangle, mesh.position.data(), close.data()}, V3f(1));
+  const MeshLight light({mesh.triangle, {mesh.position.data(), close.data()}}, V3f(1));
   constexpr uint32_t kDraws = 1 << 16;
   for (const float time : {0.f, 0.4f, 1.f}) {
     const double half = 0.5 * (1 + 2 * time), height = 2 + time;
