@@ -36,10 +36,19 @@ double log_slope(const std::vector<double>& x, const std::vector<double>& y) {
   return xy / xx;
 }
 
+/// Sum of the colours over the film.
+double light_of(const Film& film) {
+  double sum = 0;
+  for (size_t k = 0; k < film.rgba.size(); ++k)
+    if (k % 4 != 3) sum += film.rgba[k];
+  return sum;
+}
+
 /// Five seeds: the error is their mean, the cost that of the median.
 struct Sampled {
   double error = 0;
   Render median;
+  double light = 0;  // over that of the reference
 };
 
 Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples,
@@ -50,6 +59,7 @@ Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples,
   for (int seed = 1; seed <= kSeeds; ++seed) {
     renders.push_back(render(shot, geometry, samples, uint32_t(seed)));
     out.error += relative_mse(renders.back().film, reference) / kSeeds;
+    out.light += light_of(renders.back().film) / light_of(reference) / kSeeds;
   }
   std::nth_element(renders.begin(), renders.begin() + kSeeds / 2, renders.end(),
                    [](const Render& a, const Render& b) { return a.cost.cpu_s < b.cost.cpu_s; });
@@ -180,9 +190,12 @@ void render_denoise(const Emit& emit) {
   constexpr int kReference = 6400;
   Shot sky = larger(pool_shot());
   sky.light.erase(sky.light.begin());
-  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
+  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}},
+      drops{spray(), {}};
   const std::tuple<std::string, Shot, const FrameGeometry*> pictures[] = {
-      {"cloth", larger(cloth_shot()), &cloth}, {"pool under the sky", sky, &pool}};
+      {"cloth", larger(cloth_shot()), &cloth},
+      {"pool under the sky", sky, &pool},
+      {"spray against the sun", larger(spray_shot()), &drops}};
   for (const auto& [name, shot, geometry] : pictures) {
     const Film reference = render(shot, *geometry, kReference, 1000).film;
     for (const int samples : {16, 64, 256}) {
@@ -197,6 +210,8 @@ void render_denoise(const Emit& emit) {
       line.error_of = "relMSE against " + std::to_string(kReference) + " samples";
       line.more["samples"] = samples;
       line.more["noisy_rel_mse"] = noisy.error;
+      line.more["light"] = denoised.light;
+      line.more["noisy_light"] = noisy.light;
       line.more["noisy_cpu_s"] = noisy.median.cost.cpu_s;
       line.more["gain"] =
           noisy.error * noisy.median.cost.cpu_s / (denoised.error * denoised.median.cost.cpu_s);
@@ -206,7 +221,7 @@ void render_denoise(const Emit& emit) {
 }
 
 const Registration render_denoise_case{
-    "render_denoise", "cloth, and a pool under the sky: error and time with the denoiser",
+    "render_denoise", "cloth, a pool under the sky, spray: error and time with the denoiser",
     render_denoise};
 
 /// The same error with samples spread evenly would take `even_samples` as their errors' line says.

@@ -2,6 +2,9 @@
 
 #include <cmath>
 
+#include "render/sampler.h"
+#include "tests/contract/sphere_mesh.h"
+
 namespace drench::bench {
 
 TriangleMesh pleated_sheet(uint32_t cells) {
@@ -86,6 +89,41 @@ Shot pool_shot() {
   shot.light[0].radiance = {900, 900, 900};
   shot.light[0].u = {0.05, 0, 0};
   shot.light[0].v = {0, 0, 0.05};
+  return shot;
+}
+
+TriangleMesh spray() {
+  constexpr uint32_t kDrops = 400, kRings = 12;
+  const TriangleMesh drop = test::unit_sphere(kRings, 2 * kRings);
+  const auto number = [](uint32_t k) { return unit_float(hash_bits(k)); };
+  TriangleMesh mesh;
+  for (uint32_t k = 0; k < kDrops; ++k) {
+    const V3f place(0.5f * (number(4 * k) - 0.5f), 0.05f + 0.3f * number(4 * k + 1),
+                    0.3f * (number(4 * k + 2) - 0.5f));
+    const float radius = 0.0015f + 0.0035f * number(4 * k + 3);
+    const uint32_t first = uint32_t(mesh.position.size());
+    for (const V3f& p : drop.position) {
+      mesh.position.push_back(place + p * radius);
+      mesh.normal.push_back(p);
+      mesh.velocity.push_back({0, 0, 0});
+    }
+    for (const auto& t : drop.triangle)
+      mesh.triangle.push_back({first + t.x, first + t.y, first + t.z});
+  }
+  return mesh;
+}
+
+Shot spray_shot() {
+  Shot shot = cloth_shot();
+  shot.camera.position = V3d(0, 0.3, 1.2);
+  shot.camera.target = V3d(0, 0.2, 0);
+  shot.camera.fov_deg = 27.0;
+  shot.light[0] = {};
+  shot.light[0].type = LightType::sun;
+  shot.light[0].name = "sun";
+  shot.light[0].direction = {-0.5, -1, 0.75};
+  shot.light[0].angle_deg = 2;
+  shot.light[0].radiance = {4.6f, 3.9f, 3.f};
   return shot;
 }
 

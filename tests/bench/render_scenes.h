@@ -18,6 +18,11 @@ TriangleMesh wavy_pool(uint32_t n = 128);
 /// The slab under a lamp of 0.1 m.
 Shot pool_shot();
 
+/// 400 drops of 1.5 to 5 mm in a box of 0.5 x 0.3 x 0.3 m.
+TriangleMesh spray();
+/// The drops against the sun, 3 mm a pixel over 192 pixels.
+Shot spray_shot();
+
 struct Render {
   Film film;
   RenderStats stats;
