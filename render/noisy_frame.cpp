@@ -1,5 +1,6 @@
 #include "render/noisy_frame.h"
 
+#include <Imath/half.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,10 +18,18 @@ constexpr std::string_view kPrefix = "denoise_";
 constexpr const char* kUnits = "denoise_units";  // entry of the header
 
 using Plane = NoisyPicture::Plane;
+using Precision = FilmLayer::Precision;
 using Planes = std::vector<std::pair<std::string, Plane*>>;
 
-/// Names of the layers and their channels, and where a picture has their values.
-std::vector<std::pair<std::string, Planes>> layout_of(NoisyPicture& picture) {
+struct StoredLayer {
+  std::string name;
+  Precision precision;
+  Planes planes;
+};
+
+/// Names of the layers and their channels, and where a picture has their values. All but variances
+/// of the light, which may be too large for 16 bits, are noisier than these round them.
+std::vector<StoredLayer> layout_of(NoisyPicture& picture) {
   const auto rgb = [](Plane(&colour)[3]) {
     return Planes{{"R", &colour[0]}, {"G", &colour[1]}, {"B", &colour[2]}};
   };
@@ -30,16 +39,22 @@ std::vector<std::pair<std::string, Planes>> layout_of(NoisyPicture& picture) {
       out.emplace_back(fmt::format("F{:02}", f), &planes[f]);
     return out;
   };
-  return {{"denoise_first", rgb(picture.half[0])},
-          {"denoise_second", rgb(picture.half[1])},
-          {"denoise_variance", rgb(picture.variance)},
-          {"denoise_guide", numbered(picture.feature)},
-          {"denoise_scatter", numbered(picture.feature_variance)},
+  return {{"denoise_first", Precision::half, rgb(picture.half[0])},
+          {"denoise_second", Precision::half, rgb(picture.half[1])},
+          {"denoise_variance", Precision::full, rgb(picture.variance)},
+          {"denoise_guide", Precision::half, numbered(picture.feature)},
+          {"denoise_scatter", Precision::half, numbered(picture.feature_variance)},
           {"denoise_motion",
+           Precision::half,
            {{"beforeX", &picture.motion[0][0]},
             {"beforeY", &picture.motion[0][1]},
             {"afterX", &picture.motion[1][0]},
             {"afterY", &picture.motion[1][1]}}}};
+}
+
+float as_half(float value) {
+  constexpr float kLargest = HALF_MAX;
+  return Imath::half(std::clamp(value, -kLargest, kLargest));
 }
 
 [[noreturn]] void fail(const std::string& why) {
@@ -88,9 +103,17 @@ void put_clean(Film& film, const std::vector<Plane>& clean) {
   film.layer.push_back(std::move(noisy));
 }
 
+void round_as_stored(NoisyPicture& picture) {
+  for (const auto& [name, precision, planes] : layout_of(picture)) {
+    if (precision == Precision::full) continue;
+    for (const auto& [channel, plane] : planes)
+      for (float& value : *plane) value = as_half(value);
+  }
+}
+
 void add_picture(Film& film, NoisyPicture picture) {
-  for (const auto& [name, planes] : layout_of(picture)) {
-    FilmLayer layer{name, {}, FilmLayer::Precision::full, {}};
+  for (const auto& [name, precision, planes] : layout_of(picture)) {
+    FilmLayer layer{name, {}, precision, {}};
     layer.value.resize(planes.size() * picture.half[0][0].size());
     for (size_t c = 0; c < planes.size(); ++c) {
       layer.channel.push_back(planes[c].first);
@@ -116,7 +139,7 @@ NoisyPicture picture_of(const Film& film) {
     fail(fmt::format("has {} units of {} guides", picture.feature_unit.size(),
                      picture.feature.size()));
   const size_t pixels = size_t(film.width) * size_t(film.height);
-  for (const auto& [name, planes] : layout_of(picture)) {
+  for (const auto& [name, precision, planes] : layout_of(picture)) {
     const FilmLayer& layer = layer_of(film, name);
     for (const auto& [channel, plane] : planes) {
       const auto found = std::find(layer.channel.begin(), layer.channel.end(), channel);

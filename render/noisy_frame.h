@@ -21,6 +21,9 @@ std::vector<NoisyPicture::Plane> denoised_by(Denoiser denoiser, NoisyPicture pic
 /// Puts the denoised beauty in the place of the noisy one, which becomes the layer "noisy".
 void put_clean(Film& film, const std::vector<NoisyPicture::Plane>& clean);
 
+/// Rounds to what a file holds of it, so that a picture is denoised the same before and after.
+void round_as_stored(NoisyPicture& picture);
+
 /// The layers above.
 void add_picture(Film& film, NoisyPicture picture);
 

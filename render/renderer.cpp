@@ -226,6 +226,7 @@ void denoise_film(const Sums& sums, Denoised denoised, Denoiser denoiser, Film& 
   picture.width = film.width;
   picture.height = film.height;
   sums.layers.add_features(picture, sums.pixel);
+  round_as_stored(picture);
   if (denoised == Denoised::alone) {
     return put_clean(film, denoised_by(denoiser, std::move(picture)));
   }
