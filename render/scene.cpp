@@ -176,20 +176,32 @@ void Scene::find_bodies(bool has_fluid) {
     object.body = Bodies{1} << bit;
     medium_.push_back({materials_[object.material].absorption, materials_[object.material].ior});
     if (has_fluid && bodies_[bit] == 0) fluid_ = object.body;
-    find_lights_in(object);
+    find_lights_in(bodies_[bit]);
   }
 }
 
-void Scene::find_lights_in(const SceneObject& body) {
+void Scene::find_lights_in(uint32_t body) {
   for (const ShapeLight& light : lights_.shapes()) {
     V3f reach = absolute(light.u) + absolute(light.v) + V3f(light.radius);
     if (light.type == LightType::sphere) reach = V3f(light.radius);
-    lamps_in_bodies_ |=
-        body.bounds.intersects(Imath::Box3f(light.center - reach, light.center + reach));
+    lamps_in_bodies_ |= holds(body, {light.center - reach, light.center + reach});
   }
   lights_in_bodies_ |= lamps_in_bodies_;
   for (const SceneObject& object : objects_)
-    lights_in_bodies_ |= object.light >= 0 && body.bounds.intersects(object.bounds);
+    lights_in_bodies_ |= object.light >= 0 && holds(body, object.bounds);
+}
+
+bool Scene::holds(uint32_t body, const Imath::Box3f& part) const {
+  const SceneObject& object = objects_[body];
+  if (!object.bounds.intersects(part)) return false;
+  const std::vector<const V3f*> keys = object.keys();
+  for (const auto& t : object.triangle) {
+    Imath::Box3f swept;
+    for (const V3f* position : keys)
+      for (const uint32_t v : {t.x, t.y, t.z}) swept.extendBy(position[v]);
+    if (swept.intersects(part)) return true;
+  }
+  return is_inside(body, part.center(), 0);
 }
 
 void Scene::find_mesh_lights() {
@@ -386,15 +398,17 @@ Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
 }
 
 Bodies Scene::bodies_at(const V3f& point, float time) const {
-  const Ray up{point, V3f(0, 1, 0), time};
   Bodies in = 0;
-  for (const uint32_t k : bodies_) {
-    // The mesh is closed and outward: a point is inside if the first side met is an inner one.
-    const Hit hit = meet(k, up, kInfinity);
-    if (hit.kind == Hit::Kind::nothing) continue;
-    if (surface<true>(up, hit).geometric_normal.y > 0) in |= objects_[k].body;
-  }
+  for (const uint32_t k : bodies_)
+    if (is_inside(k, point, time)) in |= objects_[k].body;
   return in;
+}
+
+bool Scene::is_inside(uint32_t object, const V3f& point, float time) const {
+  const Ray up{point, V3f(0, 1, 0), time};
+  // The mesh is closed and outward: a point is inside if the first side met is an inner one.
+  const Hit hit = meet(object, up, kInfinity);
+  return hit.kind != Hit::Kind::nothing && surface<true>(up, hit).geometric_normal.y > 0;
 }
 
 }  // namespace drench

@@ -205,7 +205,10 @@ class Scene {
   uint32_t add_material(const Shot& shot, const std::string& name);
   void find_bodies(bool has_fluid);
   void find_mesh_lights();
-  void find_lights_in(const SceneObject& body);
+  void find_lights_in(uint32_t body);
+  /// Whether anything in a box may lie within a body, or on its surface, while the shutter is open.
+  bool holds(uint32_t body, const Imath::Box3f& part) const;
+  bool is_inside(uint32_t object, const V3f& point, float time) const;
   void find_albedos();
   void build(SceneObject& object);
   Digest contents_of(const TriangleMesh& mesh, const std::string& name, uint32_t material) const;

@@ -276,6 +276,47 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
   EXPECT_LT(before, 0.2);
 }
 
+// A lamp in the midst of a splash is in none of its drops; one that a drop holds, touches or meets
+// while the shutter is open leaves its light to paths.
+TEST(Photons, KnowALampAmongDropsFromOneInADrop) {
+  Shot shot = pool_shot(kIndex, 0);
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  shot.render.samples = 512;
+  Light lamp;
+  lamp.type = LightType::sphere;
+  lamp.name = "lamp";
+  lamp.center = {0, 0.5, 0};
+  lamp.radius = 0.1;
+  lamp.radiance = V3f(20);
+  shot.light = {lamp, sky(0.1f)};
+  FrameGeometry drops;
+  for (const float side : {-1.f, 1.f}) {
+    const uint32_t first = uint32_t(drops.fluid.position.size());
+    const TriangleMesh ball = sphere_mesh(4);
+    for (const V3f& p : ball.position)
+      drops.fluid.position.push_back(0.3f * p + V3f(0.6f * side, 0.5f, 0));
+    for (const auto& t : ball.triangle)
+      drops.fluid.triangle.push_back({first + t.x, first + t.y, first + t.z});
+  }
+  drops.fluid.velocity.assign(drops.fluid.position.size(), V3f(0));
+  const auto traced = [&] { return can_trace_photons(Scene(shot, 1001, drops, {})); };
+  EXPECT_TRUE(traced());
+  expect_photons_as_paths(shot, drops);
+
+  for (const double x : {0.6, 0.25, 0.95}) {
+    shot.light[0].center.x = x;
+    EXPECT_FALSE(traced()) << x;
+  }
+  shot.light[0].center.x = 0.15;
+  EXPECT_TRUE(traced());
+  drops.fluid.velocity.assign(drops.fluid.position.size(), V3f(-24, 0, 0));
+  EXPECT_TRUE(traced());
+  shot.render.motion_blur = true;
+  EXPECT_FALSE(traced()) << "a drop comes to it";
+}
+
 // What has no lamps or no fluid does without, and its picture keeps its bits.
 TEST(Photons, AreNotTracedWithoutLampsOrFluid) {
   Shot shot = pool_shot(kIndex, 0.3f);
