@@ -7,6 +7,7 @@
 
 #include "render/bsdf_dielectric.h"
 #include "render/embree.h"
+#include "render/path.h"
 #include "render/sampler.h"
 
 namespace drench {
@@ -124,7 +125,7 @@ class PhotonTracer {
       // Those that fell through gaps are missing on the yarns, which get what others do.
       const float yarns = 1 - surface.material->gap;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
-                flight.power * (1 / (n * n * yarns))};
+                flight.power * (1 / (n * n * yarns)), sampler.one(kTime)};
       return finite(photon.power);
     }
     return false;
@@ -285,7 +286,7 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-PhotonMap::PhotonMap(std::vector<Photon> photons, int samples) {
+PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, Dealt dealt) {
   if (photons.empty()) return;
   size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
@@ -293,7 +294,7 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, int samples) {
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
   while (hands_log2_ < kMostHands && int(2 * hands()) <= samples &&
-         wanted_count(size_) >= kHand * 2 * hands())
+         (dealt == Dealt::for_time || wanted_count(size_) >= kHand * 2 * hands()))
     ++hands_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
   while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
@@ -311,7 +312,7 @@ void PhotonMap::choose_radii(const std::vector<Photon>& photons) {
 
 void PhotonMap::deal(const std::vector<Photon>& photons) {
   const auto bucket = [&](size_t k) {
-    return k % hands() * buckets() + bucket_of(cell_of(photons[k].position));
+    return hand_at(photons[k].turn) * buckets() + bucket_of(cell_of(photons[k].position));
   };
   first_.assign(hands() * buckets() + 1, 0);
   for (size_t k = 0; k < size_; ++k) ++first_[bucket(k) + 1];
@@ -377,7 +378,9 @@ PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int s
   rays += traced;
   std::vector<Photon> all;
   for (const std::vector<Photon>& part : found) all.insert(all.end(), part.begin(), part.end());
-  return PhotonMap(std::move(all), samples);
+  return PhotonMap(
+      std::move(all), samples,
+      scene.features() & kMotionBlur ? PhotonMap::Dealt::for_time : PhotonMap::Dealt::for_speed);
 }
 
 }  // namespace drench

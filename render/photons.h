@@ -11,10 +11,12 @@
 //
 // Where a disc holds many, no sample needs to see them all: they are dealt out to the samples of a
 // pixel, each of which finds its own hand, a map of its own with as much light. Together they see
-// what each would have seen, at a fraction of the cost.
+// what each would have seen, at a fraction of the cost. They are dealt by their time in the
+// shutter, so that a sample of what moves finds those of about its own time.
 
 #include <immintrin.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -26,10 +28,11 @@
 namespace drench {
 
 struct Photon {
-  V3f position;   // m
-  V3f direction;  // unit, of flight
-  V3f normal;     // unit, of the surface it lies on
-  V3f power;      // W; of one that came through water divided by the squared index, as radiance is
+  V3f position;    // m
+  V3f direction;   // unit, of flight
+  V3f normal;      // unit, of the surface it lies on
+  V3f power;       // W; of one that came through water divided by the squared index, as radiance is
+  float turn = 0;  // from 0 to 1: of its time among those of the others
 };
 
 /// Eight photons as packs, four lines of the cache in a row.
@@ -54,14 +57,17 @@ __m256 unpack_unit(const std::array<uint32_t, 8>& packed) {
 class PhotonMap {
  public:
   PhotonMap() = default;
+  enum class Dealt { for_speed, for_time };  // the latter in eight hands however few there are
   /// @param samples  of a pixel, which may share the photons
-  explicit PhotonMap(std::vector<Photon> photons, int samples = 1);
+  explicit PhotonMap(std::vector<Photon> photons, int samples = 1, Dealt dealt = Dealt::for_speed);
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
   float radius() const { return radius_; }  // m
   unsigned hands() const { return 1u << hands_log2_; }
   unsigned hands_log2() const { return hands_log2_; }
+  /// The hand of those whose turn it is.
+  unsigned hand_at(float turn) const { return std::min(unsigned(turn * hands()), hands() - 1); }
 
   /// Calls f(direction of flight, power, share) for photons of a hand near a point of a surface:
   /// the sum of share x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel over a
@@ -96,7 +102,7 @@ class PhotonMap {
            p.z <= high.z;
   }
   void choose_radii(const std::vector<Photon>& photons);
-  /// Sorts them by hand, the first to the first, and by bucket.
+  /// Sorts them by hand and by bucket.
   void deal(const std::vector<Photon>& photons);
   /// From 0 on within `reach_`.
   Imath::V3i cell_of(const V3f& p) const { return Imath::V3i((p - reach_.min) * inverse_edge_); }
