@@ -7,7 +7,6 @@
 
 #include "render/bsdf_dielectric.h"
 #include "render/embree.h"
-#include "render/path.h"
 #include "render/sampler.h"
 
 namespace drench {
@@ -286,7 +285,7 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, Dealt dealt) {
+PhotonMap::PhotonMap(std::vector<Photon> photons, int samples) {
   if (photons.empty()) return;
   size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
@@ -294,7 +293,7 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, Dealt dealt) {
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
   while (hands_log2_ < kMostHands && int(2 * hands()) <= samples &&
-         (dealt == Dealt::for_time || wanted_count(size_) >= kHand * 2 * hands()))
+         wanted_count(size_) >= kHand * 2 * hands())
     ++hands_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
   while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
@@ -378,9 +377,7 @@ PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int s
   rays += traced;
   std::vector<Photon> all;
   for (const std::vector<Photon>& part : found) all.insert(all.end(), part.begin(), part.end());
-  return PhotonMap(
-      std::move(all), samples,
-      scene.features() & kMotionBlur ? PhotonMap::Dealt::for_time : PhotonMap::Dealt::for_speed);
+  return PhotonMap(std::move(all), samples);
 }
 
 }  // namespace drench

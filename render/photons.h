@@ -57,9 +57,8 @@ __m256 unpack_unit(const std::array<uint32_t, 8>& packed) {
 class PhotonMap {
  public:
   PhotonMap() = default;
-  enum class Dealt { for_speed, for_time };  // the latter in eight hands however few there are
   /// @param samples  of a pixel, which may share the photons
-  explicit PhotonMap(std::vector<Photon> photons, int samples = 1, Dealt dealt = Dealt::for_speed);
+  explicit PhotonMap(std::vector<Photon> photons, int samples = 1);
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
