@@ -478,18 +478,11 @@ class PathTracer {
     return kWater && settings_.photons && !surface.small && film_.world() == World::whole;
   }
 
-  /// Rows of a rolling shutter have times of their own, which say nothing of a photon's turn.
-  unsigned hand_of_photons() const {
-    const PhotonMap& photons = *settings_.photons;
-    if (!kMoving || scene_.camera().curve().rolls()) return sampler_.turn(photons.hands_log2());
-    return photons.hand_at(sampler_.one(kTimeDimension));
-  }
-
   template <class Bsdf>
   void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
     Irradiance light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
-    const unsigned hand = hand_of_photons();
+    const unsigned hand = settings_.photons->hand_at(sampler_.one(kTimeDimension));
     if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
       light = settings_.photons->irradiance(hand, at, normal, bsdf.front());
     else

@@ -64,7 +64,6 @@ class PhotonMap {
   size_t size() const { return size_; }
   float radius() const { return radius_; }  // m
   unsigned hands() const { return 1u << hands_log2_; }
-  unsigned hands_log2() const { return hands_log2_; }
   /// The hand of those whose turn it is.
   unsigned hand_at(float turn) const { return std::min(unsigned(turn * hands()), hands() - 1); }
 

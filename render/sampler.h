@@ -93,9 +93,6 @@ class Sampler {
     return out;
   }
 
-  /// From 0 to 2^log2 - 1: as many samples of a pixel in a row have each once, if they are as many.
-  uint32_t turn(unsigned log2) const { return log2 == 0 ? 0 : reversed_index_ >> (32 - log2); }
-
   /// One number in [0, 1) for a dimension: the first of `two`.
   float one(uint32_t dimension) const {
     const uint32_t key = key_of(dimension);
