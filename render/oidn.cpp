@@ -77,11 +77,11 @@ struct OpenImageDenoise::Library {
     void* symbol = dlsym(handle, name);
     if (!symbol && older) symbol = dlsym(handle, older);
     if (!symbol)
-      throw Error(
-          fmt::format("render.denoiser is \"oidn\", but the library found has no function "
-                      "{}; install Open Image Denoise 1.0 or later, or use the denoiser "
-                      "\"regression\"",
-                      name));
+      throw Error(fmt::format(
+          "render.denoiser is \"oidn\", but the library found has no function "
+          "{}; install a release of Open Image Denoise from 2020 or later, or use the denoiser "
+          "\"regression\"",
+          name));
     function = reinterpret_cast<Function*>(symbol);
   }
 
