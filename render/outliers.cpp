@@ -16,9 +16,9 @@ constexpr float kLuck = 4, kUnsure = 0.25f, kOneSample = 0.9f;
 constexpr size_t kFew = 3, kHalf = 12;
 /// A glint is this many times brighter than half of what is around it, with its noise; if few of
 /// its samples found it, which then lie loosely together, than half of what is farther around. So
-/// it is over the mean of the picture: before black anything would be. It and what touches it know
-/// their brightness to this part, which takes three samples.
-constexpr float kGlint = 16, kSeen = 0.5f;
+/// it is over the mean of the picture: before black anything would be. It and the 24 pixels around
+/// it know their brightness to this part, which takes seven samples.
+constexpr float kGlint = 16, kSeen = 0.4f;
 constexpr int kBlock = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
 /// The value that only `few` of a list are above.
@@ -62,20 +62,19 @@ class Brightness {
     const bool one_sample = !(scatter_[p] < kOneSample * mean_[p]);
     const float usual = beyond(around_, kHalf);
     if (!one_sample && mean_[p] > kGlint * std::max(beyond(noisy_, kHalf), picture_))
-      return {usual / mean_[p], seen(p, window)};
+      return {usual / mean_[p], seen(window)};
     if (scatter_[p] < kUnsure * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
-    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], seen(p, window)};
+    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], seen(window)};
     const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
 
  private:
   /// Whether samples enough met what a pixel shows.
-  bool seen(size_t p, const std::vector<size_t>& window) const {
+  bool seen(const std::vector<size_t>& window) const {
     float sum = 0, square = 0;
     for (const size_t q : window) {
-      if (!touch(p, q)) continue;
       sum += mean_[q];
       square += scatter_[q] * scatter_[q];
     }
@@ -100,12 +99,6 @@ class Brightness {
           noisy_.push_back(block_[size_t(r * columns_ + c)]);
     return beyond(noisy_, noisy_.size() / 2);
   }
-  bool touch(size_t p, size_t q) const {
-    const auto apart = [](size_t a, size_t b) { return a > b ? a - b : b - a; };
-    const size_t width = size_t(width_);
-    return apart(p % width, q % width) <= 1 && apart(p / width, q / width) <= 1;
-  }
-
   int width_, height_, columns_;  // columns of blocks
   Plane mean_, scatter_;          // over colours; of a half's mean
   Plane block_;                   // medians of the blocks, with noise

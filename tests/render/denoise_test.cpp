@@ -163,6 +163,33 @@ TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
   EXPECT_GT(light, 100);
 }
 
+/// The sun in a moving drop is a line two pixels wide, whose pixels have a sample of it each, or
+/// two: it stays whole, where single samples as bright elsewhere go.
+TEST(Denoise, KeepsStreaksWhole) {
+  NoisyPicture picture = made([](int, int) { return 1.f; }, none, kNoise, 16);
+  std::mt19937 random(17);
+  const auto within = [](int x, int y) {
+    return y >= 10 && y < 50 && (x == 20 + y / 6 || x == 21 + y / 6);
+  };
+  double found = 0;
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      if (random() % 100 >= (within(x, y) ? 80 : 1)) continue;
+      for (size_t c = 0; c < 3; ++c) {
+        picture.half[random() % 2][c][size_t(y * kSize + x)] += 150;
+        picture.variance[c][size_t(y * kSize + x)] = 75 * 75;
+      }
+      found += within(x, y) ? 75 : 0;
+    }
+  const auto out = denoise(picture);
+  double streak = 0, elsewhere = 0;
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      (within(x, y) ? streak : elsewhere) += out[1][size_t(y * kSize + x)] - 1;
+  EXPECT_GT(streak, 0.9 * found);
+  EXPECT_LT(elsewhere, 0.05 * found);
+}
+
 /// Where a pixel's feature lies beyond those around it a fit led below what is there, and left
 /// holes beside glints.
 TEST(Denoise, StaysWithinTheColoursItComesFrom) {
