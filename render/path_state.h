@@ -14,6 +14,10 @@ namespace drench {
 inline constexpr int kRouletteStart = 10, kLongPath = 64;
 inline constexpr float kLongSurvival = 0.99f;
 
+/// The share of a path's second and later diffuse vertices that gather photons: they are all over
+/// the scene, where each waits for memory, and light of light that a sample adds to many others.
+inline constexpr float kLaterGathers = 0.25f;
+
 /// Sampling dimensions after those of the camera: a block for every vertex of a branch.
 enum VertexDimension : uint32_t {
   kLightChoice,

@@ -381,8 +381,8 @@ class PathTracer {
     const CoatLobe coat = bsdf.coat();
     const CoatedBase base = bsdf.base();
     const bool photons = gathers_photons(surface);
-    if (photons) add_caustics(state, surface, base);
     const VertexNumbers u = numbers(state);
+    if (photons) add_caustics(state, surface, u, base);
     add_direct(state, surface, state.in, u, coat, base);
     const bool follow_coat = u[kScatterSide].x < bsdf.coat_share();
     state.interfaces = 0;
@@ -412,8 +412,8 @@ class PathTracer {
     if (bsdf.black()) return false;
     state.interfaces = 0;
     state.has_photons = gathers_photons(surface);
-    if (state.has_photons) add_caustics(state, surface, bsdf);
     const VertexNumbers u = numbers(state);
+    if (state.has_photons) add_caustics(state, surface, u, bsdf);
     const Scatter next = sample_scatter(state, surface, u, bsdf);  // while the light is drawn
     add_direct(state, surface, state.in, u, bsdf);
     state.survival *= bsdf.albedo();
@@ -427,8 +427,8 @@ class PathTracer {
                           fabric_at(scene_, surface, hit, state.ray.time, wetness, state.in));
     film_.record_albedo(state.survival * bsdf.albedo());
     const bool photons = gathers_photons(surface);
-    if (photons) add_caustics(state, surface, bsdf.soft());
     const VertexNumbers u = numbers(state);
+    if (photons) add_caustics(state, surface, u, bsdf.soft());
     add_direct(state, surface, state.in, u, bsdf.soft(), bsdf.glints());
     const bool glint = u[kScatterSide].x < bsdf.glint_share();
     state.interfaces = 0;
@@ -479,7 +479,10 @@ class PathTracer {
   }
 
   template <class Bsdf>
-  void add_caustics(const PathState& state, const Surface& surface, const Bsdf& bsdf) {
+  void add_caustics(const PathState& state, const Surface& surface, const VertexNumbers& u,
+                    const Bsdf& bsdf) {
+    const float gathers = state.diffuse > 1 ? kLaterGathers : 1.f;
+    if (!(u[kLightChoice].y < gathers)) return;
     Irradiance light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
     const unsigned hand = settings_.photons->hand_at(sampler_.one(kTimeDimension));
@@ -490,7 +493,8 @@ class PathTracer {
                                        [&](const V3f& flight, const V3f& power, float share) {
                                          bsdf.receive(light, -flight, power * share);
                                        });
-    film_.deposit(state.throughput * bsdf.radiance(light), scene_.lights().caustics_group());
+    film_.deposit(state.throughput * bsdf.radiance(light) * (1 / gathers),
+                  scene_.lights().caustics_group());
   }
 
   /// Light from a sampled light by way of each lobe. @param beyond  bodies that the surface's other
