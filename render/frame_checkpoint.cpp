@@ -11,7 +11,7 @@ namespace drench {
 namespace {
 
 /// Changes with the layout of what is archived.
-constexpr uint64_t kFormat = 0x6472656e63680002;  // "drench", 2
+constexpr uint64_t kFormat = 0x6472656e63680003;  // "drench", 3
 
 struct Head {
   uint64_t format = kFormat;

@@ -79,10 +79,11 @@ void LayerFilm::clear(PathRecord& record) const {
 }
 
 void LayerFilm::archive(CheckpointArchive& file) {
-  file.column(light_);
+  for (auto* column : {&light_, &caught_, &background_}) file.column(*column);
   for (Pixel& p : pixel_) {
     for (V3f* sum : {&p.albedo, &p.normal, &p.albedo2, &p.normal2}) file.value(*sum);
     file.value(p.inverse_depth), file.value(p.inverse_depth2), file.value(p.nearest);
+    file.value(p.usual);
     p.object.archive(file), p.material.archive(file);
   }
 }
@@ -132,7 +133,11 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   Pixel& p = pixel_[pixel];
   p.albedo += record.albedo;
   p.albedo2 += record.albedo * record.albedo;
-  if (record.first.kind != Hit::Kind::ground && record.first.kind != Hit::Kind::object) return;
+  const int object = record.first.kind == Hit::Kind::ground   ? int(scene_->object_count())
+                     : record.first.kind == Hit::Kind::object ? int(record.first.index)
+                                                              : kSky;
+  if (features_) vote(p.usual, object, record);
+  if (object == kSky) return;
   p.normal += record.normal;
   p.normal2 += record.normal * record.normal;
   const CameraPose& eye = frame_camera_.open();
@@ -141,14 +146,22 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   p.inverse_depth2 += 1 / (depth * depth);
   if (depth < p.nearest.depth) {
     p.nearest = {depth, record.position};
-    if (want_.motion || features_) p.nearest.motion = motion_of(record, frame_camera_.close(), 1);
-    if (features_) p.nearest.back = motion_of(record, before_camera_.open(), -1);
+    if (want_.motion) p.nearest.motion = motion_of(record, frame_camera_.close(), 1);
   }
   if (!want_.cryptomatte) return;
-  const size_t object =
-      record.first.kind == Hit::Kind::ground ? scene_->object_count() : size_t(record.first.index);
-  p.object.add(objects_.index[object]);
-  p.material.add(materials_.index[object]);
+  p.object.add(objects_.index[size_t(object)]);
+  p.material.add(materials_.index[size_t(object)]);
+}
+
+void LayerFilm::vote(Usual& usual, int object, const PathRecord& record) const {
+  if (usual.votes > 0) {
+    usual.votes += usual.object == object ? 1 : -1;
+    return;
+  }
+  usual = {object, 1};
+  if (object == kSky) return;
+  usual.after = motion_of(record, frame_camera_.close(), 1);
+  usual.before = motion_of(record, before_camera_.open(), -1);
 }
 
 FilmLayer LayerFilm::layer(const std::string& name, const std::vector<std::string>& channels,
@@ -243,9 +256,9 @@ void LayerFilm::add_motion(NoisyPicture& picture) const {
   for (auto& side : picture.motion)
     for (NoisyPicture::Plane& plane : side) plane.resize(pixel_.size());
   for (size_t p = 0; p < pixel_.size(); ++p) {
-    const bool sky = !saw_something(p);
-    const V3f before = sky ? motion_of_sky(p, before_camera_.open()) : pixel_[p].nearest.back;
-    const V3f after = sky ? motion_of_sky(p, frame_camera_.close()) : pixel_[p].nearest.motion;
+    const bool sky = pixel_[p].usual.object == kSky;
+    const V3f before = sky ? motion_of_sky(p, before_camera_.open()) : pixel_[p].usual.before;
+    const V3f after = sky ? motion_of_sky(p, frame_camera_.close()) : pixel_[p].usual.after;
     picture.motion[0][0][p] = before.x, picture.motion[0][1][p] = -before.y;
     picture.motion[1][0][p] = after.x, picture.motion[1][1][p] = -after.y;
   }

@@ -53,17 +53,26 @@ class LayerFilm {
   struct Nearest {
     float depth = kNothing;
     V3f position{0, 0, 0};
-    V3f motion{0, 0, 0}, back{0, 0, 0};  // to the next frame and to the one before
+    V3f motion{0, 0, 0};  // to the next frame
+  };
+  static constexpr int kSky = -1;
+  /// What most samples of a pixel see, by majority vote (Boyer and Moore 1991): a streak of spray
+  /// that few see does not take along what lies behind.
+  struct Usual {
+    int object = kSky, votes = 0;
+    V3f after{0, 0, 0}, before{0, 0, 0};  // motion to the frames beside
   };
   struct Pixel {
     V3f albedo{0, 0, 0}, normal{0, 0, 0};
     V3f albedo2{0, 0, 0}, normal2{0, 0, 0};  // sums of squares
     float inverse_depth = 0, inverse_depth2 = 0;
     Nearest nearest;
+    Usual usual;
     CryptomattePixel object, material;
   };
   static constexpr float kNothing = 1e10f;
 
+  void vote(Usual& usual, int object, const PathRecord& record) const;
   void add_light(size_t pixel, const PathRecord& record);
   Imath::V3d light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const;
   V3f motion_of(const PathRecord& record, const CameraPose& eye, float frames) const;

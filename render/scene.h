@@ -41,7 +41,7 @@ struct SceneObject {
   std::vector<Imath::V4f> sphere, sphere_close;  // m: centre and radius; in place of triangles
   std::vector<V3f> normal;                       // unit, per vertex; empty: flat
   std::vector<V2f> uv;                           // may be empty
-  std::vector<V3f> velocity;                     // m/s; kept for the layer of motion only
+  std::vector<V3f> velocity;                     // m/s; kept for the layer of motion and the denoiser only
   std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
   std::vector<float> wetness;                    // of cloth, 0 to 1; may be empty
   uint32_t material = 0;
@@ -229,7 +229,7 @@ class Scene {
 
   double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
   double fps_ = 24;
-  LayerSettings layers_;
+  bool keeps_velocities_ = false;
   ShutterCamera camera_;
   std::shared_ptr<KeptParts> parts_;
   Lights lights_;

@@ -114,7 +114,7 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
   };
   hasher.text(name).text(material_names_[material]);
   add(mesh.triangle), add(mesh.position), add(mesh.normal), add(mesh.uv), add(mesh.contact);
-  if (layers_.motion) add(mesh.velocity);
+  if (keeps_velocities_) add(mesh.velocity);
   return hasher.finish();
 }
 
@@ -136,7 +136,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
   object.contents = contents;
   object.name = name;
   object.material_name = material_names_[material];
-  if (layers_.motion) object.velocity = mesh.velocity;
+  if (keeps_velocities_) object.velocity = mesh.velocity;
   object.triangle = mesh.triangle;
   object.normal = mesh.normal.empty() ? smooth_normals(mesh) : mesh.normal;
   object.uv = mesh.uv;
@@ -182,7 +182,7 @@ void Scene::add_foam(const FoamFrame& foam) {
   material_names_.push_back("foam");
   SceneObject object;
   object.name = object.material_name = "foam";
-  if (layers_.motion) object.velocity = foam.velocity;
+  if (keeps_velocities_) object.velocity = foam.velocity;
   object.material = uint32_t(materials_.size() - 1);
   const auto at = [&](double frames) {
     std::vector<Imath::V4f> spheres;

@@ -307,6 +307,39 @@ TEST(NoisyFrame, TellsWhereWhatIsSeenIsInTheFramesBeside) {
   EXPECT_LT(off, 0.5 * still);  // of the albedo of checks
 }
 
+/// In pixels, of the ball and not of the floor, from a camera that stands.
+TEST(NoisyFrame, TellsTheMotionOfThings) {
+  RollingBall ball;
+  ball.shot.camera.position = V3d(0, 0.4, 3);
+  ball.shot.camera.target = V3d(0, 0.4, 0);
+  const NoisyPicture now = picture_of(read_layers(ball.noisy(1003)));
+  const double pixels = 0.06 * 96 / (2 * std::tan(20 * kPi64 / 180) * (3 - 0.4));  // a frame
+  const size_t middle = 48 * 96 + 48, floor = 90 * 96 + 5;
+  EXPECT_NEAR(now.motion[0][0][middle], -pixels, 0.02);
+  EXPECT_NEAR(now.motion[1][0][middle], pixels, 0.02);
+  EXPECT_NEAR(now.motion[1][1][middle], 0, 0.02);
+  EXPECT_NEAR(now.motion[1][0][floor], 0, 1e-3);
+}
+
+/// A streak that few samples of a pixel see does not take along what lies behind.
+TEST(NoisyFrame, TellsTheMotionOfWhatMostSamplesSee) {
+  RollingBall ball;
+  ball.shot.camera.position = V3d(0, 0.4, 3);
+  ball.shot.camera.target = V3d(0, 0.4, 0);
+  FrameGeometry drop = RollingBall::geometry(1003);
+  for (V3f& p : drop.fluid.position) p = (p - V3f(0, 0.4f, 0)) * 0.05f + V3f(0, 0.4f, 0);
+  drop.fluid.velocity.assign(drop.fluid.position.size(), V3f(24, 0, 0));  // 50 times its radius
+  RenderOptions options;
+  options.denoised = Denoised::later;
+  const NoisyPicture now = picture_of(render_frame(ball.shot, 1003, drop, options));
+  int streak = 0;
+  for (size_t p = 48 * 96; p < 49 * 96; ++p) {
+    streak += now.feature_variance[0][p] > 0 && now.feature[0][p] < 0.9f;
+    EXPECT_NEAR(now.motion[1][0][p], 0, 1e-3) << p;
+  }
+  EXPECT_GT(streak, 5);
+}
+
 TEST(NoisyFrame, WithNeighboursErrsLess) {
   const RollingBall ball;
   const std::filesystem::path before = ball.noisy(1002), frame = ball.noisy(1003),

@@ -77,6 +77,18 @@ TEST(FrameCheckpoint, GoesOnToTheSameBits) {
   EXPECT_GE(first, 0.6);
 }
 
+/// What plates need besides: how much of a backdrop is seen, and what catchers have of each light.
+TEST(FrameCheckpoint, OfAPlateGoesOnToTheSameBits) {
+  Frame frame;
+  frame.shot.ground.matte = Matte::shadow_catcher;
+  frame.shot.layers.opacity = true;
+  const Film whole = frame.whole();
+  double first = 0;
+  frame.stop_at(0.4);
+  expect_equal(frame.go_on(first), whole);
+  EXPECT_GE(first, 0.4);
+}
+
 TEST(FrameCheckpoint, IsWrittenNowAndThen) {
   Frame frame;
   const Film whole = frame.whole();
