@@ -228,9 +228,9 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
   Imf::addChromaticities(header, acescg_chromaticities());
   for (const auto* entries : {&attributes, &film.header})
     for (const auto& [name, value] : *entries) {
-      if (name.empty() || name.size() > 31 || header.find(name.c_str()) != header.end())
+      if (name.empty() || name.size() > 255 || header.find(name.c_str()) != header.end())
         throw Error(
-            fmt::format("'{}' cannot name an EXR attribute: use 1 to 31 characters and no "
+            fmt::format("'{}' cannot name an EXR attribute: use 1 to 255 characters and no "
                         "name of OpenEXR's own",
                         name));
       header.insert(name, Imf::StringAttribute(value));

@@ -67,9 +67,9 @@ void check(const Material& m) {
 V3f ShadingMaterial::reflectance_at(const V2f& uv) const {
   V3f out = reflectance;
   if (checker) {
-    const int squares =
-        int(std::floor(uv.x * inverse_checker_size)) + int(std::floor(uv.y * inverse_checker_size));
-    if (squares & 1) out *= kDarkSquare;
+    const float squares =
+        std::floor(uv.x * inverse_checker_size) + std::floor(uv.y * inverse_checker_size);
+    if (squares - 2 * std::floor(squares / 2) == 1) out *= kDarkSquare;  // not of infinite ones
   }
   if (texture) {
     const V3f color = texture->at(picture_uv(uv));

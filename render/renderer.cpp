@@ -50,7 +50,7 @@ void check_settings(const RenderSettings& r) {
 
 uint32_t photon_count(const RenderSettings& r) {
   constexpr double kMost = 1e7;  // 1.5 GB while they are sorted
-  return uint32_t(std::min(r.photons * r.samples * r.width * r.height, kMost));
+  return uint32_t(std::clamp(r.photons * r.samples * r.width * r.height, 1., kMost));
 }
 
 /// What every tile reads.

@@ -140,7 +140,10 @@ Texture from_exr(const std::filesystem::path& path, Primaries primaries) {
 }  // namespace
 
 V3f Texture::at(const V2f& uv) const {
-  const auto wrap = [](float s) { return s - std::floor(s); };
+  const auto wrap = [](float s) {
+    const float w = s - std::floor(s);
+    return w >= 0 ? w : 0.f;  // of what is not finite
+  };
   const float x = wrap(uv.x) * float(width) - 0.5f, y = (1 - wrap(uv.y)) * float(height) - 0.5f;
   const float x0 = std::floor(x), y0 = std::floor(y), s = x - x0, t = y - y0;
   const auto texel_at = [&](int column, int row) {

@@ -1,6 +1,7 @@
 #include "pipeline/contract/picture_check.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <vector>
 
@@ -21,6 +22,8 @@ class PictureChecker : CheckBase {
     for (size_t i = 0; i < shot_.light.size(); ++i) check_light(i);
     for (size_t i = 0; i < shot_.material.size(); ++i) check_material(i);
     check_material_uses();
+    check_environments();
+    check_names();
   }
 
  private:
@@ -93,14 +96,56 @@ class PictureChecker : CheckBase {
     }
   }
 
-  void check_light(size_t i) const {
-    const Light& light = shot_.light[i];
-    const std::string path = fmt::format("light[{}]", i);
-    if ((light.group.empty() ? light.name : light.group) == "caustics") {
-      fail(path + (light.group.empty() ? ".name" : ".group"),
+  void check_group(const std::string& key, const std::string& group) const {
+    if (group == "caustics") {
+      fail(key,
            "the group of lights \"caustics\" is that of what comes through water; choose another "
            "name");
     }
+  }
+
+  void check_environments() const {
+    size_t environments = 0;
+    for (size_t i = 0; i < shot_.light.size(); ++i) {
+      if (shot_.light[i].type != LightType::environment || ++environments == 1) continue;
+      fail(fmt::format("light[{}].type", i),
+           fmt::format("light \"{}\" is a second environment, and light comes from one sky only. "
+                       "Remove one of them",
+                       shot_.light[i].name));
+    }
+  }
+
+  /// What is drawn has one name each for its matte, and what shines one for its group of lights.
+  void check_names() const {
+    std::map<std::string, std::string> seen{
+        {"fluid", "the fluid"}, {"foam", "the foam"}, {"ground", "the ground"}};
+    const auto check = [&](const auto& things, const std::string& section) {
+      for (size_t i = 0; i < things.size(); ++i) {
+        const std::string key = fmt::format("{}[{}].name", section, i), &name = things[i].name;
+        const auto [other, is_new] = seen.emplace(name, "a thing of [[" + section + "]]");
+        if (!is_new && shot_.layers.cryptomatte) {
+          fail(key, fmt::format("\"{}\" is the name of {} already, and both would have one "
+                                "Cryptomatte. Give each its own name",
+                                name, other->second));
+        }
+        if (shines(things[i].material)) check_group(key, name);
+      }
+    };
+    check(shot_.cloth, "cloth");
+    check(shot_.obstacle, "obstacle");
+  }
+
+  bool shines(const std::string& material) const {
+    return std::any_of(shot_.material.begin(), shot_.material.end(), [&](const Material& m) {
+      return m.name == material && m.emission != V3f(0);
+    });
+  }
+
+  void check_light(size_t i) const {
+    const Light& light = shot_.light[i];
+    const std::string path = fmt::format("light[{}]", i);
+    check_group(path + (light.group.empty() ? ".name" : ".group"),
+                light.group.empty() ? light.name : light.group);
     if (light.type == LightType::rectangle && !(light.u.cross(light.v).length() > 1e-12)) {
       fail(path, fmt::format("{0}.u is {1} and {0}.v is {2}; the light has no area. Give two half "
                              "edges that are not parallel",
@@ -109,6 +154,8 @@ class PictureChecker : CheckBase {
     if (light.type == LightType::sphere || light.type == LightType::disk) {
       check_positive(path + ".radius", light.radius, " m", "the light has no area");
     }
+    if (light.type == LightType::sun)
+      check_positive(path + ".angle_deg", light.angle_deg, " degrees", "the sun has no disc");
     if (light.type == LightType::sun || light.type == LightType::disk)
       check_not_zero(path + ".direction", light.direction);
   }

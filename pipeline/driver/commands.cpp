@@ -188,7 +188,7 @@ void plan_command(const ShotArguments& arguments) {
 }
 
 void clean_command(const ShotArguments& arguments) {
-  const Job job = job_of(arguments, all_steps());
+  const Job job = job_of(arguments, {});  // makes nothing, so that nothing needs to be installed
   if (!fs::exists(job.folder / layout::manifest)) {
     throw Error(
         fmt::format("{}: holds no manifest; nothing was made here. Give the --out or "

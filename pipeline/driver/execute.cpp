@@ -519,7 +519,7 @@ void Executor::watch() {
     }
     const bool asked = options_.stop_requested && options_.stop_requested();
     // Never while a checkpoint may be in the writing.
-    if (asked && !simulating_ && seconds_since(*stop_time) > options_.patience_s) {
+    if (asked && stop_time && !simulating_ && seconds_since(*stop_time) > options_.patience_s) {
       if (options_.abandon) options_.abandon();
     }
     if (limit > 0 && !stopping() && resident_memory() > limit) {

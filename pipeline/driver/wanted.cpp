@@ -159,6 +159,9 @@ StageKey render_key(const Shot& shot, const std::string& denoiser) {
   for (const Material& material : shot.material)
     builder.file(material.texture).file(material.normal_map);
   add_obstacle_meshes(shot, builder);
+  for (const Obstacle& obstacle : shot.obstacle)
+    if (obstacle.type == ObstacleType::plane)  // is drawn as wide as the domain
+      builder.number("domain", (shot.domain.max - shot.domain.min).length());
   if (!denoiser.empty()) builder.part("denoiser", denoiser);
   return builder.finish();
 }

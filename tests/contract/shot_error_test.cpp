@@ -231,6 +231,17 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
        {"scene.toml:9", "scene.toml:6"}},
       {"[[light]]\nname = \"k\"\n", {"scene.toml:4", "has no type"}},
       {"[[light]]\ntype = \"sun\"\ngroup = \"caustics\"\n", {"scene.toml:6", "another name"}},
+      {"[[light]]\ntype = \"sun\"\nangle_deg = 0\n", {"scene.toml:6", "no disc"}},
+      {"[[light]]\ntype = \"environment\"\n[[light]]\ntype = \"environment\"\nname = \"b\"\n",
+       {"scene.toml:7", "\"b\"", "one sky"}},
+      {"[[material]]\nname = \"lava\"\nemission = [9, 2, 1]\n[[obstacle]]\nname = \"caustics\"\n"
+       "type = \"sphere\"\nmaterial = \"lava\"\n",
+       {"scene.toml:8", "another name"}},
+      {"[layers]\ncryptomatte = true\n[[cloth]]\nname = \"a\"\n[[obstacle]]\nname = \"a\"\n"
+       "type = \"sphere\"\n",
+       {"scene.toml:9", "\"a\"", "[[cloth]]"}},
+      {"[layers]\ncryptomatte = true\n[[obstacle]]\nname = \"ground\"\ntype = \"sphere\"\n",
+       {"scene.toml:7", "the ground"}},
       {"[render]\nwidth = 64\ncrop_min = [8, 8]\ncrop_max = [65, 9]\n",
        {"scene.toml:7", "[65, 9]", "64 x"}},
       {"[render]\nsamples = 8\ndenoise = true\n", {"scene.toml:6", "at least 16"}},

@@ -231,19 +231,25 @@ TEST(DenoiseStep, ByAnotherDenoiserRendersNothing) {
   EXPECT_EQ(run("regression", "1"), built_in);
 }
 
+/// To clean a folder up none is needed.
 TEST(DenoiseStep, NamesAMissingDenoiserBeforeAnythingIsMade) {
   const TinyShot shot(3);
   // Files that are no libraries, found before any that is installed.
   for (const char* version : {"", ".1", ".2"})
     std::ofstream(shot.folder() / (std::string("libOpenImageDenoise.so") + version));
-  const Ended ended =
-      run_program(DRENCH_PROGRAM,
-                  shot.words("run", {"--set", "render.denoise=true", "--set", "render.samples=16",
-                                     "--set", "render.denoiser=\"oidn\""}),
-                  shot.folder(), {"LD_LIBRARY_PATH=" + shot.folder().string()});
+  const auto with_it = [&](const char* command) {
+    return run_program(
+        DRENCH_PROGRAM,
+        shot.words(command, {"--set", "render.denoise=true", "--set", "render.samples=16", "--set",
+                             "render.denoiser=\"oidn\""}),
+        shot.folder(), {"LD_LIBRARY_PATH=" + shot.folder().string()});
+  };
+  const Ended ended = with_it("run");
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("LD_LIBRARY_PATH"), std::string::npos) << ended.err;
   EXPECT_FALSE(std::filesystem::exists(shot.out() / "sim"));
+  EXPECT_EQ(shot.run("simulate").code, 0);
+  EXPECT_EQ(with_it("clean").code, 0);
 }
 
 }  // namespace

@@ -5,10 +5,13 @@
 #include <tbb/task_arena.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "pipeline/contract/level_set.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/shot_file.h"
+#include "pipeline/driver/wanted.h"
 #include "sim/obstacle_view.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
@@ -190,6 +193,20 @@ TEST(MeshObstacle, AResumedRunHasTheSameBits) {
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.velocity, b.velocity);
   EXPECT_EQ(a.density, b.density);
+}
+
+/// A plane is drawn as wide as the domain; other pictures know nothing of that.
+TEST(PlaneObstacle, IsDrawnAnewInAnotherDomain) {
+  const TemporaryFolder folder;
+  const auto key = [&](const std::string& type, const std::string& max) {
+    std::ofstream(folder / "ball.toml") << "[domain]\nmax = " << max
+                                        << "\n[[fluid.sphere]]\ncenter = [0, 1, 0]\nradius = 0.1\n"
+                                           "[[obstacle]]\nname = \"o\"\ntype = \""
+                                        << type << "\"\nposition = [0, 0.1, 0]\n";
+    return want(read_shot(folder / "ball.toml", {}), {1001}, {Step::render}, "cpu").render.digest;
+  };
+  EXPECT_NE(key("plane", "[1, 2, 1]"), key("plane", "[1, 3, 1]"));
+  EXPECT_EQ(key("sphere", "[1, 2, 1]"), key("sphere", "[1, 3, 1]"));
 }
 
 }  // namespace

@@ -142,6 +142,31 @@ TEST_F(FilmFile, PngReturnsItsPixelsAsTexture) {
   EXPECT_EQ(texture.at({1.125f, -0.25f}), texture.texel[0]);
 }
 
+/// Coordinates of a hostile mesh, divided by a small texture_size.
+TEST_F(FilmFile, TextureHasATexelAtEveryCoordinate) {
+  write_png(at("a.png"), 3, 1, std::vector<uint8_t>(9, 255));
+  const Texture white = read_texture(at("a.png"));
+  const float most = std::numeric_limits<float>::max(), beyond = 2 * most;
+  for (const float u : {-1e-9f, 1e30f, -most, most, beyond, -beyond, beyond - beyond}) {
+    EXPECT_NEAR(white.at({u, 0.5f}).y, 1, 1e-3) << u;
+    EXPECT_NEAR(white.at({0.5f, u}).y, 1, 1e-3) << u;
+  }
+}
+
+/// They hold the name of a file, and that the name of a sheet, which may have 64 characters.
+TEST_F(FilmFile, AttributesHaveLongNames) {
+  Film film;
+  film.width = film.height = 1;
+  film.rgba = {1, 2, 3, 1};
+  const std::string name = "key.sim/cloth." + std::string(64, 'x') + ".1001.ply";
+  write_exr(at("a.exr"), film, {{name, "digest"}});
+  const Imf::InputFile file(at("a.exr").c_str());
+  const auto* found = file.header().findTypedAttribute<Imf::StringAttribute>(name);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->value(), "digest");
+  EXPECT_THROW(write_exr(at("b.exr"), film, {{std::string(256, 'x'), ""}}), Error);
+}
+
 TEST_F(FilmFile, TextureThatIsNoPictureIsRefused) {
   std::ofstream(at("a.png"), std::ios::binary) << "\x89PNG\r\n\x1a\n and nothing more";
   std::ofstream(at("a.jpg"), std::ios::binary) << "\xff\xd8\xff\xe0 and nothing more";
