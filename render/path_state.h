@@ -18,6 +18,9 @@ inline constexpr float kLongSurvival = 0.99f;
 /// the scene, where each waits for memory, and light of light that a sample adds to many others.
 inline constexpr float kLaterGathers = 0.25f;
 
+/// Of a sample: more go round in a circle that rounding has closed, and would for ever.
+inline constexpr uint64_t kMostRays = 1u << 16;
+
 /// Sampling dimensions after those of the camera: a block for every vertex of a branch.
 enum VertexDimension : uint32_t {
   kLightChoice,

@@ -60,7 +60,7 @@ class PathTracer {
 
   /// Goes on from there.
   void shade() {
-    going_ = meet(state_, hit_);
+    going_ = rays_ < kMostRays && meet(state_, hit_);
     ++state_.vertices;
     while (!(going_ &= finite(state_.ray.direction + state_.ray.origin)))
       if (!(going_ = begin_next())) return;

@@ -26,11 +26,12 @@ enum PhotonDimension : uint32_t {
 };
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
-constexpr float kMostGain = 2;           // of flux, by a smooth normal in place of the real one
-constexpr float kCrowd = 4;              // times the photons of the median one's disc
-constexpr uint32_t kFewest = 400;        // photons of a crowded cell: noise above blur
-constexpr unsigned kMostHands = 3;       // log2: any eight samples in a row see all photons
-constexpr double kHand = 4;              // photons of the median one's disc in a hand, at least
+constexpr int kMostMet = 1 << 12;   // contact faces and gaps that it passes one after the other
+constexpr float kMostGain = 2;      // of flux, by a smooth normal in place of the real one
+constexpr float kCrowd = 4;         // times the photons of the median one's disc
+constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
+constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
+constexpr double kHand = 4;         // photons of the median one's disc in a hand, at least
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// The smooth bodies' triangles by area; those on sheets let light pass and start none.
@@ -204,7 +205,7 @@ class PhotonTracer {
   /// it falls through. Where water has a surface in their gaps paths keep what comes through.
   Hit next(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
     bool dry_gap = false;
-    while (true) {
+    for (int met = 0; met < kMostMet; ++met) {
       const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
       ++rays;
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
@@ -225,6 +226,7 @@ class PhotonTracer {
       flight.in |= surface.body;
       flight.ray.origin = surface.leave(flight.ray.direction);
     }
+    return {};
   }
 
   void absorb(Flight& flight, float distance) const {

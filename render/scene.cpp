@@ -308,16 +308,19 @@ namespace {
 /// Where a ray met a sphere, on it to rounding.
 template <bool moving>
 void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surface& s) {
-  Imath::V4f sphere = object.sphere[hit.triangle];
+  Imath::V4f sphere = object.sphere[hit.triangle], way(0);
   if constexpr (moving)
-    if (object.moves()) sphere += (object.sphere_close[hit.triangle] - sphere) * ray.time;
+    if (object.moves()) {
+      way = object.sphere_close[hit.triangle] - sphere;
+      sphere += way * ray.time;
+    }
   const V3f center(sphere.x, sphere.y, sphere.z);
   s.geometric_normal = s.shading_normal =
       normalized(ray.origin + ray.direction * hit.distance - center);
   s.position = center + s.geometric_normal * sphere.w;
   s.uv = V2f(0);
   s.small = true;
-  const V3f size = absolute(center) + V3f(sphere.w);
+  const V3f size = absolute(center) + absolute(V3f(way.x, way.y, way.z)) + V3f(sphere.w);
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
 }
 
@@ -354,7 +357,11 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   const V3f a = at(t.x), b = at(t.y), c = at(t.z);
   const float w = 1 - hit.u - hit.v;
   s.position = a * w + b * hit.u + c * hit.v;
-  const V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
+  V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
+  if constexpr (moving) {
+    const auto way = [&](uint32_t v) { return object.way(v, ray.time); };
+    size += way(t.x) * w + way(t.y) * hit.u + way(t.z) * hit.v;
+  }
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
   if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(a, b, c, hit, s);
   s.geometric_normal = normalized(cross(b - a, c - a));

@@ -41,9 +41,9 @@ struct SceneObject {
   std::vector<Imath::V4f> sphere, sphere_close;  // m: centre and radius; in place of triangles
   std::vector<V3f> normal;                       // unit, per vertex; empty: flat
   std::vector<V2f> uv;                           // may be empty
-  std::vector<V3f> velocity;                     // m/s; kept for the layer of motion and the denoiser only
-  std::vector<uint8_t> contact;                  // by triangle, 1: lies on a sheet; may be empty
-  std::vector<float> wetness;                    // of cloth, 0 to 1; may be empty
+  std::vector<V3f> velocity;     // m/s; kept for the layer of motion and the denoiser only
+  std::vector<uint8_t> contact;  // by triangle, 1: lies on a sheet; may be empty
+  std::vector<float> wetness;    // of cloth, 0 to 1; may be empty
   uint32_t material = 0;
   int light = -1;   // its number among the meshes that shine
   Bodies body = 0;  // its bit, if it is a dielectric
@@ -68,6 +68,14 @@ struct SceneObject {
     if (key.empty()) return open + (position_close[vertex] - open) * time;
     return between(&Key::position, vertex, time);
   }
+  /// How far a vertex comes on the straight way that it is on, along each axis, m. By so much its
+  /// ends, of which a place between is made, may be larger than that place.
+  V3f way(uint32_t vertex, float time) const {
+    if (position_close.empty()) return V3f(0);
+    if (key.empty()) return absolute(position_close[vertex] - position[vertex]);
+    const size_t k = segment(time);
+    return absolute(key[k + 1].position[vertex] - key[k].position[vertex]);
+  }
   /// Not of unit length. Surfaces that move straight keep theirs.
   V3f normal_at(uint32_t vertex, float time) const {
     return key.empty() ? normal[vertex] : between(&Key::normal, vertex, time);
@@ -75,10 +83,12 @@ struct SceneObject {
 
  private:
   V3f between(std::vector<V3f> Key::*column, uint32_t vertex, float time) const {
-    const float at = time * float(key.size() - 1);
-    const size_t k = std::min(size_t(at), key.size() - 2);
+    const size_t k = segment(time);
     const V3f &a = (key[k].*column)[vertex], &b = (key[k + 1].*column)[vertex];
-    return a + (b - a) * (at - float(k));
+    return a + (b - a) * (time * float(key.size() - 1) - float(k));
+  }
+  size_t segment(float time) const {
+    return std::min(size_t(time * float(key.size() - 1)), key.size() - 2);
   }
 };
 

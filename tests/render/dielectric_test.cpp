@@ -264,6 +264,40 @@ TEST(WaterMesh, LosesNoRayThroughItsEdges) {
   EXPECT_EQ(caught, 0);
 }
 
+/// Near the origin in the middle of the shutter, 25 m from it at its ends: places are rounded as
+/// those are.
+TEST(WaterMesh, LetsRaysGoOnWhereItFliesPast) {
+  Shot shot = plain_shot(1);
+  shot.material = {dielectric("water", kIndex)};
+  shot.render.motion_blur = true;
+  TriangleMesh mesh = sphere_mesh(4);
+  mesh.velocity.assign(mesh.position.size(), V3f(100 * 24, 60 * 24, -80 * 24));  // m/s
+  const Scene scene(shot, 1001, {mesh, {}}, {});
+  const float frames = float(shot.camera.shutter_close - shot.camera.shutter_open);
+  ASSERT_NEAR(shot.camera.shutter_open, -frames / 2, 1e-9);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  int lost = 0, caught = 0;
+  for (int k = 0; k < 200000; ++k) {
+    const float time = 0.5f + 0.02f * uniform(random);
+    const V3f center = mesh.velocity[0] * ((time - 0.5f) * frames / 24);
+    const V3f d = V3f(uniform(random), uniform(random), 1.5f + uniform(random)).normalized();
+    Ray ray{center, d, time};
+    const Hit hit = scene.intersect(ray, Coherence::incoherent);
+    if (hit.kind != Hit::Kind::object) {
+      ++lost;
+      continue;
+    }
+    const Surface surface = scene.surface<true>(ray, hit);
+    ray.origin = surface.leave(d);
+    caught += scene.intersect(ray, Coherence::incoherent).kind == Hit::Kind::object ? 1 : 0;
+    ray = {surface.leave(-d), d, time};
+    lost += scene.intersect(ray, Coherence::incoherent).kind == Hit::Kind::object ? 0 : 1;
+  }
+  EXPECT_EQ(caught, 0);
+  EXPECT_EQ(lost, 0);
+}
+
 TEST(WaterMesh, KnowsWhatLiesInside) {
   Shot shot = plain_shot(1);
   shot.material = {dielectric("water", kIndex)};
