@@ -39,7 +39,8 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
       {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}};
   command.add_option("SHOT", shot.shot, "shot file (TOML)")->required();
   command.add_option("--out", shot.out, "output folder; default out/<shot>/<quality>");
-  command.add_option("--frames", shot.frames, "1001-1048, 1001-1048x2, or a list of these");
+  command.add_option("--frames", shot.frames,
+                     "1001-1048, 1001-1048x2 (every second), or a list of these; default all");
   command.add_option("--device", shot.device, "auto, cpu or cuda")
       ->transform(CLI::CheckedTransformer(devices, CLI::ignore_case))
       ->option_text("NAME");
@@ -82,6 +83,7 @@ void add_commands(CLI::App& app, Arguments& arguments) {
 
   CLI::App* clean = app.add_subcommand("clean", "remove frames beyond the shot's range");
   add_shot_options(*clean, arguments);
+  clean->remove_option(clean->get_option("--frames"));  // that would be the ones to keep
   clean->footer("Example: drench clean shots/pour.toml --quality preview");
   clean->callback([&arguments] { clean_command(arguments.shot); });
 

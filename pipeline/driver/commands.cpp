@@ -199,8 +199,8 @@ void clean_command(const ShotArguments& arguments) {
   remove_leftovers(job.folder);
   Manifest manifest(job.folder / layout::manifest);
   manifest.open_for_append();
-  const int last = arguments.frames.empty() ? job.shot.timeline.last : job.wanted.frames.back();
-  const Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), last);
+  const Plan plan =
+      make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
   for (const std::string& file : plan.beyond) {
     manifest.drop(file);
     std::error_code code;
