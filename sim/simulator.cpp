@@ -240,8 +240,9 @@ struct Simulator::Implementation {
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
         scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
-        scene.parameters.incompressible ? " or a smaller fluid.tolerance"
-                                        : ", a softer cloth or a larger fluid.sound_speed"));
+        !scene.parameters.incompressible ? ", a softer cloth or a larger fluid.sound_speed"
+        : particle                       ? " or a smaller fluid.tolerance"
+                                         : " or a softer cloth"));
   }
 
   /// What emitters added, sinks took and open sides let go since the last report.

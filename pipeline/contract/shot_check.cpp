@@ -348,7 +348,7 @@ class Checker : CheckBase {
       }
       if (vertices > most_vertices) {
         fail(path + ".cells",
-             fmt::format("{}.cells is [{}, {}], {:.3g} vertices; at most {:.3g} "
+             fmt::format("{}.cells is [{}, {}], {:.0f} vertices; at most {:.0f} "
                          "are allowed. Use fewer cells",
                          path, cloth.cells.x, cloth.cells.y, vertices, most_vertices));
       }

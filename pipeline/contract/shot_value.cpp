@@ -574,11 +574,15 @@ std::string_view nearest_word(std::string_view word, const std::vector<std::stri
     }
     return row.back();
   };
+  const auto is_part_of = [&](std::string_view other) {
+    return !word.empty() &&
+           fmt::format("_{}_", other).find(fmt::format("_{}_", word)) != std::string::npos;
+  };
   if (word.size() > 64) return {};
   std::string_view best;
   size_t least = std::max<size_t>(2, word.size() / 2) + 1;
   for (const std::string_view other : words) {
-    const size_t d = distance(other);
+    const size_t d = is_part_of(other) ? 1 : distance(other);
     if (d < least && d < other.size()) {
       least = d;
       best = other;

@@ -36,7 +36,8 @@ const char* file_name_problem(std::string_view name);
 std::string kind_text(const Parameter& parameter);
 std::string limits_text(const Parameter& parameter);
 
-/// The word of `words` that is most like `word`, or empty when none is near.
+/// The word of `words` that is most like `word` or has it as a part ("fov": "fov_deg"), or empty
+/// when none is near.
 std::string_view nearest_word(std::string_view word, const std::vector<std::string_view>& words);
 
 }  // namespace drench::shot_table

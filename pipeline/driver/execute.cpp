@@ -525,7 +525,7 @@ void Executor::watch() {
     if (limit > 0 && !stopping() && resident_memory() > limit) {
       fail(std::make_exception_ptr(Error(fmt::format(
           "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was "
-          "stopped with a checkpoint. Give more, or a larger spacing",
+          "stopped with a checkpoint. Give more, a larger spacing or smaller frames",
           folder_.string(), double(resident_memory()) / double(1 << 30), options_.memory_gib))));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

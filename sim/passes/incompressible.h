@@ -74,7 +74,6 @@ inline void find_neighbours(State& state) {
   }
   correct_gradients(state);
   invert_diagonal(state);
-  if (p.obstacles > 0) limit_squeezed(state);
   if (sheets) limit_recovery(state);
 }
 

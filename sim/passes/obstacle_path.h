@@ -122,7 +122,6 @@ struct ObstacleGuard {
   /// Where a particle ends that would go from x0 to x1, and what becomes of its velocity.
   DRENCH_HD Vec3<float> operator()(Vec3<float> x0, Vec3<float> x1, Vec3<float>& v) const {
     bool met = true;
-    int last = 0;
     for (int round = 0; met && round < 4; ++round) {
       met = false;
       for (int k = 0; k < obstacles.count; ++k) {
@@ -130,7 +129,6 @@ struct ObstacleGuard {
         Vec3<float> own;
         if (!PathStop{start, o.clearance, 1.01f * o.clearance}.stops(o, x0, x1, own)) continue;
         met = true;
-        last = o.of;
         x1 = o.to_frame(1, own);
         const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
         const float inward = dot(v, n) - (start == 1 ? 0.f : surface_speed(o, own, n, inverse_dt));
@@ -140,15 +138,8 @@ struct ObstacleGuard {
         x1 = walls.inside(x1);
       }
     }
-    if (!met || !(worst(x1) < 0.f)) return x1;
-    // Squeezed between obstacles or against a wall: the better of both places, and no faster than
-    // the way there.
-    if (worst(walls.inside(x0)) > worst(x1)) x1 = walls.inside(x0);
-    const Vec3<float> way = (x1 - x0) * inverse_dt;
-    if (length2(way) < length2(v)) {
-      stopped.add(last, v - way);
-      v = way;
-    }
+    // Squeezed between obstacles or against a wall: the better of both places.
+    if (met && worst(x1) < 0.f && worst(walls.inside(x0)) > worst(x1)) x1 = walls.inside(x0);
     return x1;
   }
 };

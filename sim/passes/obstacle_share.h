@@ -134,43 +134,4 @@ inline void add_obstacle_shares(State& state) {
       });
 }
 
-/// What two solids squeeze between them, an obstacle and a wall or another obstacle, comes apart no
-/// faster than the scene moves, and not within the step, as between sheets (limit_recovery): a ball
-/// that is set down on the floor leaves no room for the particles below it, and the shorter steps
-/// that follow would throw them faster.
-inline void limit_squeezed(State& state) {
-  const Parameters& p = state.parameters;
-  const VecView x = state.fluid.position.view(), v = state.fluid.velocity.view();
-  const ObstacleShare law = obstacle_share_of(p);
-  const ImageWalls walls = image_walls_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const Float4* wall = state.pressure.wall.data();
-  const float* inverse_diagonal = state.pressure.inverse_diagonal.data();
-  float* source = state.pressure.source.data();
-  const float dt = float(state.dt), recovery = dt * 0.01f * p.sound_speed;
-  const float h = p.support_radius,
-              own = p.particle_mass / p.lattice_sum / (h * h * h) * WendlandC2::value(1.f);
-  const float alone = p.rest_density - own, inverse_room = 1.f / (0.4f * p.rest_density);
-  parallel_for(
-      "obstacles: squeezed", state.fluid.count, DRENCH_LAMBDA(int i) {
-        if (wall[i].w == 0.f || inverse_diagonal[i] == 0.f) return;
-        const Vec3<float> to = x[i], way = v[i] * dt;
-        WallShare all = walls.share(to);
-        float nearer = max0(dot(way, all.gradient)) / maximum(length(all.gradient), 1e-20f);
-        bool squeezed = false;
-        for (int k = 0; k < obstacles.count; ++k) {
-          const ObstacleView& o = obstacles.obstacle[k];
-          const WallShare share = law.of(o, to);
-          if (share.value == 0.f) continue;
-          squeezed = squeezed || dot(share.gradient, all.gradient) < 0.f;
-          nearer += max0(o.distance(o.to_own(0, to - way), o.blend[0]) -
-                         o.distance(o.to_own(1, to), o.blend[1]));
-          all = law.both(all, share);
-        }
-        if (!squeezed) return;
-        const float room = minimum(max0(alone - wall[i].w) * inverse_room, 1.f);
-        source[i] = minimum(source[i], (room * (nearer + recovery)) / sqrtf(inverse_diagonal[i]));
-      });
-}
-
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -150,45 +150,6 @@ TEST(ObstacleMotion, LimitsTheStepToFourTenthsOfASpacing) {
   EXPECT_NEAR(run.scene.obstacles.fastest(), 1 / frame, 0.01 / frame);
 }
 
-/// Fastest particle, over the body's speed, while a body comes down on the floor of a pool 10
-/// layers deep, leaves no room between, and for a while after.
-struct Squirt {
-  double most = 0, after = 0;
-};
-Squirt squirt_of(ObstacleType type) {
-  Shot shot = tank_shot(10);
-  const double a = shot.fluid.spacing, speed = 2;
-  shot.fluid.box.clear();
-  add_box(shot, V3d(0), {24, 10, 24});
-  shot.domain.max = V3d(24 * a, 60 * a, 24 * a);
-  Obstacle& body = add_obstacle(shot, type, V3d(0));
-  body.radius = 5 * a, body.size = V3d(10 * a);
-  const double frames = 15 * a / speed * shot.timeline.fps;
-  body.position.keys = {{1001, V3d(12 * a, 20 * a, 12 * a)},
-                        {1001 + frames, V3d(12 * a, 5 * a, 12 * a)}};
-  body.rotation_deg.keys = {{1001, V3d(0)}};
-  Stepper run(shot);
-  const double landed = frames / shot.timeline.fps;
-  Squirt result;
-  while (run.time < landed + 0.15) {
-    run.step();
-    double& fastest = run.time < landed + 0.1 ? result.most : result.after;
-    fastest = std::max(fastest, double(run.limits.max_speed) / speed);
-    if (run.limits.bad_particle >= 0) return {1e9, 1e9};
-  }
-  return result;
-}
-
-/// A film squeezed out is as fast as its length over twice its thickness says, without end for one
-/// of no thickness: what there is no room for stays.
-TEST(ObstacleMotion, ABodySetDownThrowsNothing) {
-  for (const ObstacleType type : {ObstacleType::sphere, ObstacleType::box}) {
-    const Squirt squirt = squirt_of(type);
-    EXPECT_LT(squirt.most, 12) << int(type);
-    EXPECT_LT(squirt.after, 3) << int(type);
-  }
-}
-
 Shot stirred() {
   Shot shot = fall();
   const double a = shot.fluid.spacing;
