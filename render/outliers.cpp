@@ -99,6 +99,7 @@ class Brightness {
           noisy_.push_back(block_[size_t(r * columns_ + c)]);
     return beyond(noisy_, noisy_.size() / 2);
   }
+
   int width_, height_, columns_;  // columns of blocks
   Plane mean_, scatter_;          // over colours; of a half's mean
   Plane block_;                   // medians of the blocks, with noise
