@@ -17,8 +17,10 @@ constexpr size_t kFew = 3, kHalf = 12;
 /// A glint is this many times brighter than half of what is around it, with its noise; if few of
 /// its samples found it, which then lie loosely together, than half of what is farther around. So
 /// it is over the mean of the picture: before black anything would be. It and the 24 pixels around
-/// it know their brightness to this part, which takes seven samples.
+/// it know their brightness to this part, which takes seven samples; or one within that reach is
+/// such a glint: the ends of a streak, where its pixels are few.
 constexpr float kGlint = 16, kSeen = 0.4f;
+constexpr int kReach = 2;
 constexpr int kBlock = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
 /// The value that only `few` of a list are above.
@@ -28,7 +30,8 @@ float beyond(std::vector<float>& list, size_t few) {
 }
 
 struct Outlier {
-  float factor = 1;  // takes it down to what is around it
+  float factor = 1;     // takes it down to what is around it
+  bool bright = false;  // as a glint is
   bool glint = false;
 };
 
@@ -62,10 +65,10 @@ class Brightness {
     const bool one_sample = !(scatter_[p] < kOneSample * mean_[p]);
     const float usual = beyond(around_, kHalf);
     if (!one_sample && mean_[p] > kGlint * std::max(beyond(noisy_, kHalf), picture_))
-      return {usual / mean_[p], seen(window)};
+      return {usual / mean_[p], true, seen(window)};
     if (scatter_[p] < kUnsure * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
-    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], seen(window)};
+    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], true, seen(window)};
     const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
@@ -107,21 +110,41 @@ class Brightness {
   std::vector<float> around_, noisy_;
 };
 
+/// Makes glints of what is as bright and hangs together with one.
+void follow_glints(int width, int height, std::vector<Outlier>& outliers) {
+  std::vector<size_t> found;
+  for (size_t p = 0; p < outliers.size(); ++p)
+    if (outliers[p].glint) found.push_back(p);
+  while (!found.empty()) {
+    const size_t p = found.back();
+    found.pop_back();
+    for_each_near(width, height, p, kReach, [&](size_t q) {
+      if (outliers[q].glint || !outliers[q].bright) return;
+      outliers[q].glint = true;
+      found.push_back(q);
+    });
+  }
+}
+
 }  // namespace
 
 std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   Brightness bright(picture);
-  std::vector<Plane> glints(3, Plane(picture.variance[0].size(), 0.f));
-  for_each_window(picture.width, picture.height, 2, [&](size_t p, const auto& window) {
-    const auto [factor, glint] = bright.judge(p, window);
-    if (factor == 1) return;
+  std::vector<Outlier> outliers(picture.variance[0].size());
+  for_each_window(picture.width, picture.height, kReach,
+                  [&](size_t p, const auto& window) { outliers[p] = bright.judge(p, window); });
+  follow_glints(picture.width, picture.height, outliers);
+  std::vector<Plane> glints(3, Plane(outliers.size(), 0.f));
+  for (size_t p = 0; p < outliers.size(); ++p) {
+    const Outlier& o = outliers[p];
+    if (o.factor == 1) continue;
     for (size_t c = 0; c < 3; ++c) {
       Plane &first = picture.half[0][c], &second = picture.half[1][c];
-      if (glint) glints[c][p] = (1 - factor) * 0.5f * (first[p] + second[p]);
-      first[p] *= factor, second[p] *= factor;
-      picture.variance[c][p] *= factor * factor;
+      if (o.glint) glints[c][p] = (1 - o.factor) * 0.5f * (first[p] + second[p]);
+      first[p] *= o.factor, second[p] *= o.factor;
+      picture.variance[c][p] *= o.factor * o.factor;
     }
-  });
+  }
   return glints;
 }
 

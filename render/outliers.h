@@ -9,18 +9,24 @@
 
 namespace drench {
 
+/// Calls with the pixels within `reach` of one.
+template <class Visit>
+void for_each_near(int width, int height, size_t pixel, int reach, const Visit& visit) {
+  const int x = int(pixel % size_t(width)), y = int(pixel / size_t(width));
+  for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
+    for (int u = std::max(x - reach, 0); u <= std::min(x + reach, width - 1); ++u)
+      visit(size_t(v) * size_t(width) + size_t(u));
+}
+
 /// Calls with each pixel and the pixels within `reach` of it.
 template <class Visit>
 void for_each_window(int width, int height, int reach, const Visit& visit) {
   std::vector<size_t> window;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      window.clear();
-      for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
-        for (int u = std::max(x - reach, 0); u <= std::min(x + reach, width - 1); ++u)
-          window.push_back(size_t(v) * size_t(width) + size_t(u));
-      visit(size_t(y) * size_t(width) + size_t(x), window);
-    }
+  for (size_t p = 0; p < size_t(width) * size_t(height); ++p) {
+    window.clear();
+    for_each_near(width, height, p, reach, [&](size_t q) { window.push_back(q); });
+    visit(p, window);
+  }
 }
 
 /// Brings pixels that far outshine what is around them down to it: those whose brightness few of
