@@ -58,6 +58,8 @@ void taylor_green(const Emit& emit) {
     line.error_of = "relative error of the decay rate, t U/L to 1";
     line.gate = size.gate;
     line.more["rate_of_mode"] = flow.mode;
+    line.more["rate"] = flow.rate;
+    line.more["friction_of_pairs"] = flow.friction;
     line.more["speed_error"] = flow.speed;
     line.more["density_spread"] = flow.density;
     line.more["energy_across"] = flow.thickness;

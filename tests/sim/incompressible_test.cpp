@@ -268,6 +268,32 @@ TEST_P(Collapse, KeepsTheDensityThatWasAskedFor) {
 
 INSTANTIATE_TEST_SUITE_P(Tolerance, Collapse, testing::Values(1e-3, 3e-4, 1e-4));
 
+enum class Guess { last_step, none };
+
+/// Of all solves of 0.3 s.
+int iterations_of(const Shot& shot, Guess guess) {
+  Stepper run(shot);
+  int sum = 0;
+  while (run.time < 0.3) {
+    sim::HostState state = run.solver->save();
+    std::fill(state.pressure_term.begin(), state.pressure_term.end(), 0.f);
+    if (guess == Guess::none) run.solver->load(state);
+    run.step();
+    sum += run.limits.iterations;
+  }
+  return sum;
+}
+
+// A peer's warm start saves nothing at rest. Measured: 30 and 21 %, 53 and 31 % at a tenth of the
+// tolerance, 20 and 21 % at ten times as much.
+TEST(Incompressible, PressuresOfTheLastStepSaveIterations) {
+  const Shot collapse = column(16, 1e-4);
+  Shot rest = collapse;
+  rest.domain.max.x /= 2;
+  for (const Shot& shot : {rest, collapse})
+    EXPECT_LT(iterations_of(shot, Guess::last_step), 0.85 * iterations_of(shot, Guess::none));
+}
+
 /// A block whose particles are shaken by half a spacing.
 sim::Scene shaken_block() {
   Shot shot = water();

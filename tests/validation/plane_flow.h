@@ -33,6 +33,9 @@ struct TaylorGreen {
   double speed = 0;      // largest relative error of the RMS speed
   double density = 0;    // RMS of density's deviation from its mean, over rest, at the end
   double thickness = 0;  // kinetic energy across the plane over all of it, at the end
+  // What friction between pairs takes at the places and velocities that particles have, over what
+  // a continuum's does, less 1: mean over the time. The rest of `rate` is other losses.
+  double friction = 0;
   int particles = 0, iterations = 0, steps = 0;
 };
 /// @param across  particles to the side of the square.
