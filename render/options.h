@@ -45,7 +45,7 @@ class KeptParts;
 struct RenderOptions {
   Estimator estimator = Estimator::mis;
   EnvironmentSampling environment = EnvironmentSampling::automatic;
-  FirstInterface first_interface = FirstInterface::one;
+  FirstInterface first_interface = FirstInterface::both;
   WaterGuide water_guide = WaterGuide::on;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not

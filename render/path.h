@@ -36,15 +36,15 @@ struct PathRecord {
   Hit first;               // the ground or object met first, if any
   V3f position, normal;    // of it; normal to the side seen
   float time = 0;          // in the shutter
-  V3f albedo;              // of the first diffuse surface, through water and glass
-  bool shaded = false;     // whether there was one
+  V3f albedo;              // of the first diffuse surfaces, through water and glass
+  bool shaded = false;     // whether there was one on this branch
   MatteRecord matte;
 };
 
 struct PathSettings {
   int depth = 8;
   Estimator estimator = Estimator::mis;
-  FirstInterface first_interface = FirstInterface::one;
+  FirstInterface first_interface = FirstInterface::both;
   WaterGuide water_guide = WaterGuide::on;
   Bodies camera_in = 0;
   Background background = Background::sky;

@@ -69,8 +69,14 @@ class PathFilm {
 
   void record_albedo(const V3f& albedo) {
     if (!record_ || record_->shaded) return;
-    record_->albedo = albedo;
+    record_->albedo += albedo;
     record_->shaded = true;
+  }
+
+  /// The mirrored branch has an albedo of its own share.
+  void begin_branch() {
+    if constexpr (has_plate) plate.on_catcher = false;
+    if (record_) record_->shaded = false;
   }
 
   /// Adds light to the picture.

@@ -91,7 +91,7 @@ class PathTracer {
       if (mirrored_) {
         state_ = *mirrored_;
         mirrored_.reset();
-        if constexpr (kPlate) film_.plate.on_catcher = false;
+        film_.begin_branch();
         return true;
       }
     if constexpr (kPlate)
@@ -326,13 +326,16 @@ class PathTracer {
         kPlate && state.clear && (state.in & ~settings_.camera_in & surface.body) != 0;
     bool reflect = split.reflectance >= 1;
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
-      mirrored_ = state;
-      mirrored_->throughput *= split.reflectance;
-      mirrored_->survival *= split.reflectance;
-      mirrored_->branch = 1;
-      mirrored_->clear = clear_mirror;
-      ++mirrored_->vertices;
-      depart(*mirrored_, surface, split.reflected);
+      const float follow = std::min(split.reflectance / kSmallBranch, 1.f);
+      if (follow == 1 || number(state, kRoulette) < follow) {
+        mirrored_ = state;
+        mirrored_->throughput *= split.reflectance / follow;
+        mirrored_->survival *= split.reflectance / follow;
+        mirrored_->branch = 1;
+        mirrored_->clear = clear_mirror;
+        ++mirrored_->vertices;
+        depart(*mirrored_, surface, split.reflected);
+      }
       state.throughput *= 1 - split.reflectance;
       state.survival *= 1 - split.reflectance;
     } else if (!reflect) {

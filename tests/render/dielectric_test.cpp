@@ -92,6 +92,33 @@ TEST(AbsorbingSlab, FollowsBeerLambertAloneWhenTheIndexMatches) {
   }
 }
 
+// Films as thin as 10 micrometres near the origin and 0.1 mm 300 m away: both faces are met, or
+// light would be kept whole or lost. What rays leave a face by is not absorbed, the rounding of
+// places 10 m and 310 m from the origin.
+TEST(AbsorbingSlab, KeepsThinFilms) {
+  for (const auto& [far, thickness] : {std::pair{0.f, 1e-3},
+                                       {0.f, 1e-4},
+                                       {0.f, 1e-5},
+                                       {300.f, 1e-2},
+                                       {300.f, 1e-3},
+                                       {300.f, 1e-4}})
+    for (const double index : {1., kIndex}) {
+      const double density = 0.5 / thickness, left = 1.3e-7 * (10 + far);  // 1/m, m
+      Slab slab(thickness, dielectric("water", index, V3f(float(density))), Facing::up);
+      const V3d by(far, 0, -far);
+      translate(slab.geometry.fluid, V3f(by));
+      slab.shot.camera.position.keys[0].second += by;
+      slab.shot.camera.target.keys[0].second += by;
+      slab.shot.light[0].center += by;
+      const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry), 0);
+      const double face = index == 1 ? 0 : kOneFace, once = std::exp(-0.5);
+      const double whole = std::pow(1 - face, 2) * once / (1 - std::pow(face * once, 2));
+      EXPECT_GT(mean.value, whole - bound(mean)) << thickness << " m, " << far << " m away";
+      EXPECT_LT(mean.value, whole * std::exp(density * left) + bound(mean))
+          << thickness << " m, " << far << " m away";
+    }
+}
+
 TEST(AbsorbingSlab, TintsTheFloorByTheWayLightTook) {
   // Index-matched water over a white floor, light straight down: e^-s(d / cos camera + d).
   Shot shot = plain_shot(64);
@@ -118,19 +145,74 @@ TEST(AbsorbingSlab, TintsTheFloorByTheWayLightTook) {
                 std::exp(-(c == 0 ? 0.8 : 0.4) * depth * (1 + std::sqrt(2.))), 1e-3);
 }
 
+/// A camera under flat water that looks up through 120 degrees, black around it.
+struct UnderWater {
+  Shot shot;
+  FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
+
+  explicit UnderWater(int samples) : shot(plain_shot(samples, 64)) {
+    add_ground(shot, 0, 200);
+    shot.material.push_back(dielectric("water", kIndex));
+    shot.camera.position = V3d(0, 1, 0);
+    shot.camera.target = V3d(0, 2, 0);
+    shot.camera.up = V3d(0, 0, -1);
+    shot.camera.fov_deg = 120.0;
+  }
+};
+
+/// What water reflects of unpolarised light from within, `angle` to the vertical.
+double reflected_within(double angle) {
+  const double s = kIndex * std::sin(angle);
+  if (s >= 1) return 1;
+  const double i = std::cos(angle), t = std::sqrt(1 - s * s);
+  return 0.5 * (std::pow((kIndex * i - t) / (kIndex * i + t), 2) +
+                std::pow((i - kIndex * t) / (i + kIndex * t), 2));
+}
+
+// The picture of the sky, summed, is that of the window's disc: its radius is right to a tenth of a
+// pixel.
+TEST(SnellsWindow, IsAsLargeAsRefractionSays) {
+  UnderWater scene(64);
+  scene.shot.light = {sky(1)};
+  const Film film = render_frame(scene.shot, 1001, scene.geometry);
+  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
+  double shown = 0, expected = 0;
+  for (size_t p = 0; p < film.rgba.size(); p += 4) shown += film.rgba[p];
+  constexpr int kFine = 2000;
+  for (int k = 0; k < kFine; ++k) {
+    const double r = 32 * (k + 0.5) / kFine;
+    expected +=
+        (1 - reflected_within(std::atan(r / pixels_per_tangent))) * 2 * kPi64 * r * 32 / kFine;
+  }
+  EXPECT_NEAR(shown, expected, 0.01 * expected);  // 1 % of a disc of 21 pixels: 0.1
+}
+
+// Beyond the window the floor is mirrored whole, within it by what Fresnel leaves.
+TEST(SnellsWindow, MirrorsTheFloor) {
+  UnderWater scene(64);
+  scene.shot.light = {panel({0, 0.5, 0}, 60, 60, 1, Facing::up)};
+  const Film film = render_frame(scene.shot, 1001, scene.geometry);
+  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
+  double within = 0, expected = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double r = std::hypot(x + 0.5 - 32, y + 0.5 - 32);
+      const double angle = std::atan(r / pixels_per_tangent);
+      const float value = film.rgba[4 * size_t(y * 64 + x)];
+      if (r > pixels_per_tangent * std::tan(std::asin(1 / kIndex)) + 2.2) {
+        EXPECT_NEAR(value, 1, 1e-4) << x << ' ' << y;
+      }
+      if (r < 15) within += value, expected += reflected_within(angle);
+    }
+  EXPECT_NEAR(within, expected, 0.03 * expected);
+}
+
 TEST(SnellsWindow, EndsAtTheCriticalAngle) {
   // Under flat water over a black floor the sky shows inside asin(1/n) = 48.61 degrees of the
   // vertical and nothing shows outside.
-  Shot shot = plain_shot(4, 64);
-  add_ground(shot, 0, 200);
-  shot.material.push_back(dielectric("water", kIndex));
-  shot.light = {sky(1)};
-  shot.camera.position = V3d(0, 1, 0);
-  shot.camera.target = V3d(0, 2, 0);
-  shot.camera.up = V3d(0, 0, -1);
-  shot.camera.fov_deg = 120.0;
-  const FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
-  const Film film = render_frame(shot, 1001, geometry);
+  UnderWater scene(4);
+  scene.shot.light = {sky(1)};
+  const Film film = render_frame(scene.shot, 1001, scene.geometry);
   const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
   const double edge = pixels_per_tangent * std::tan(std::asin(1 / kIndex));
   int inside = 0, outside = 0;

@@ -71,6 +71,36 @@ TEST(Turn, KeepsABladeInItsCircle) {
   EXPECT_NEAR(std::sqrt(square / ring), std::sqrt((sweep * sweep + width * width) / 12), 0.4);
 }
 
+/// Keys of its place and velocities of its vertices say the same of what slides.
+TEST(Turn, SlidesAsVelocitiesSay) {
+  Turning keyed({0.5, 0.3, 0.2}, {0, 0, 0});
+  keyed.shot.camera.position = V3d(0, 0.4, 10);
+  keyed.shot.camera.target = V3d(0, 0, 0);
+  keyed.shot.camera.fov_deg = 2 * std::atan(kSize * kPixel / 20) * 180 / kPi64;
+  keyed.shot.light = {sky(1)};
+  keyed.shot.material.back().reflectance = V3f(0.5f);
+  const V3d way(0.3, -0.2, 1);  // m a frame
+  keyed.shot.obstacle[0].position.keys = {{991, way * -10}, {1011, way * 10}};
+  keyed.look();
+
+  Turning given = keyed;
+  given.shot.obstacle[0].position.keys = {{1001, {0, 0, 0}}};
+  given.look();
+  TriangleMesh& mesh = given.geometry.obstacle[0].mesh;
+  mesh.velocity.assign(mesh.position.size(), V3f(way * given.shot.timeline.fps));
+  const Film a = render_frame(keyed.shot, 1001, keyed.geometry),
+             b = render_frame(given.shot, 1001, given.geometry);
+  double most = 0, moved = 0;
+  given.shot.render.motion_blur = false;
+  const Film still = render_frame(given.shot, 1001, given.geometry);
+  for (size_t p = 0; p < a.rgba.size(); ++p) {
+    most = std::max(most, double(std::abs(a.rgba[p] - b.rgba[p])));
+    moved = std::max(moved, double(std::abs(a.rgba[p] - still.rgba[p])));
+  }
+  EXPECT_GT(moved, 0.3);
+  EXPECT_LT(most, 1e-3);
+}
+
 /// A face that turns about an edge under a sun: the mean cosine over the shutter.
 TEST(Turn, TurnsNormalsToo) {
   Turning scene({1, 1, 1}, {0, 0, 80});
