@@ -14,16 +14,18 @@ struct Irradiance {
 
 class ClothBsdf {
  public:
+  enum class Sides { real, smooth };  // which normal light must be in front of
+
   /// @param outgoing  unit, away from the surface towards where the path came from
   /// Normals are unit and of the same hemisphere.
   ClothBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, const V3f& reflectance,
-            const V3f& transmittance)
+            const V3f& transmittance, Sides sides = Sides::real)
       : reflectance_(reflectance), transmittance_(transmittance) {
     // A sheet has nothing within that light must be kept from: its sides are those of the smooth
     // normal, or flat triangles would show as a chequer where light grazes them.
     const V3f& real = is_black(transmittance) ? geometric : shading;
     const float side = dot(outgoing, real) < 0 ? -1.f : 1.f;
-    geometric_ = real * side;
+    geometric_ = (sides == Sides::smooth ? shading : real) * side;
     shading_ = shading * side;
     const float r = largest(reflectance), t = largest(transmittance);
     reflect_probability_ = r + t > 0 ? r / (r + t) : 1;
@@ -40,7 +42,7 @@ class ClothBsdf {
     if (!(cos > 0)) return V3f(0);
     const float density = cos / kPi;
     pdf = density * (side > 0 ? reflect_probability_ : 1 - reflect_probability_);
-    return (side > 0 ? reflectance_ : transmittance_) * (density * terminator(incoming, cos, side));
+    return (side > 0 ? reflectance_ : transmittance_) * density;
   }
 
   /// Unit, to the side that `Irradiance::front` is on.
@@ -69,20 +71,11 @@ class ClothBsdf {
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
     out.pdf = cos / kPi * probability;
     const V3f& share = reflect ? reflectance_ : transmittance_;
-    out.weight = share * (terminator(out.direction, cos, side) / probability);
+    out.weight = share / probability;
     return out;
   }
 
  private:
-  /// Softens the edge of the shadow that flat triangles cast on themselves under smooth normals.
-  /// Chiang, Li, Burley 2019, "Taming the Shadow Terminator".
-  float terminator(const V3f& incoming, float cos, float side) const {
-    const float flat = dot(incoming, geometric_) * side;
-    const float g = flat / (cos * dot(geometric_, shading_));
-    if (g >= 1) return 1;
-    return g > 0 ? g * (1 + g * (1 - g)) : 0;
-  }
-
   V3f geometric_;  // of the normal that divides the sides
   V3f shading_, reflectance_, transmittance_;
   float reflect_probability_ = 1;

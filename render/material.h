@@ -45,6 +45,10 @@ struct ShadingMaterial {
     return type == MaterialType::metal || type == MaterialType::coated || alpha > 0;
   }
   /// Whether light meets more than a diffuse sheet where it is dry.
+  bool is_opaque_diffuse() const {
+    return (type == MaterialType::diffuse || type == MaterialType::cloth) &&
+           is_black(transmittance) && !normal_map;
+  }
   bool is_fabric() const { return !is_black(sheen) || !is_black(yarn); }
   /// Diffuse reflectance at a surface point; with the transmittance never above 1.
   V3f reflectance_at(const V2f& uv) const;

@@ -410,7 +410,8 @@ class PathTracer {
     if (++state.diffuse > settings_.depth) return false;
     const ShadingMaterial& material = *surface.material;
     const ClothBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
-                         material.reflectance_at(surface.uv), material.transmittance);
+                         material.reflectance_at(surface.uv), material.transmittance,
+                         surface.lifts() ? ClothBsdf::Sides::smooth : ClothBsdf::Sides::real);
     film_.record_albedo(state.survival * bsdf.albedo());
     if (bsdf.black()) return false;
     state.interfaces = 0;
@@ -449,9 +450,9 @@ class PathTracer {
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
     if constexpr (kWater)
-      if (dot(next.direction, surface.geometric_normal) *
-              dot(state.ray.direction, surface.geometric_normal) >
-          0)
+      if (!surface.lifts() && dot(next.direction, surface.geometric_normal) *
+                                      dot(state.ray.direction, surface.geometric_normal) >
+                                  0)
         state.in &= ~scene_.fluid();
     depart(state, surface, next.direction);
     state.throughput *= next.weight;

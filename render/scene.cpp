@@ -324,6 +324,19 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
 }
 
+/// Surface::lift. Normals of corners that lean farther than 45 degrees are those of edges.
+V3f lift_to_patch(const V3f (&corner)[3], const V3f (&normal)[3], const float (&weight)[3],
+                  const V3f& from, const Surface& s) {
+  const float side = dot(from, s.geometric_normal) > 0 ? -1.f : 1.f;
+  V3f lift(0);
+  for (int k = 0; k < 3; ++k) {
+    const V3f n = normalized(normal[k]) * side;
+    if (!(dot(n, s.geometric_normal) * side > 0.7f)) return V3f(0);
+    lift -= n * (weight[k] * std::min(dot(s.position - corner[k], n), 0.f));
+  }
+  return lift;
+}
+
 /// Turns the shading normal as the material's map says, unless that is out of the real surface.
 void map_normal(Surface& s, const V3f& along_u, const V3f& along_v) {
   const V3f mapped = s.material->normal_at(s.uv, s.shading_normal, along_u, along_v);
@@ -368,7 +381,11 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   const auto normal = [&](uint32_t v) {
     return moving ? object.normal_at(v, ray.time) : object.normal[v];
   };
-  s.shading_normal = normalized(normal(t.x) * w + normal(t.y) * hit.u + normal(t.z) * hit.v);
+  const V3f corner_normal[3] = {normal(t.x), normal(t.y), normal(t.z)};
+  s.shading_normal =
+      normalized(corner_normal[0] * w + corner_normal[1] * hit.u + corner_normal[2] * hit.v);
+  if (s.material->is_opaque_diffuse())
+    s.lift = lift_to_patch({a, b, c}, corner_normal, {w, hit.u, hit.v}, ray.direction, s);
   if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;

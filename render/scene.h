@@ -118,10 +118,20 @@ struct Surface {
   bool contact = false;  // of the fluid with a sheet: no air meets water here
   bool small = false;    // a sphere of foam: too small for a density of photons
 
-  /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error.
+  /// From the triangle up to the curved patch that the normals of its corners make of it, on the
+  /// side that was met, m; 0 where that is no opaque diffuse surface, or hollow. Hanika 2021,
+  /// "Hacking the Shadow Terminator".
+  V3f lift{0, 0, 0};
+  bool lifts() const { return !is_black(lift); }
+
+  /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error, and
+  /// off the patch where it leads out of this and into the triangle.
   V3f leave(const V3f& direction) const {
     const float reach = dot(absolute(geometric_normal), error);
-    return position + geometric_normal * (dot(direction, geometric_normal) > 0 ? reach : -reach);
+    const float up = dot(lift, geometric_normal), out = dot(direction, geometric_normal);
+    const bool over = up * out < 0 && up * dot(direction, shading_normal) > 0;
+    return (over ? position + lift : position) +
+           geometric_normal * ((over ? up : out) > 0 ? reach : -reach);
   }
 };
 
