@@ -333,7 +333,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
     *stats = {report.samples(), rays, picture_error(sums.beauty()),
-              process_cpu_seconds() - cpu_start};
+              process_cpu_seconds() - cpu_start, photons.empty() ? 0 : photons.radius()};
   }
   return film;
 }

@@ -207,6 +207,8 @@ class ShotStages final : public Stages {
     if (shot_.render.error > 0)
       all.emplace_back("relative_mse", fmt::format("{:.3g}", stats.relative_mse));
     all.emplace_back("photons", fmt::format("{}", shot_.render.photons));
+    if (stats.photon_radius > 0)  // the one part of a frame that is biased
+      all.emplace_back("photon_radius_m", fmt::format("{:.3g}", stats.photon_radius));
     StageReport report;
     const std::string file =
         later ? layout::noisy(shot_.name, frame) : layout::image(shot_.name, frame);
@@ -216,6 +218,7 @@ class ShotStages final : public Stages {
         {"camera_samples", stats.camera_samples},
         {"rays", stats.rays},
         {"relative_mse", stats.relative_mse},
+        {"photon_radius", stats.photon_radius},
         {"cpu_s",
          stats.cpu_s}}.dump();
     report.line = fmt::format("camera_samples={} rays={} relative_mse={:.2g}", stats.camera_samples,

@@ -276,6 +276,27 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
   EXPECT_LT(before, 0.2);
 }
 
+// Their blur is told, less with more samples; where there are none, none.
+TEST(Photons, TellTheirBlur) {
+  Shot shot = pool_shot(kIndex, 0);
+  shot.light = {sun({0.2, -1, 0.1}, 0.5)};
+  shot.render.width = shot.render.height = 64;
+  double before = 1e9;
+  for (const int samples : {4, 16, 64}) {
+    shot.render.samples = samples;
+    shot.render.photons = 1;
+    RenderStats stats;
+    render_frame(shot, 1001, {waves(), {}}, &stats);
+    EXPECT_GT(stats.photon_radius, 0);
+    EXPECT_LT(stats.photon_radius, before / 1.1) << samples;
+    before = stats.photon_radius;
+  }
+  shot.render.photons = 0;
+  RenderStats stats;
+  render_frame(shot, 1001, {waves(), {}}, &stats);
+  EXPECT_EQ(stats.photon_radius, 0);
+}
+
 // A sample finds the photons of its own eighth of the shutter; all eighths have as much light.
 TEST(Photons, AreThoseOfTheirTime) {
   constexpr int kCount = 300000;
