@@ -43,7 +43,7 @@ TEST_P(MovingBody, ThroughAPoolTakesNothingIn) {
     inside += particles_inside(shot, watch.run);
   EXPECT_EQ(inside, 0);
   Gates gates = squeezed();
-  gates.energy = gates.speed = not_gated;  // the ball's doing
+  gates.energy = gates.speed = no_rule;  // the ball's doing
   report("moving obstacle", fmt::format("ball at {} m/s", speed), watch, gates,
          fmt::format("{} particles inside; {:.1f} m/s", inside, watch.figures().max_speed));
 }
@@ -66,7 +66,7 @@ TEST_P(Plate, ThatIsThinIsTight) {
     for (const float y : watch.state().position.y) behind += y < 1;
     EXPECT_EQ(behind, 0);
     Gates gates;
-    gates.drift = not_gated;  // the plate has it
+    gates.drift = no_rule;  // the plate has it
     gates.speed = 1.6;        // as the rim of any impact
     report("thin plate", fmt::format("{} spacings, {} m/s", GetParam(), speed), watch, gates,
            fmt::format("{} behind it", behind));

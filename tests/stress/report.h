@@ -12,8 +12,9 @@ namespace drench::stress_tests {
 /// seconds.
 bool long_form();
 
-/// In place of a gate where the rule has no meaning.
-constexpr double not_gated = 1e30;
+/// In place of a gate.
+constexpr double not_gated = 1e30;  // the row still says whether the common gate holds
+constexpr double no_rule = 1e300;   // there is none, something outside acts: it says nothing
 
 /// What all stress tests are to hold. A test that must ask for less says why.
 struct Gates {
