@@ -26,15 +26,14 @@ struct ChannelCase {
 };
 class Channels : public testing::TestWithParam<ChannelCase> {};
 
-// From a lattice shaken by a quarter spacing. Measured at 10, 20 and 40 particles across, Couette:
-// 1.6, 0.5 and 0.2 % early, 0.5, 0.3 and 0.2 % late; Poiseuille: 1.7, 0.5 and 0.2 % early, 1.4, 0.8
-// and 0.5 % late.
+// From a lattice shaken by a quarter spacing. Early errors fall with the resolution, late ones do
+// not: what friction between pairs of a packing errs by is the same at any (docs/benchmarks.md).
 TEST_P(Channels, StartAsTheSeriesSays) {
   const ChannelCase c = GetParam();
   const validation::Channel channel = validation::start_up(c.flow, c.across, 0.25);
   const double most = c.across == 10 ? 0.025 : 0.02;  // Poiseuille at 10: 2.1 %, at 20: 0.4 %
   for (const double error : channel.error) EXPECT_LT(error, most);
-  EXPECT_LT(channel.error[0], 0.2 / c.across);  // first order at least
+  EXPECT_LT(channel.error[0], 0.2 / c.across);  // below a line of first order
 }
 
 INSTANTIATE_TEST_SUITE_P(
