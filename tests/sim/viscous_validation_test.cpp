@@ -27,7 +27,7 @@ struct ChannelCase {
 class Channels : public testing::TestWithParam<ChannelCase> {};
 
 // From a lattice shaken by a quarter spacing. Early errors fall with the resolution, late ones do
-// not: what friction between pairs of a packing errs by is the same at any (docs/benchmarks.md).
+// not (docs/benchmarks.md).
 TEST_P(Channels, StartAsTheSeriesSays) {
   const ChannelCase c = GetParam();
   const validation::Channel channel = validation::start_up(c.flow, c.across, 0.25);
