@@ -67,7 +67,7 @@ TEST_P(Plate, ThatIsThinIsTight) {
     EXPECT_EQ(behind, 0);
     Gates gates;
     gates.drift = no_rule;  // the plate has it
-    gates.speed = 1.6;        // as the rim of any impact
+    gates.speed = 1.6;      // as the rim of any impact
     report("thin plate", fmt::format("{} spacings, {} m/s", GetParam(), speed), watch, gates,
            fmt::format("{} behind it", behind));
   }
