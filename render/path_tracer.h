@@ -450,9 +450,10 @@ class PathTracer {
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
     if constexpr (kWater)
-      if (!surface.lifts() && dot(next.direction, surface.geometric_normal) *
-                                      dot(state.ray.direction, surface.geometric_normal) >
-                                  0)
+      if (!surface.passes_over(next.direction) &&
+          dot(next.direction, surface.geometric_normal) *
+                  dot(state.ray.direction, surface.geometric_normal) >
+              0)
         state.in &= ~scene_.fluid();
     depart(state, surface, next.direction);
     state.throughput *= next.weight;

@@ -124,14 +124,19 @@ struct Surface {
   V3f lift{0, 0, 0};
   bool lifts() const { return !is_black(lift); }
 
-  /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error, and
-  /// off the patch where it leads out of this and into the triangle.
+  /// Whether a direction leads out of the patch and into the triangle.
+  bool passes_over(const V3f& direction) const {
+    const float up = dot(lift, geometric_normal);
+    return up * dot(direction, geometric_normal) < 0 && up * dot(direction, shading_normal) > 0;
+  }
+
+  /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error, off
+  /// the patch where it passes over the triangle.
   V3f leave(const V3f& direction) const {
     const float reach = dot(absolute(geometric_normal), error);
-    const float up = dot(lift, geometric_normal), out = dot(direction, geometric_normal);
-    const bool over = up * out < 0 && up * dot(direction, shading_normal) > 0;
-    return (over ? position + lift : position) +
-           geometric_normal * ((over ? up : out) > 0 ? reach : -reach);
+    const bool over = passes_over(direction);
+    const float out = dot(over ? lift : direction, geometric_normal);
+    return (over ? position + lift : position) + geometric_normal * (out > 0 ? reach : -reach);
   }
 };
 
