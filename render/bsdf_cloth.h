@@ -71,7 +71,7 @@ class ClothBsdf {
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
     out.pdf = cos / kPi * probability;
     const V3f& share = reflect ? reflectance_ : transmittance_;
-    out.weight = share / probability;
+    out.weight = share * (1 / probability);
     return out;
   }
 

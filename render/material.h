@@ -45,6 +45,8 @@ struct ShadingMaterial {
     return type == MaterialType::metal || type == MaterialType::coated || alpha > 0;
   }
   /// Whether light meets more than a diffuse sheet where it is dry.
+  /// Whether it ends light where its smooth normals say (Surface::lift). Mapped ones say other
+  /// things.
   bool is_opaque_diffuse() const {
     return (type == MaterialType::diffuse || type == MaterialType::cloth) &&
            is_black(transmittance) && !normal_map;

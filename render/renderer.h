@@ -51,8 +51,8 @@ struct RenderStats {
   uint64_t camera_samples = 0, rays = 0;
   double relative_mse = 0;  // of the frame, as its samples tell; 0 with fewer than 16 a pixel
   double cpu_s = 0;         // of the whole process during the call
-  double photon_radius =
-      0;  // m: photons blur caustics by that at most; 0: all is right in the mean
+  /// m: photons blur caustics by that at most; 0: all is right in the mean.
+  double photon_radius = 0;
 };
 
 /// Path-traces one frame. The same bits for any thread count and tile order.

@@ -324,7 +324,8 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
 }
 
-/// Surface::lift. Normals of corners that lean farther than 45 degrees are those of edges.
+/// Surface::lift. Normals of corners that lean farther than 45 degrees are those of edges; what is
+/// no more than rounding is that of a flat or hollow surface.
 V3f lift_to_patch(const V3f (&corner)[3], const V3f (&normal)[3], const float (&weight)[3],
                   const V3f& from, const Surface& s) {
   const float side = dot(from, s.geometric_normal) > 0 ? -1.f : 1.f;
@@ -334,7 +335,8 @@ V3f lift_to_patch(const V3f (&corner)[3], const V3f (&normal)[3], const float (&
     if (!(dot(n, s.geometric_normal) * side > 0.7f)) return V3f(0);
     lift -= n * (weight[k] * std::min(dot(s.position - corner[k], n), 0.f));
   }
-  return lift;
+  const float rounding = dot(absolute(s.geometric_normal), s.error);
+  return dot(lift, s.geometric_normal) * side > rounding ? lift : V3f(0);
 }
 
 /// Turns the shading normal as the material's map says, unless that is out of the real surface.
