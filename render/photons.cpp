@@ -27,12 +27,16 @@ enum PhotonDimension : uint32_t {
 constexpr int kMostInterfaces = 64, kLongFlight = 8;
 constexpr float kLongSurvival = 0.8f;
 constexpr int kMostMet = 1 << 12;   // contact faces and gaps that it passes one after the other
-constexpr float kMostGain = 2;      // of flux, by a smooth normal in place of the real one
+constexpr float kMostPower = 2;     // of one that falls straight on a body, where discs hold few
+constexpr double kDotShare = 0.1;   // of a disc's light that one may bring where they hold many
 constexpr float kCrowd = 4;         // times the photons of the median one's disc
 constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
 constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
 constexpr double kHand = 4;         // photons of the median one's disc in a hand, at least
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
+
+/// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
+double wanted_count(size_t photons) { return 20 * std::sqrt(double(photons) / 1e5); }
 
 /// The smooth bodies' triangles by area; those on sheets let light pass and start none.
 class InterfacePoints {
@@ -100,12 +104,16 @@ struct Flight {
   Bodies in = 0;
   int interfaces = 0;
   uint32_t sheets = 0;  // with gaps, that it met
+  float most_gain = 0;  // of flux, that smooth normals in place of the real ones may still add
 };
 
 class PhotonTracer {
  public:
   PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count)
-      : scene_(scene), starts_(starts), count_(count) {}
+      : scene_(scene),
+        starts_(starts),
+        count_(count),
+        most_power_(std::max(kMostPower, float(kDotShare * wanted_count(count)))) {}
 
   /// A photon, if it starts and comes to lie on something. In their order they start along the
   /// bodies' surface: an even spread, and neighbours in memory one after the other.
@@ -149,6 +157,7 @@ class PhotonTracer {
         {surface.leave(light.direction), light.direction, flight.ray.time}, light.distance);
     if (share == 0) return false;
     flight.ray.direction = -light.direction;
+    flight.most_gain = most_power_ / facing;
     flight.power = light.radiance *
                    (share * facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
     return true;
@@ -184,13 +193,14 @@ class PhotonTracer {
     bool reflect = reflects();
     V3f out = reflect ? split.reflected : split.refracted;
     float gain = std::abs(dot(out, flat) * dot(d, normal) / (dot(d, flat) * dot(out, normal)));
-    if (!(gain < kMostGain)) {  // along the real surface: one photon would be a white dot
+    if (!(gain < flight.most_gain)) {  // along the real surface: it would be a white dot
       split = split_at_interface(d, flat, eta);
       reflect = reflects();
       out = reflect ? split.reflected : split.refracted;
       gain = 1;
     }
     flight.power *= gain;
+    flight.most_gain /= gain;
     if (flight.interfaces > kLongFlight) {
       if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
       flight.power *= 1 / kLongSurvival;
@@ -238,6 +248,7 @@ class PhotonTracer {
   const Scene& scene_;
   const InterfacePoints& starts_;
   uint32_t count_;
+  float most_power_;
 };
 
 uint64_t key_of(const Imath::V3i& cell) {
@@ -265,9 +276,6 @@ double typical_count(const std::vector<Photon>& photons, float edge) {
     if ((seen += count) * 2 >= key.size()) return count;
   return 1;
 }
-
-/// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
-double wanted_count(size_t photons) { return 20 * std::sqrt(double(photons) / 1e5); }
 
 float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& bounds) {
   const double wanted = wanted_count(photons.size());
