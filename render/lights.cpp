@@ -255,22 +255,80 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
   return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
 }
 
+std::pair<size_t, float> Lights::choose_first(size_t count, const V3f& from, float u_light) const {
+  if (count < 2) return {0, float(count)};
+  float total = 0;
+  for (size_t k = 0; k < count; ++k) total += importance(k, from);
+  if (!(total > 0)) return {0, 0.f};
+  size_t chosen = 0;
+  float weight = importance(0, from), target = u_light * total;
+  while (target >= weight && chosen + 1 < count) {
+    target -= weight;
+    weight = importance(++chosen, from);
+  }
+  return {chosen, weight / total};
+}
+
+LampPoint Lights::aim_at(size_t lamp, const V3f& from) const {
+  if (lamp >= shapes_.size()) {
+    const SunLight& sun = suns_[lamp - shapes_.size()];
+    const float density = 1 / (2 * kPi * sun.one_minus_cos);
+    return {sun.toward, -sun.toward, sun.radiance, density, std::sqrt(sun.sin2), true, lamp};
+  }
+  const ShapeLight& shape = shapes_[lamp];
+  LampPoint out{shape.center, shape.normal, shape.radiance, 1 / shape.area, shape.radius,
+                false,        lamp};
+  if (shape.type == LightType::sphere) {
+    out.normal = normalized(from - shape.center);
+    out.density = 1 / (kPi * shape.radius * shape.radius);
+  } else if (shape.type == LightType::rectangle) {
+    out.extent = std::sqrt(std::max(dot(shape.u, shape.u), dot(shape.v, shape.v)));
+  }
+  return out;
+}
+
+LampPoint Lights::sample_lamp_point(const V3f& from, float u_light, const V2f& u) const {
+  const auto [lamp, probability] = choose_first(lamps(), from, u_light);
+  if (!(probability > 0 && importance(lamp, from) > 0)) return {};
+  LampPoint out = aim_at(lamp, from);
+  out.density *= probability;
+  if (lamp >= shapes_.size()) {
+    out.at = Basis(out.at).world(sample_cone(u, suns_[lamp - shapes_.size()].one_minus_cos));
+    out.normal = -out.at;
+    return out;
+  }
+  const ShapeLight& shape = shapes_[lamp];
+  if (shape.type == LightType::rectangle) {
+    out.at += shape.u * (2 * u.x - 1) + shape.v * (2 * u.y - 1);
+  } else {
+    const Basis plane(out.normal);
+    const V2f d = sample_disc(u) * shape.radius;
+    out.at += plane.tangent * d.x + plane.bitangent * d.y;
+  }
+  return out;
+}
+
+LampPoint Lights::lamp_point_of(size_t lamp, const V3f& from, const V3f& origin,
+                                const V3f& direction) const {
+  if (!(importance(lamp, from) > 0)) return {};
+  LampPoint out = aim_at(lamp, from);
+  if (out.sun) {
+    out.at = direction, out.normal = -direction;
+    return out;
+  }
+  const float facing = dot(direction, out.normal);
+  if (!(facing < 0)) return {};
+  const V3f at = origin + direction * (dot(out.at - origin, out.normal) / facing);
+  const V3f off = at - out.at;
+  if (shapes_[lamp].type == LightType::sphere && dot(off, off) > out.extent * out.extent) return {};
+  out.at = at;
+  return out;
+}
+
 LightSample Lights::sample_first(size_t count, const V3f& from, float time, float u_light,
                                  const V2f& u) const {
-  if (count == 0) return {};
-  size_t chosen = 0;
-  float probability = 1;
-  if (count > 1) {
-    float total = 0;
-    for (size_t k = 0; k < count; ++k) total += importance(k, from);
-    if (!(total > 0)) return {};
-    float weight = importance(0, from), target = u_light * total;
-    while (target >= weight && chosen + 1 < count) {
-      target -= weight;
-      weight = importance(++chosen, from);
-    }
-    probability = weight / total;
-  }
+  const auto [chosen, probability] = choose_first(count, from, u_light);
+  if (!(probability > 0)) return {};
   LightSample out;
   if (chosen < shapes_.size()) {
     out = shapes_[chosen].sample(from, u);
@@ -288,6 +346,7 @@ LightSample Lights::sample_first(size_t count, const V3f& from, float time, floa
     out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf, environment_group_};
   }
   out.pdf *= probability;
+  if (chosen < lamps()) out.lamp = int(chosen);
   return out;
 }
 

@@ -75,6 +75,12 @@ class Lights {
     return sample_first(lamps(), from, 0, u_light, u);
   }
 
+  /// Draws a lamp, then a point of it.
+  LampPoint sample_lamp_point(const V3f& from, float u_light, const V2f& u) const;
+  /// The point of a lamp that a ray aims at which ends on it.
+  LampPoint lamp_point_of(size_t lamp, const V3f& from, const V3f& origin,
+                          const V3f& direction) const;
+
   /// Radiance of a hit shape light, and the density with which `sample` finds it from `from`.
   V3f shape_radiance(int light) const { return shapes_[light].radiance; }
   float shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const;
@@ -127,6 +133,9 @@ class Lights {
  private:
   uint32_t group_of(const Light& light);
   uint32_t group_named(const std::string& name);
+  /// Of the first `count`. @return its number and the probability, 0 for none
+  std::pair<size_t, float> choose_first(size_t count, const V3f& from, float u_light) const;
+  LampPoint aim_at(size_t lamp, const V3f& from) const;
   LightSample sample_first(size_t count, const V3f& from, float time, float u_light,
                            const V2f& u) const;
   size_t environment_index() const { return lamps() + meshes_.size(); }

@@ -27,6 +27,13 @@ enum class WaterGuide {
   off,
 };
 
+/// Whether lamps are looked for through water from where they shine on (manifold.h).
+enum class Walks {
+  none,
+  some,
+  if_calm,  // if walks find most of what photons bring
+};
+
 /// What render.denoise makes of a frame.
 enum class Denoised {
   alone,  // smooth, by this frame only
@@ -47,6 +54,7 @@ struct RenderOptions {
   EnvironmentSampling environment = EnvironmentSampling::automatic;
   FirstInterface first_interface = FirstInterface::both;
   WaterGuide water_guide = WaterGuide::on;
+  Walks walks = Walks::if_calm;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
   FrameCheckpoint checkpoint{};

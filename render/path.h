@@ -49,7 +49,8 @@ struct PathSettings {
   Bodies camera_in = 0;
   Background background = Background::sky;
   RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
-  const PhotonMap* photons = nullptr;  // with it, paths leave out what it holds
+  const PhotonMap* photons = nullptr;  // with it, paths leave out what lamps send through bodies
+  Walks walks = Walks::none;           // which find what the photons leave out
 };
 
 /// A camera sample to trace.

@@ -16,6 +16,7 @@
 #include "render/bsdf_rough.h"
 #include "render/fabric.h"
 #include "render/guide.h"
+#include "render/manifold.h"
 #include "render/path_film.h"
 
 namespace drench {
@@ -498,8 +499,20 @@ class PathTracer {
                                        [&](const V3f& flight, const V3f& power, float share) {
                                          bsdf.receive(light, -flight, power * share);
                                        });
-    film_.deposit(state.throughput * bsdf.radiance(light) * (1 / gathers),
-                  scene_.lights().caustics_group());
+    V3f found = bsdf.radiance(light);
+    if (settings_.walks == Walks::some) found += walked_light(state, surface, u, bsdf);
+    film_.deposit(state.throughput * found * (1 / gathers), scene_.lights().caustics_group());
+  }
+
+  /// What comes from a lamp by the way that a walk finds.
+  template <class Bsdf>
+  V3f walked_light(const PathState& state, const Surface& surface, const VertexNumbers& u,
+                   const Bsdf& bsdf) {
+    const auto light = walk_to_lamps(scene_, surface, state.ray, state.in, u[kLightChoice].x,
+                                     u[kLightPoint], rays_);
+    float pdf = 0;
+    const V3f found = light ? bsdf.value(light->direction, pdf) * light->radiance : V3f(0);
+    return finite(found) ? found : V3f(0);
   }
 
   /// Light from a sampled light by way of each lobe. @param beyond  bodies that the surface's other

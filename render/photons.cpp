@@ -7,6 +7,7 @@
 
 #include "render/bsdf_dielectric.h"
 #include "render/embree.h"
+#include "render/manifold.h"
 #include "render/sampler.h"
 
 namespace drench {
@@ -33,6 +34,9 @@ constexpr float kCrowd = 4;         // times the photons of the median one's dis
 constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
 constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
 constexpr double kHand = 4;         // photons of the median one's disc in a hand, at least
+// Share of the light that walks must find. Each costs a path three rays or more, and where much is
+// left to photons it is they that picture and error are made by.
+constexpr double kCalm = 0.8;
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
@@ -104,39 +108,46 @@ struct Flight {
   Bodies in = 0;
   int interfaces = 0;
   uint32_t sheets = 0;  // with gaps, that it met
+  int lamp = 0;
+  V3f start, lit_from;  // where it met the body, and from which direction
   float most_gain = 0;  // of flux, that smooth normals in place of the real ones may still add
 };
 
 class PhotonTracer {
  public:
-  PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count)
+  PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count, Walks walks)
       : scene_(scene),
         starts_(starts),
         count_(count),
+        walks_(walks),
         most_power_(std::max(kMostPower, float(kDotShare * wanted_count(count)))) {}
 
-  /// A photon, if it starts and comes to lie on something. In their order they start along the
-  /// bodies' surface: an even spread, and neighbours in memory one after the other.
+  enum class Fate { lost, lies, walked };
+
+  /// A photon, if it starts and comes to lie on something, and whether a walk finds its way. In
+  /// their order they start along the bodies' surface: an even spread, and neighbours in memory one
+  /// after the other.
   /// @param from  triangle of the photon before, or one before that of this
-  bool trace(uint32_t number, const Sampler& sampler, size_t& from, Photon& photon,
+  Fate trace(uint32_t number, const Sampler& sampler, size_t& from, Photon& photon,
              uint64_t& rays) const {
     Flight flight;
     Surface surface;
-    if (!start(number, sampler, from, flight, surface, rays)) return false;
+    if (!start(number, sampler, from, flight, surface, rays)) return Fate::lost;
     while (cross_interface(sampler, flight, surface)) {
       const Hit hit = next(sampler, flight, surface, rays);
-      if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return false;
+      if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return Fate::lost;
       if (surface.body) continue;
       // Paths bring foam and metal what they get.
-      if (surface.small || surface.material->type == MaterialType::metal) return false;
+      if (surface.small || surface.material->type == MaterialType::metal) return Fate::lost;
       const float n = scene_.medium(flight.in).ior;
       // Those that fell through gaps are missing on the yarns, which get what others do.
       const float yarns = 1 - surface.material->gap;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
                 flight.power * (1 / (n * n * yarns)), sampler.one(kTime)};
-      return finite(photon.power);
+      if (!finite(photon.power)) return Fate::lost;
+      return is_walked(flight, surface, rays) ? Fate::walked : Fate::lies;
     }
-    return false;
+    return Fate::lost;
   }
 
  private:
@@ -158,9 +169,19 @@ class PhotonTracer {
     if (share == 0) return false;
     flight.ray.direction = -light.direction;
     flight.most_gain = most_power_ / facing;
+    flight.lamp = light.lamp, flight.start = surface.position, flight.lit_from = light.direction;
     flight.power = light.radiance *
                    (share * facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
     return true;
+  }
+
+  bool is_walked(const Flight& flight, const Surface& surface, uint64_t& rays) const {
+    if (walks_ == Walks::none || flight.interfaces > 1 || flight.sheets > 0) return false;
+    if (!std::has_single_bit(flight.in)) return false;
+    const LampPoint lamp = scene_.lights().lamp_point_of(size_t(flight.lamp), surface.position,
+                                                         flight.start, flight.lit_from);
+    return walk_finds(scene_, surface, flight.ray.time, flight.in, lamp, flight.ray.direction,
+                      rays);
   }
 
   /// Reflects or refracts at a body's surface. Snell's law keeps n^2 cos dw about the normal
@@ -248,6 +269,7 @@ class PhotonTracer {
   const Scene& scene_;
   const InterfacePoints& starts_;
   uint32_t count_;
+  Walks walks_;
   float most_power_;
 };
 
@@ -365,13 +387,17 @@ bool can_trace_photons(const Scene& scene) {
   return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
-PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
-                        uint64_t& rays) {
+Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
+                       uint64_t& rays) {
   constexpr uint32_t chunk = 4096;
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
-  const PhotonTracer tracer(scene, starts, count);
-  std::vector<std::vector<Photon>> found((count + chunk - 1) / chunk);
+  const PhotonTracer tracer(scene, starts, count, walks);
+  struct Found {
+    Photon photon;
+    bool walked;
+  };
+  std::vector<std::vector<Found>> found((count + chunk - 1) / chunk);
   std::atomic<uint64_t> traced{0};
   tbb::parallel_for(size_t{0}, found.size(), [&](size_t c) {
     const FlushDenormals flush;
@@ -380,14 +406,31 @@ PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int s
     for (uint32_t k = uint32_t(c) * chunk; k < std::min(count, (uint32_t(c) + 1) * chunk); ++k) {
       const Sampler sampler(PixelOrder::separate, seed ^ kSeed, 0, 0, 0, k);
       Photon photon;
-      if (tracer.trace(k, sampler, from, photon, chunk_rays)) found[c].push_back(photon);
+      const PhotonTracer::Fate fate = tracer.trace(k, sampler, from, photon, chunk_rays);
+      if (fate != PhotonTracer::Fate::lost)
+        found[c].push_back({photon, fate == PhotonTracer::Fate::walked});
     }
     traced += chunk_rays;
   });
   rays += traced;
-  std::vector<Photon> all;
-  for (const std::vector<Photon>& part : found) all.insert(all.end(), part.begin(), part.end());
-  return PhotonMap(std::move(all), samples);
+  double light = 0, walked = 0;
+  for (const std::vector<Found>& part : found)
+    for (const Found& f : part) {
+      const V3f& power = f.photon.power;
+      const double sum = double(power.x) + double(power.y) + double(power.z);
+      light += sum;
+      if (f.walked) walked += sum;
+    }
+  Caustics out;
+  if (light > 0) out.walked = float(walked / light);
+  if (walks == Walks::if_calm) walks = out.walked > kCalm ? Walks::some : Walks::none;
+  out.walks = walks;
+  std::vector<Photon> left;
+  for (const std::vector<Found>& part : found)
+    for (const Found& f : part)
+      if (walks == Walks::none || !f.walked) left.push_back(f.photon);
+  out.photons = PhotonMap(std::move(left), samples);
+  return out;
 }
 
 }  // namespace drench

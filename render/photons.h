@@ -174,11 +174,20 @@ class PhotonMap {
 /// of them in a body.
 bool can_trace_photons(const Scene& scene);
 
+/// The light of lamps that comes through bodies: photons, and walks (manifold.h) for what these
+/// leave out.
+struct Caustics {
+  PhotonMap photons;
+  Walks walks = Walks::none;
+  float walked = 0;  // share of the light that walks find, if they were tried
+};
+
 /// The same bits for any thread count.
 /// @param count    photons that start
 /// @param samples  of a pixel
+/// @param walks    which are tried
 /// @param rays     counts rays traced
-PhotonMap trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
-                        uint64_t& rays);
+Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
+                       uint64_t& rays);
 
 }  // namespace drench

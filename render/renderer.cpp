@@ -303,11 +303,12 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
   uint64_t photon_rays = 0;
-  PhotonMap photons;
+  Caustics caustics;
   if (shot.render.photons > 0 && can_trace_photons(scene)) {
-    photons =
-        trace_photons(scene, seed, photon_count(shot.render), shot.render.samples, photon_rays);
-    path.photons = &photons;
+    caustics = trace_photons(scene, seed, photon_count(shot.render), shot.render.samples,
+                             options.walks, photon_rays);
+    path.photons = &caustics.photons;
+    path.walks = caustics.walks;
   }
   const FilmWindow window = window_of(shot.render);
   const bool whole = window.frame_width == 0;
@@ -332,8 +333,12 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
-    *stats = {report.samples(), rays, picture_error(sums.beauty()),
-              process_cpu_seconds() - cpu_start, photons.empty() ? 0 : photons.radius()};
+    *stats = {report.samples(),
+              rays,
+              picture_error(sums.beauty()),
+              process_cpu_seconds() - cpu_start,
+              caustics.photons.empty() ? 0 : caustics.photons.radius(),
+              caustics.walked};
   }
   return film;
 }

@@ -53,6 +53,7 @@ struct RenderStats {
   double cpu_s = 0;         // of the whole process during the call
   /// m: photons blur caustics by that at most; 0: all is right in the mean.
   double photon_radius = 0;
+  double walked = 0;  // share of photons' light that walks (manifold.h) would find
 };
 
 /// Path-traces one frame. The same bits for any thread count and tile order.

@@ -356,7 +356,7 @@ struct RenderSettings {
   bool motion_blur = true;
   Background background = Background::sky;
   RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
-  double photons = 0.05;  // of caustics, for each camera sample; 0: caustics by paths alone
+  double photons = 0.2;  // of caustics, for each camera sample; 0: caustics by paths alone
   uint32_t seed = 1;
 };
 

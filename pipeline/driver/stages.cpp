@@ -219,6 +219,7 @@ class ShotStages final : public Stages {
         {"rays", stats.rays},
         {"relative_mse", stats.relative_mse},
         {"photon_radius", stats.photon_radius},
+        {"walked", stats.walked},
         {"cpu_s",
          stats.cpu_s}}.dump();
     report.line = fmt::format("camera_samples={} rays={} relative_mse={:.2g}", stats.camera_samples,

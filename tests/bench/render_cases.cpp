@@ -51,13 +51,13 @@ struct Sampled {
   double light = 0;  // over that of the reference
 };
 
-Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples,
-               const Film& reference) {
+Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples, const Film& reference,
+               const RenderOptions& options = {}) {
   constexpr int kSeeds = 5;
   Sampled out;
   std::vector<Render> renders;
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    renders.push_back(render(shot, geometry, samples, uint32_t(seed)));
+    renders.push_back(render(shot, geometry, samples, uint32_t(seed), options));
     out.error += relative_mse(renders.back().film, reference) / kSeeds;
     out.light += light_of(renders.back().film) / light_of(reference) / kSeeds;
   }
@@ -154,20 +154,25 @@ void render_caustics(const Emit& emit) {
   paths.render.photons = 0;
   const FrameGeometry geometry{wavy_pool(), {}};
   const Film reference = render(paths, geometry, kReferenceSamples, 1000).film;
+  RenderOptions none;
+  none.walks = Walks::none;
+  const std::tuple<const char*, const Shot*, RenderOptions> ways[] = {
+      {"paths", &paths, {}}, {"photons", &photons, none}, {"photons and walks", &photons, {}}};
   for (const int samples : {4, 16, 64, 256}) {
     double efficiency = 0;
-    for (const Shot* shot : {&paths, &photons}) {
-      const Sampled sampled = sample(*shot, geometry, samples, reference);
+    for (const auto& [name, shot, options] : ways) {
+      const Sampled sampled = sample(*shot, geometry, samples, reference, options);
       Line line = line_of(sampled);
-      line.method = shot == &paths ? "pool, small lamp, paths" : "pool, small lamp, photons";
+      line.method = std::string("pool, small lamp, ") + name;
       const double here = 1 / (sampled.error * sampled.median.cost.cpu_s);
       line.more["rel_mse"] = sampled.error;
+      line.more["light"] = sampled.light;
       if (shot == &paths) {
         efficiency = here;
       } else {
         line.more["gain"] = here / efficiency;
         line.error = efficiency / here, line.gate = 1;
-        line.error_of = "efficiency of paths over that of photons";
+        line.error_of = "efficiency of paths over that of " + std::string(name);
       }
       emit(line);
     }
@@ -175,8 +180,60 @@ void render_caustics(const Emit& emit) {
 }
 
 const Registration render_caustics_case{
-    "render_caustics", "a pool with a small lamp: error and time with photons and without",
+    "render_caustics", "a pool with a small lamp: error and time by paths, photons and walks",
     render_caustics};
+
+/// Relative MSE by two references of paths alone, so that their noise adds nothing.
+double error_beside(const Film& film, const Film& a, const Film& b) {
+  double sum = 0;
+  for (size_t k = 0; k < film.rgba.size(); ++k) {
+    if (k % 4 == 3) continue;
+    const double r = 0.5 * (double(a.rgba[k]) + double(b.rgba[k]));
+    sum += (double(film.rgba[k]) - a.rgba[k]) * (double(film.rgba[k]) - b.rgba[k]) / (r * r + 0.01);
+  }
+  return sum / (0.75 * double(film.rgba.size()));
+}
+
+/// What waves of a height leave to photons, and whether the renderer's choice errs less in its
+/// time.
+void render_walks(const Emit& emit) {
+  constexpr int kReference = 6400, kSamples = 64, kSeeds = 4;
+  const Shot shot = pool_shot();
+  Shot paths = shot;
+  paths.render.photons = 0;
+  for (const float waves : {0.f, 1.f, 2.f, 4.f}) {
+    const FrameGeometry geometry{wavy_pool(128, waves), {}};
+    const Film a = render(paths, geometry, kReference, 1000).film,
+               b = render(paths, geometry, kReference, 1001).film;
+    double least = 1e30;  // relative MSE x CPU s
+    for (const auto& [name, walks] : {std::pair{"photons", Walks::none},
+                                      {"photons and walks", Walks::some},
+                                      {"what is chosen", Walks::if_calm}}) {
+      RenderOptions options;
+      options.walks = walks;
+      double error = 0, cpu_s = 0;
+      Render last;
+      for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
+        last = render(shot, geometry, kSamples, seed, options);
+        error += error_beside(last.film, a, b) / kSeeds, cpu_s += last.cost.cpu_s / kSeeds;
+      }
+      Line line = line_of({error, last});
+      line.method = fmt::format("pool, waves of {:.2f} m, {}", 0.03 * double(waves), name);
+      line.more["rel_mse"] = error, line.more["cpu_s"] = cpu_s;
+      line.more["walked"] = last.stats.walked;
+      if (walks == Walks::if_calm) {
+        line.error = error * cpu_s / least, line.gate = 1.15;
+        line.error_of = "error x time over that of the better";
+      }
+      least = std::min(least, error * cpu_s);
+      emit(line);
+    }
+  }
+}
+
+const Registration render_walks_case{
+    "render_walks", "pools of four heights of waves: error and time with walks and without",
+    render_walks};
 
 /// Larger than the others: what lies between edges is what a denoiser lives on.
 Shot larger(Shot shot) {

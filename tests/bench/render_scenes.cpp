@@ -44,14 +44,14 @@ Shot cloth_shot() {
   return shot;
 }
 
-TriangleMesh wavy_pool(uint32_t n) {
+TriangleMesh wavy_pool(uint32_t n, float waves) {
   const uint32_t row = n + 1, below = row * row;
   TriangleMesh mesh;
   for (const bool top : {true, false})
     for (uint32_t j = 0; j <= n; ++j)
       for (uint32_t i = 0; i <= n; ++i) {
         const float x = -2 + 4 * float(i) / n, z = -2 + 4 * float(j) / n;
-        const float wave = 0.03f * (std::sin(7 * x + 2 * z) + std::sin(5 * z - 3 * x));
+        const float wave = 0.03f * waves * (std::sin(7 * x + 2 * z) + std::sin(5 * z - 3 * x));
         mesh.position.push_back({x, top ? 0.35f + wave : -0.1f, z});
         mesh.velocity.push_back({0, 0, 0});
       }
@@ -127,12 +127,13 @@ Shot spray_shot() {
   return shot;
 }
 
-Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed) {
+Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed,
+              const RenderOptions& options) {
   shot.render.samples = samples;
   shot.render.seed = seed;
   Render out;
-  out.cost =
-      measure([&] { out.film = render_frame(shot, shot.timeline.first, geometry, &out.stats); });
+  out.cost = measure(
+      [&] { out.film = render_frame(shot, shot.timeline.first, geometry, options, &out.stats); });
   return out;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 // Pictures that the renderer's cases are measured on.
 
-#include "render/renderer.h"
+#include "render/options.h"
 #include "tests/bench/bench.h"
 
 namespace drench::bench {
@@ -14,7 +14,8 @@ TriangleMesh pleated_sheet(uint32_t cells = 64);
 Shot cloth_shot();
 /// A closed slab of water of 4 m whose top waves, its floor below the ground, of 4 n (n + 2)
 /// triangles.
-TriangleMesh wavy_pool(uint32_t n = 128);
+/// @param waves  how high, over waves of 0.03 m
+TriangleMesh wavy_pool(uint32_t n = 128, float waves = 1);
 /// The slab under a lamp of 0.1 m.
 Shot pool_shot();
 
@@ -28,7 +29,8 @@ struct Render {
   RenderStats stats;
   Measured cost;
 };
-Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed);
+Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed,
+              const RenderOptions& options = {});
 
 /// mean((x - r)^2 / (r^2 + 0.01)) over pixels and channels.
 double relative_mse(const Film& film, const Film& reference);

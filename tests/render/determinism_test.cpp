@@ -57,6 +57,18 @@ TEST(RenderedBits, AreTheSameForAnyNumberOfThreads) {
   for (int threads : {2, 16}) EXPECT_EQ(on_threads(threads, scene).rgba, one.rgba) << threads;
 }
 
+TEST(RenderedBits, OfLampsSeenThroughCalmWaterAreTheSameForAnyNumberOfThreads) {
+  Everything scene;
+  scene.shot.render.photons = 1;
+  scene.geometry.cloth.clear();
+  scene.geometry.fluid = box_mesh({-3, -0.1f, -3}, {3, 0.4f, 3});
+  RenderStats stats;
+  render_frame(scene.shot, 1001, scene.geometry, &stats);
+  ASSERT_GT(stats.walked, 0.82);  // so that walks are chosen: a fifth may be left
+  const Film one = on_threads(1, scene);
+  for (int threads : {2, 16}) EXPECT_EQ(on_threads(threads, scene).rgba, one.rgba) << threads;
+}
+
 /// With every light and every feature of the camera.
 struct EveryLightAndLens : Everything {
   TemporaryFolder folder;

@@ -50,7 +50,7 @@ PhotonMap photons_of(const Shot& shot, const TriangleMesh& fluid, uint32_t count
                      uint32_t seed = 1) {
   const Scene scene(shot, 1001, {fluid, {}}, {});
   uint64_t rays = 0;
-  PhotonMap map = trace_photons(scene, seed, count, 64, rays);
+  PhotonMap map = trace_photons(scene, seed, count, 64, Walks::none, rays).photons;
   EXPECT_GT(rays, count / 8);
   return map;
 }

@@ -226,14 +226,20 @@ inline double relative_mse(const Film& film, const Film& reference) {
   return sum * 4 / double(film.rgba.size());
 }
 
-/// Photons and paths alone give one mean. Half a percent is for the blur at the rims.
+/// Photons and paths alone give one mean, with walks and without. Half a percent is for the blur at
+/// the rims.
 inline void expect_photons_as_paths(Shot shot, const FrameGeometry& geometry) {
   const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
-  shot.render.photons = 6;
-  const Mean photons = mean_over_seeds(shot, geometry, {}, 16);
   EXPECT_LT(paths.error, 0.01 * paths.value);
-  EXPECT_NEAR(photons.value, paths.value,
-              4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value);
+  shot.render.photons = 6;
+  for (const Walks walks : {Walks::none, Walks::some}) {
+    RenderOptions options;
+    options.walks = walks;
+    const Mean photons = mean_over_seeds(shot, geometry, options, 16);
+    EXPECT_NEAR(photons.value, paths.value,
+                4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value)
+        << (walks == Walks::some ? "with walks" : "without");
+  }
 }
 
 /// Light sampling, surface sampling and both give one mean, and know it well enough to say so.
