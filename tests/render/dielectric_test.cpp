@@ -4,9 +4,11 @@
 
 #include <random>
 
+#include "render/bsdf_cloth.h"
 #include "render/guide.h"
 #include "render/kept_parts.h"
 #include "render/scene.h"
+#include "tests/render/chi_square.h"
 #include "tests/render/closed_body.h"
 #include "tests/render/support.h"
 
@@ -307,6 +309,50 @@ TEST(WaterGuide, HasTheDensityItClaims) {
   EXPECT_NEAR(drawn, integral, 3e-3);
   EXPECT_GT(drawn, 0.9);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean_drawn[c], mean[c], 3e-3);
+}
+
+// What a surface under water draws: a diffuse direction, or one aimed at the lamp.
+TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
+  KeptParts parts;
+  const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6), sky(0.5f)},
+                      Lights::SampleEnvironment::automatic, parts);
+  const RefractedLightGuide guide(lights, float(kIndex));
+  const V3f point(0.1f, 0, 0), up(0, 1, 0);
+  const ClothBsdf floor({0, 1, 0}, up, up, V3f(0.5f), V3f(0));
+  const float share = guide.share(point);
+  ASSERT_GT(share, 0.2);
+  ASSERT_LT(share, 0.9);
+  const auto number = [](std::mt19937& random) {
+    return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random);
+  };
+  const ChiSquare fit = chi_square(
+      7,
+      [&](std::mt19937& random) {
+        const float u = number(random), v = number(random), w = number(random);
+        return sample_mixed(floor, guide, share, point, u, {v, w});
+      },
+      [&](const V3f& d) {
+        float pdf = 0;
+        floor.value(d, pdf);
+        return pdf > 0 ? double(share * guide.pdf(point, d) + (1 - share) * pdf) : 0.;
+      });
+  EXPECT_GT(fit.p_value, 0.01);
+  // The guide's density grows without bound at the critical angle.
+  EXPECT_NEAR(fit.integral, fit.drawn, 0.005);
+}
+
+TEST(WaterMesh, AloneIsTracedWithoutGaps) {
+  Shot shot = plain_shot(1);
+  shot.material = {dielectric("water", kIndex), diffuse("cotton", 0.5f)};
+  shot.fluid.material = "water";
+  const TriangleMesh sheet = sheet_mesh(2, [](float, float) { return 3.f; });
+  const Scene scene(shot, 1001, {sphere_mesh(2), {{"cloth", sheet}}}, {});
+  ASSERT_EQ(scene.object_count(), 2u);
+  for (uint32_t k = 0; k < 2; ++k) {
+    const SceneObject& object = scene.object(k);
+    const bool robust = rtcGetSceneFlags(object.scene.get()) & RTC_SCENE_FLAG_ROBUST;
+    EXPECT_EQ(robust, object.body != 0) << object.name;
+  }
 }
 
 TEST(WaterMesh, LosesNoRayThroughItsEdges) {

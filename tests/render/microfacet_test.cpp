@@ -161,6 +161,30 @@ TEST(Coated, DrawsWithTheDensityItStates) {
     }
 }
 
+// About normals bent off the real surface, from any side.
+TEST(Facets, DrawWithTheDensityTheyStateAboutBentNormals) {
+  constexpr int kFrames = 5;
+  constexpr float kAlpha = 0.3f;
+  const AlbedoTable glass = AlbedoTable::dielectric(kAlpha, 1.5f),
+                    mirrors = AlbedoTable::mirrors(kAlpha);
+  uint32_t seed = 400;
+  Tilted t;
+  const auto check = [&](const auto& bsdf, const char* name) {
+    const ChiSquare fit = chi_square(
+        ++seed, [&](std::mt19937& random) { return sample(bsdf, numbers({random})); },
+        [&](const V3f& d) { return density(bsdf, d); });
+    EXPECT_GT(fit.p_value, least_p(3 * kFrames)) << name << ' ' << seed;
+    EXPECT_NEAR(fit.integral, fit.drawn, 0.005) << name << ' ' << seed;
+  };
+  for (int k = 0; k < kFrames; ++k) {
+    t.next();
+    const V3f &o = t.outgoing, &g = t.geometric, &n = t.shading;
+    check(RoughBsdf(o, g, n, kAlpha, 1.5f, glass), "rough");
+    check(MetalBsdf(o, g, n, kAlpha, kMirror, mirrors), "metal");
+    check(CoatedBsdf(o, g, n, kAlpha, 1.5f, V3f(0.6f), glass), "coated");
+  }
+}
+
 TEST(Facets, SampleTheValueTheyState) {
   Tilted t;
   const float alpha = 0.3f;
