@@ -34,25 +34,23 @@ class SmoothNormal {
   SmoothNormal(const SceneObject& object, const Hit& hit, float time) {
     const auto& t = object.triangle[hit.triangle];
     const V3f a = object.at(t.x, time), na = object.normal_at(t.x, time);
-    ab_ = object.at(t.y, time) - a, ac_ = object.at(t.z, time) - a;
-    nab_ = object.normal_at(t.y, time) - na, nac_ = object.normal_at(t.z, time) - na;
-    flat_ = cross(ab_, ac_);
-    const V3f n = na + nab_ * hit.u + nac_ * hit.v;
-    length_ = std::sqrt(dot(n, n));
-    unit_ = n * (1 / length_);
+    const V3f ab = object.at(t.y, time) - a, ac = object.at(t.z, time) - a, flat = cross(ab, ac);
+    const V3f nab = object.normal_at(t.y, time) - na, nac = object.normal_at(t.z, time) - na;
+    const V3f n = na + nab * hit.u + nac * hit.v;
+    const float inverse = 1 / std::sqrt(dot(n, n)), scale = inverse / dot(flat, flat);
+    unit_ = n * inverse;
+    across_u_ = cross(ac, flat) * scale, across_v_ = cross(flat, ab) * scale;
+    along_u_ = nab - unit_ * dot(nab, unit_), along_v_ = nac - unit_ * dot(nac, unit_);
   }
 
   const V3f& unit() const { return unit_; }
   /// @param way  in the triangle's plane
   V3f change(const V3f& way) const {
-    const float scale = 1 / (dot(flat_, flat_) * length_);
-    const V3f n = (nab_ * dot(cross(way, ac_), flat_) + nac_ * dot(cross(ab_, way), flat_)) * scale;
-    return n - unit_ * dot(n, unit_);
+    return along_u_ * dot(way, across_u_) + along_v_ * dot(way, across_v_);
   }
 
  private:
-  V3f ab_, ac_, nab_, nac_, flat_, unit_;
-  float length_;
+  V3f unit_, across_u_, across_v_, along_u_, along_v_;
 };
 
 class Walk {
@@ -121,16 +119,17 @@ class Walk {
     if (!(cos_out > 0)) return false;
     const Basis across(direction);
     out.axis[0] = across.tangent, out.axis[1] = across.bitangent;
+    const float inverse = 1 / dot(direction, flat), inverse_out = 1 / cos_out,
+                inverse_lamp = 1 / dot(out.bent, lamp_.normal);
     for (int k = 0; k < 2; ++k) {
       const V3f& d = out.axis[k];
-      const V3f way = (d - direction * (dot(d, flat) / dot(direction, flat))) * out.way;
+      const V3f way = (d - direction * (dot(d, flat) * inverse)) * out.way;
       const V3f turn = smooth.change(way) * side;
       const float d_cos = -dot(d, n) - dot(direction, turn),
-                  d_out = mu * mu * cos * d_cos / cos_out;
+                  d_out = mu * mu * cos * d_cos * inverse_out;
       const V3f bend = d * mu + turn * (mu * cos - cos_out) + n * (mu * d_cos - d_out);
       const V3f moved = lamp_.sun ? bend : way + bend * out.beyond;
-      const float along = dot(moved, lamp_.normal) / dot(out.bent, lamp_.normal);
-      out.slope[k] = on_plane(moved - out.bent * along);
+      out.slope[k] = on_plane(moved - out.bent * (dot(moved, lamp_.normal) * inverse_lamp));
     }
     return true;
   }
