@@ -85,10 +85,10 @@ TEST(Coated, ReturnsAllLightOverAWhiteBaseAndLessOverAnother) {
       const AlbedoTable coat = AlbedoTable::dielectric(alpha, eta);
       for (const float cos : {1.f, 0.8f, 0.4f, 0.15f, 0.04f}) {
         const CoatedBsdf white = coated(cos, alpha, eta, 1, coat);
-        EXPECT_NEAR(furnace(white), 1, 0.01) << alpha << ' ' << eta << ' ' << cos;
+        EXPECT_NEAR(furnace(white), 1, 0.005) << alpha << ' ' << eta << ' ' << cos;
         const CoatedBsdf grey = coated(cos, alpha, eta, 0.5f, coat);
         const double returned = furnace(grey);
-        EXPECT_NEAR(returned, grey.albedo().x, 0.01);
+        EXPECT_NEAR(returned, grey.albedo().x, 0.005);
         EXPECT_LT(returned, 0.95);
         EXPECT_GT(returned, coat.at(cos).reflected);
       }
