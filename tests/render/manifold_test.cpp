@@ -9,22 +9,12 @@
 
 #include "render/bsdf_dielectric.h"
 #include "render/photons.h"
-#include "tests/render/support.h"
+#include "tests/render/puddle.h"
 
 namespace drench::test {
 namespace {
 
 constexpr double kIndex = 1.333;
-
-Light sun(const V3d& direction, double angle_deg) {
-  Light light;
-  light.type = LightType::sun;
-  light.name = "sun";
-  light.direction = direction;
-  light.angle_deg = angle_deg;
-  light.radiance = V3f(2);
-  return light;
-}
 
 /// Water over a ground of reflectance 0.5.
 struct Pool {
@@ -43,15 +33,6 @@ struct Pool {
 };
 
 TriangleMesh level_water() { return box_mesh({-4, -0.1f, -4}, {4, 0.4f, 4}); }
-
-/// A puddle of 4 m with waves.
-TriangleMesh waves() {
-  TriangleMesh mesh = sphere_mesh(6);
-  for (V3f& p : mesh.position)
-    p = {2 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 2 * p.z};
-  mesh.normal.clear();
-  return mesh;
-}
 
 /// A point of the ground.
 Surface ground_at(const Scene& scene, float x, float z) {

@@ -8,22 +8,12 @@
 #include <random>
 
 #include "render/bsdf_dielectric.h"
-#include "tests/render/support.h"
+#include "tests/render/puddle.h"
 
 namespace drench::test {
 namespace {
 
 constexpr double kIndex = 1.333;
-
-Light sun(const V3d& direction, double angle_deg) {
-  Light light;
-  light.type = LightType::sun;
-  light.name = "sun";
-  light.direction = direction;
-  light.angle_deg = angle_deg;
-  light.radiance = V3f(2);  // W/m^2 on a surface that faces it
-  return light;
-}
 
 /// Calls f(direction of flight, power, share) for the photons near a point, whosever hand.
 template <class F>
@@ -60,15 +50,6 @@ Shot pool_shot(double index, float absorption) {
   add_ground(shot, 0.5f, 6);
   shot.material.push_back(dielectric("water", index, V3f(absorption)));
   return shot;
-}
-
-/// A puddle of 4 m with waves.
-TriangleMesh waves() {
-  TriangleMesh mesh = sphere_mesh(6);
-  for (V3f& p : mesh.position)
-    p = {2 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 2 * p.z};
-  mesh.normal.clear();
-  return mesh;
 }
 
 // Under level water, E cos(a) (1 - F(a)) e^(-s d / cos(b)) / n^2. A million photons, of which some
