@@ -9,12 +9,12 @@ namespace drench {
 namespace {
 
 constexpr int kMostSteps = 5;
-constexpr int kMostMet = 16;       // contact faces that a ray passes one after the other
-constexpr float kArrived = 0.03f;  // of the lamp's extent: so near its point a walk ends
-constexpr float kSameWay = 0.15f;  // of it: so near each other two ways arrive that are one
-constexpr float kLongStep = 0.3f;  // rad
-constexpr float kMostFocus = 2;    // times the light that would come straight: more is photons'
-constexpr float kIsSmooth = 1e-4f;
+constexpr int kMostMet = 16;        // contact faces that a ray passes one after the other
+constexpr float kArrived = 0.03f;   // of the lamp's extent: so near its point a walk ends
+constexpr float kSameWay = 0.15f;   // of it: so near each other two ways arrive that are one
+constexpr float kLongStep = 0.3f;   // rad
+constexpr float kMostFocus = 2;     // times the light that would come straight: more is photons'
+constexpr float kIsSmooth = 1e-4f;  // square of how far two unit normals that are one may differ
 
 /// Where a ray meets the interface and, bent there, the lamp's plane.
 struct Arrival {

@@ -34,8 +34,8 @@ constexpr float kCrowd = 4;         // times the photons of the median one's dis
 constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
 constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
 constexpr double kHand = 4;         // photons of the median one's disc in a hand, at least
-// Share of the light that walks must find. Each costs a path three rays or more, and where much is
-// left to photons it is they that picture and error are made by.
+// Share of the light that walks must find to be taken: each costs a path four rays, and where much
+// is left to photons the error is theirs (render_walks).
 constexpr double kCalm = 0.8;
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
