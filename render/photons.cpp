@@ -107,7 +107,8 @@ struct Flight {
   V3f power;
   Bodies in = 0;
   int interfaces = 0;
-  uint32_t sheets = 0;  // with gaps, that it met
+  uint32_t sheets = 0;  // with gaps, that it met,
+  uint32_t gaps = 0;    // and gaps that it fell through
   int lamp = 0;
   V3f start, lit_from;  // where it met the body, and from which direction
   float most_gain = 0;  // of flux, that smooth normals in place of the real ones may still add
@@ -176,7 +177,7 @@ class PhotonTracer {
   }
 
   bool is_walked(const Flight& flight, const Surface& surface, uint64_t& rays) const {
-    if (walks_ == Walks::none || flight.interfaces > 1 || flight.sheets > 0) return false;
+    if (walks_ == Walks::none || flight.interfaces > 1 || flight.gaps > 0) return false;
     if (!std::has_single_bit(flight.in)) return false;
     const LampPoint lamp = scene_.lights().lamp_point_of(size_t(flight.lamp), surface.position,
                                                          flight.start, flight.lit_from);
@@ -247,6 +248,7 @@ class PhotonTracer {
       if (outwards) flight.in |= surface.body;
       const float gap = surface.material->gap;
       if (gap > 0 && sampler.one(kFirstGap + flight.sheets++) < gap) {
+        ++flight.gaps;
         flight.ray.origin = surface.leave(flight.ray.direction);
         dry_gap = !scene_.in_fluid(flight.in);
         if (!dry_gap && !scene_.fluid_beyond(flight.ray)) return {};

@@ -239,6 +239,22 @@ TEST(GapPhotons, GiveThePictureThatPathsGive) {
     }
 }
 
+// Gauze that hangs in level water: walks find the lamp from its yarns, photons that lie on these
+// are left out although they met gaps, and what fell through a gap stays a photon.
+TEST(GapPhotons, ShareWithWalksWhatYarnsUnderWaterGet) {
+  Shot shot = shot_with(gauze(0.5f, 0.2f, 0.5), 512);
+  shot.material.push_back(dielectric("water", 1.333));
+  shot.fluid.material = "water";
+  add_ground(shot, 0.5f, 6);
+  shot.light = {panel({0.8, 3, 0}, 0.5, 0.5, 15)};
+  FrameGeometry geometry = sheets({0.5f}, 2.5f);
+  geometry.fluid = box_mesh({-3, -0.1f, -3}, {3, 1, 3});
+  shot.camera.position = V3d(1.2, 2, 0);
+  shot.camera.target = V3d(0, 0.5, 0);
+  shot.camera.fov_deg = 12.0;
+  expect_photons_as_paths(shot, geometry);
+}
+
 // A lamp under a sheet that holds water: paths keep what comes in by the gaps, where no photon is.
 TEST(GapPhotons, LeaveToPathsWhatComesThroughGapsIntoWater) {
   Shot shot = shot_with(gauze(0.5f, 0.2f, 0.5), 512);
