@@ -15,6 +15,8 @@ namespace drench {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+/// From so many on a tree of them is worth its steps.
+constexpr size_t kManyLights = 16;
 
 [[noreturn]] void fail(const Light& light, const std::string& what) {
   throw Error(fmt::format("light '{}': {}", light.name, what));
@@ -172,6 +174,16 @@ float ShapeLight::importance(const V3f& from) const {
              : 0;
 }
 
+LightTree::Light ShapeLight::extent() const {
+  const float intensity = luminance(radiance);
+  if (type == LightType::sphere) {
+    const V3f reach(radius);
+    return {{center - reach, center + reach}, V3f(0), intensity * kPi * radius * radius};
+  }
+  const V3f reach = absolute(u) + absolute(v);
+  return {{center - reach, center + reach}, normal, intensity * area};
+}
+
 bool SunLight::covers(const V3f& direction) const {
   const V3f off = cross(direction, toward);  // 1 - cos would lose the sun's digits
   return dot(direction, toward) > 0 && dot(off, off) <= sin2;
@@ -227,12 +239,25 @@ uint32_t Lights::group_named(const std::string& name) {
   return group;
 }
 
+void Lights::finish() {
+  if (shapes_.size() + meshes_.size() < kManyLights) return;
+  std::array<std::vector<LightTree::Light>, 2> kinds;
+  for (const ShapeLight& shape : shapes_) kinds[0].push_back(shape.extent());
+  for (const MeshLight& mesh : meshes_) kinds[1].push_back(mesh.extent());
+  tree_ = LightTree(kinds);
+}
+
 Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
   Hit hit{-1, distance};
-  for (size_t k = 0; k < shapes_.size(); ++k) {
+  const auto meet = [&](size_t k) {
     const float t = shapes_[k].intersect(origin, direction, hit.distance);
     if (t < hit.distance) hit = {int(k), t};
-  }
+    return hit.distance;
+  };
+  if (!tree_.empty())
+    tree_.along(origin, direction, distance, meet);
+  else
+    for (size_t k = 0; k < shapes_.size(); ++k) meet(k);
   return hit;
 }
 
@@ -243,12 +268,33 @@ float Lights::importance(size_t index, const V3f& from) const {
   return environment_importance_;
 }
 
+template <class Visit>
+void Lights::for_each_alone(size_t count, const Visit& visit) const {
+  if (tree_.empty()) {
+    for (size_t k = 0; k < count; ++k) visit(k);
+    return;
+  }
+  for (size_t k = shapes_.size(); k < lamps(); ++k) visit(k);
+  for (size_t k = environment_index(); k < count; ++k) visit(k);
+}
+
+LightTree::Cut Lights::cut(size_t count, const V3f& from) const {
+  if (tree_.empty()) return {};
+  return tree_.cut(count > lamps() ? 2 : 1, from, tree_importance(from));
+}
+
 float Lights::choice_probability(size_t index, const V3f& from) const {
   const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
   if (count == 1) return 1;
-  float total = 0;
-  for (size_t k = 0; k < count; ++k) total += importance(k, from);
-  return total > 0 ? importance(index, from) / total : 0;
+  const LightTree::Cut cut = this->cut(count, from);
+  float total = cut.total;
+  for_each_alone(count, [&](size_t k) { total += importance(k, from); });
+  if (!(total > 0)) return 0;
+  const bool alone =
+      tree_.empty() || index >= environment_index() || (index >= shapes_.size() && index < lamps());
+  if (alone) return importance(index, from) / total;
+  const size_t place = index < shapes_.size() ? index : index - suns_.size();
+  return tree_.part(cut, from, uint32_t(place), tree_importance(from)) / total;
 }
 
 float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const {
@@ -257,15 +303,26 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
 
 std::pair<size_t, float> Lights::choose_first(size_t count, const V3f& from, float u_light) const {
   if (count < 2) return {0, float(count)};
-  float total = 0;
-  for (size_t k = 0; k < count; ++k) total += importance(k, from);
+  const LightTree::Cut cut = this->cut(count, from);
+  float total = cut.total;
+  for_each_alone(count, [&](size_t k) { total += importance(k, from); });
   if (!(total > 0)) return {0, 0.f};
-  size_t chosen = 0;
-  float weight = importance(0, from), target = u_light * total;
-  while (target >= weight && chosen + 1 < count) {
-    target -= weight;
-    weight = importance(++chosen, from);
+  float target = u_light * total;
+  if (target < cut.total) {
+    const auto [place, part] = tree_.choose(cut, from, target, tree_importance(from));
+    return {place < shapes_.size() ? place : place + suns_.size(), part / total};
   }
+  target -= cut.total;
+  size_t chosen = 0;
+  float weight = 0;
+  bool found = false;
+  for_each_alone(count, [&](size_t k) {
+    if (found) return;
+    chosen = k;
+    weight = importance(k, from);
+    found = target < weight;
+    target -= weight;
+  });
   return {chosen, weight / total};
 }
 

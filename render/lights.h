@@ -9,6 +9,7 @@
 #include "pipeline/contract/shot.h"
 #include "render/environment.h"
 #include "render/light_sample.h"
+#include "render/light_tree.h"
 #include "render/mesh_light.h"
 
 namespace drench {
@@ -29,6 +30,7 @@ struct ShapeLight {
   float pdf(const V3f& from, const V3f& direction, float distance) const;
   /// Irradiance it could cause at `from`, roughly: its weight in the draw. 0 only where it is 0.
   float importance(const V3f& from) const;
+  LightTree::Light extent() const;
 };
 
 struct SunLight {
@@ -57,6 +59,8 @@ class Lights {
     mesh_group_.push_back(group_named(group));
     return int(meshes_.size()) - 1;
   }
+  /// To be called once all are there: many are drawn from a tree.
+  void finish();
 
   struct Hit {
     int light = -1;
@@ -127,6 +131,8 @@ class Lights {
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }
   const std::vector<MeshLight>& meshes() const { return meshes_; }
+  /// Of shapes and of meshes, numbered in this order; empty if these are few.
+  const LightTree& tree() const { return tree_; }
   /// Mean irradiance of the environment, as luminance.
   float environment_importance() const { return environment_importance_; }
 
@@ -135,6 +141,16 @@ class Lights {
   uint32_t group_named(const std::string& name);
   /// Of the first `count`. @return its number and the probability, 0 for none
   std::pair<size_t, float> choose_first(size_t count, const V3f& from, float u_light) const;
+  /// Calls `visit(number)` for those of the first `count` that are not in the tree.
+  template <class Visit>
+  void for_each_alone(size_t count, const Visit& visit) const;
+  LightTree::Cut cut(size_t count, const V3f& from) const;
+  auto tree_importance(const V3f& from) const {
+    return [this, &from](uint32_t place) {
+      return place < shapes_.size() ? shapes_[place].importance(from)
+                                    : meshes_[place - shapes_.size()].importance(from);
+    };
+  }
   LampPoint aim_at(size_t lamp, const V3f& from) const;
   LightSample sample_first(size_t count, const V3f& from, float time, float u_light,
                            const V2f& u) const;
@@ -145,6 +161,7 @@ class Lights {
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
   std::vector<MeshLight> meshes_;
+  LightTree tree_;
   std::shared_ptr<const Environment> environment_;
   std::vector<std::string> groups_;
   std::vector<uint32_t> mesh_group_;

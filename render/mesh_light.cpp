@@ -71,4 +71,8 @@ float MeshLight::importance(const V3f& from) const {
   return power_ / std::max(dot(away, away), radius_ * radius_);
 }
 
+LightTree::Light MeshLight::extent() const {
+  return {{center_ - V3f(radius_), center_ + V3f(radius_)}, {0, 0, 0}, power_};
+}
+
 }  // namespace drench

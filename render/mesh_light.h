@@ -7,6 +7,7 @@
 
 #include "render/environment.h"
 #include "render/light_sample.h"
+#include "render/light_tree.h"
 
 namespace drench {
 
@@ -34,6 +35,7 @@ class MeshLight {
   float pdf(uint32_t triangle, float time, float distance, float facing) const;
   /// Irradiance it could cause at `from`, roughly: its weight in the draw. Never 0.
   float importance(const V3f& from) const;
+  LightTree::Light extent() const;
 
  private:
   struct Corners {

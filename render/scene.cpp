@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "pipeline/contract/error.h"
+#include "render/box_test.h"
 #include "render/kept_parts.h"
 #include "render/path.h"
 #include "render/turn.h"
@@ -28,34 +29,6 @@ RTCRay embree_ray(const Ray& ray, float reach) {
   const V3f &o = ray.origin, &d = ray.direction;
   return {o.x, o.y, o.z, 0, d.x, d.y, d.z, ray.time, reach, 0xffffffffu, 0, 0};
 }
-
-/// The slab test of a ray against boxes, grown by its own rounding: x, y, z and z again as a pack.
-class BoxTest {
- public:
-  explicit BoxTest(const Ray& ray)
-      : origin_(pack(ray.origin)), inverse_(_mm_div_ps(_mm_set1_ps(1), pack(ray.direction))) {}
-
-  bool meets(const Imath::Box3f& box, float reach) const {
-    const __m128 a = along(box.min), b = along(box.max), whole = _mm_set1_ps(reach);
-    // 0 x infinity: the ray runs in the plane of a side, which does not bound it.
-    const __m128 bounded = _mm_cmpord_ps(a, b);
-    __m128 near = _mm_and_ps(_mm_min_ps(a, b), bounded);
-    __m128 far = _mm_blendv_ps(whole, _mm_min_ps(_mm_max_ps(a, b), whole), bounded);
-    near = _mm_max_ps(near, _mm_movehl_ps(near, near));
-    near = _mm_max_ss(near, _mm_movehdup_ps(near));
-    far = _mm_min_ps(far, _mm_movehl_ps(far, far));
-    far = _mm_min_ss(far, _mm_movehdup_ps(far));
-    return std::max(_mm_cvtss_f32(near), 0.f) <= _mm_cvtss_f32(far) * (1 + 8 * 0x1p-24f);
-  }
-
- private:
-  static __m128 pack(const V3f& v) { return _mm_setr_ps(v.x, v.y, v.z, v.z); }
-  __m128 along(const V3f& corner) const {
-    return _mm_mul_ps(_mm_sub_ps(pack(corner), origin_), inverse_);
-  }
-
-  __m128 origin_, inverse_;
-};
 
 /// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
 /// else it may lie beyond the face that meets this one there, and a ray from it is lost.
@@ -210,6 +183,7 @@ void Scene::find_mesh_lights() {
     if (is_black(emission) || object.triangle.empty()) continue;
     object.light = lights_.add_mesh({object.triangle, object.keys()}, emission, object.name);
   }
+  lights_.finish();
 }
 
 /// One table for each pair of roughness and index that facets of the frame have.
@@ -272,7 +246,7 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
   if (objects_.empty()) return hit;
   RTCRayHit query{embree_ray(ray, hit.distance), {}};
-  const BoxTest box(ray);
+  const BoxTest box(ray.origin, ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {
     if (!box.meets(objects_[k].bounds, query.ray.tfar)) continue;
     if (world == World::plate && objects_[k].matte == Matte::none) continue;
@@ -292,7 +266,7 @@ bool Scene::occluded(const Ray& ray, float distance, World world, Gaps gaps) con
   if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
   if (objects_.empty()) return false;
   RTCRay query = embree_ray(ray, reach);
-  const BoxTest box(ray);
+  const BoxTest box(ray.origin, ray.direction);
   for (const SceneObject& object : objects_) {
     if (!box.meets(object.bounds, reach)) continue;
     if (world == World::plate && object.matte == Matte::none) continue;
