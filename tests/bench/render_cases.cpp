@@ -241,6 +241,64 @@ const Registration render_walks_case{
     "render_walks", "pools of four heights of waves: error and time with walks and without",
     render_walks};
 
+/// The sheet under the sky with so many lamps of as much light together: a ceiling of panels that
+/// face down, or balls and disks low over the ground that face all ways.
+enum class Lamps { above, low };
+Shot lamps_shot(int count, Lamps where) {
+  const bool low = where == Lamps::low;
+  Shot shot = cloth_shot();
+  Light lamp = shot.light[0];
+  const Light sky = shot.light[1];
+  shot.light.clear();
+  lamp.group = "lamps";
+  for (int k = 0; k < count; ++k) {
+    const double turn = 2.39996 * k, share = std::sqrt((k + 0.5) / count);  // a golden angle on
+    const double out = low ? 0.2 + 1.6 * share : 0.4 + 3 * share, up = (7 * k % 11) / 11.;
+    lamp.name = fmt::format("lamp{}", k);
+    lamp.center = {out * std::cos(turn), low ? 0.06 + 0.5 * up : 1.5 + 1.5 * up,
+                   out * std::sin(turn)};
+    lamp.u = {0.1, 0, 0};
+    lamp.v = {0, 0, 0.1};
+    lamp.radiance = V3f((low ? 1500.f : 800.f) / float(count));
+    if (low) lamp.type = k % 2 ? LightType::sphere : LightType::disk;
+    lamp.radius = k % 2 ? 0.02 + 0.01 * (k % 3) : 0.04;
+    lamp.direction = {std::cos(1.7 * k), 0.6 * std::sin(5.1 * k), std::sin(1.7 * k)};
+    shot.light.push_back(lamp);
+  }
+  shot.light.push_back(sky);
+  return shot;
+}
+
+/// Error and time by the number of lamps.
+void render_lamps(const Emit& emit) {
+  constexpr int kReference = 1600, kSamples = 64, kSeeds = 4;
+  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  for (const Lamps where : {Lamps::above, Lamps::low}) {
+    double of_one = 0;
+    for (const int count : {1, 4, 16, 64, 256}) {
+      const Shot shot = lamps_shot(count, where);
+      const Film a = render(shot, geometry, kReference, 1000).film,
+                 b = render(shot, geometry, kReference, 1001).film;
+      double error = 0, cpu_s = 0;
+      Render last;
+      for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
+        last = render(shot, geometry, kSamples, seed);
+        error += error_beside(last.film, a, b) / kSeeds, cpu_s += last.cost.cpu_s / kSeeds;
+      }
+      if (count == 1) of_one = cpu_s;
+      Line line = line_of({error, last});
+      line.method = fmt::format("{} lamps, {}", count, where == Lamps::low ? "low" : "above");
+      line.more["rel_mse"] = error, line.more["cpu_s"] = cpu_s;
+      line.error = cpu_s / of_one, line.gate = 5;
+      line.error_of = "CPU time over that with one lamp";
+      emit(line);
+    }
+  }
+}
+
+const Registration render_lamps_case{"render_lamps", "a sheet under 1 to 256 lamps: error and time",
+                                     render_lamps};
+
 /// Larger than the others: what lies between edges is what a denoiser lives on.
 Shot larger(Shot shot) {
   shot.render.width = 192;
