@@ -305,9 +305,10 @@ V3f lift_to_patch(const V3f (&corner)[3], const V3f (&normal)[3], const float (&
   const float side = dot(from, s.geometric_normal) > 0 ? -1.f : 1.f;
   V3f lift(0);
   for (int k = 0; k < 3; ++k) {
-    const V3f n = normalized(normal[k]) * side;
-    if (!(dot(n, s.geometric_normal) * side > 0.7f)) return V3f(0);
-    lift -= n * (weight[k] * std::min(dot(s.position - corner[k], n), 0.f));
+    const V3f n = normal[k] * side;
+    const float along = dot(normal[k], s.geometric_normal), length2 = dot(n, n);
+    if (!(along > 0 && along * along > 0.5f * length2)) return V3f(0);
+    lift -= n * (weight[k] * std::min(dot(s.position - corner[k], n), 0.f) / length2);
   }
   const float rounding = dot(absolute(s.geometric_normal), s.error);
   return dot(lift, s.geometric_normal) * side > rounding ? lift : V3f(0);
