@@ -21,6 +21,11 @@ constexpr size_t kFew = 3, kHalf = 12;
 /// such a glint: the ends of a streak, where its pixels are few.
 constexpr float kGlint = 16, kSeen = 0.4f;
 constexpr int kReach = 2;
+/// What a pixel of a glint shows stays there if noise is less than this part of it in the squares
+/// of 25 pixels, which takes three samples of each. Else it is spread to the pixels beside it by a
+/// normal distribution of so many pixels: more would blur edges more than it fills holes
+/// (docs/benchmarks.md).
+constexpr float kShape = 0.5f, kSpread = 0.65f;
 constexpr int kBlock = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
 /// The value that only `few` of a list are above.
@@ -33,6 +38,7 @@ struct Outlier {
   float factor = 1;     // takes it down to what is around it
   bool bright = false;  // as a glint is
   bool glint = false;
+  bool stays = false;  // its place is known
 };
 
 class Brightness {
@@ -65,10 +71,11 @@ class Brightness {
     const bool one_sample = !(scatter_[p] < kOneSample * mean_[p]);
     const float usual = beyond(around_, kHalf);
     if (!one_sample && mean_[p] > kGlint * std::max(beyond(noisy_, kHalf), picture_))
-      return {usual / mean_[p], true, seen(window)};
+      return {usual / mean_[p], true, seen(window), knows_shape(window)};
     if (scatter_[p] < kUnsure * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
-    if (mean_[p] > kGlint * far) return {std::min(usual, far) / mean_[p], true, seen(window)};
+    if (mean_[p] > kGlint * far)
+      return {std::min(usual, far) / mean_[p], true, seen(window), knows_shape(window)};
     const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
@@ -82,6 +89,16 @@ class Brightness {
       square += scatter_[q] * scatter_[q];
     }
     return square < kSeen * kSeen * sum * sum;
+  }
+
+  /// Whether what pixels differ by is more than their noise.
+  bool knows_shape(const std::vector<size_t>& window) const {
+    float light = 0, noise = 0;
+    for (const size_t q : window) {
+      light += mean_[q] * mean_[q];
+      noise += scatter_[q] * scatter_[q];
+    }
+    return noise < kShape * light;
   }
 
   float median_of_block(int x0, int y0) {
@@ -126,6 +143,21 @@ void follow_glints(int width, int height, std::vector<Outlier>& outliers) {
   }
 }
 
+/// Adds what a glint lost to its pixel and those beside it: one whose lamp few samples of each
+/// pixel find is a handful of white dots as it is.
+void spread(int width, int height, size_t p, const V3f& lost, std::vector<Plane>& out) {
+  const auto weight = [&](size_t q) {
+    const float x = float(q % size_t(width)) - float(p % size_t(width));
+    const float y = float(q / size_t(width)) - float(p / size_t(width));
+    return std::exp(-(x * x + y * y) / (2 * kSpread * kSpread));
+  };
+  float sum = 0;
+  for_each_near(width, height, p, 1, [&](size_t q) { sum += weight(q); });
+  for_each_near(width, height, p, 1, [&](size_t q) {
+    for (int c = 0; c < 3; ++c) out[size_t(c)][q] += lost[c] * (weight(q) / sum);
+  });
+}
+
 }  // namespace
 
 std::vector<Plane> tame_outliers(NoisyPicture& picture) {
@@ -138,12 +170,17 @@ std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   for (size_t p = 0; p < outliers.size(); ++p) {
     const Outlier& o = outliers[p];
     if (o.factor == 1) continue;
+    V3f lost(0);
     for (size_t c = 0; c < 3; ++c) {
       Plane &first = picture.half[0][c], &second = picture.half[1][c];
-      if (o.glint) glints[c][p] = (1 - o.factor) * 0.5f * (first[p] + second[p]);
+      if (o.glint) lost[int(c)] = (1 - o.factor) * 0.5f * (first[p] + second[p]);
       first[p] *= o.factor, second[p] *= o.factor;
       picture.variance[c][p] *= o.factor * o.factor;
     }
+    if (o.stays)
+      for (size_t c = 0; c < 3; ++c) glints[c][p] += lost[int(c)];
+    else if (o.glint)
+      spread(picture.width, picture.height, p, lost, glints);
   }
   return glints;
 }

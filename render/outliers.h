@@ -32,7 +32,8 @@ void for_each_window(int width, int height, int reach, const Visit& visit) {
 /// Brings pixels that far outshine what is around them down to it: those whose brightness few of
 /// their samples found, and glints, a lamp that water or glass shows in a few pixels. Spread over
 /// its window either would be a white square.
-/// @return what glints lost, the three colours: it belongs where it is
+/// @return what glints lost, the three colours: it belongs where it is, or around it where too few
+///         samples of a pixel found it to tell its shape
 std::vector<NoisyPicture::Plane> tame_outliers(NoisyPicture& picture);
 
 }  // namespace drench
