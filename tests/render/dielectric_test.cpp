@@ -10,7 +10,7 @@
 #include "render/scene.h"
 #include "tests/render/chi_square.h"
 #include "tests/render/closed_body.h"
-#include "tests/render/support.h"
+#include "tests/render/puddle.h"
 
 namespace drench::test {
 namespace {
@@ -249,12 +249,7 @@ TEST(SnellsWindow, ShowsOneMinusFresnelAtTheZenith) {
 
 TEST(WaterGuide, LeavesTheMeanAsItIs) {
   // A wavy surface over a floor, a lamp and a sun aslant: aimed and unaimed rays see one picture.
-  Shot shot = plain_shot(512, 8);
-  add_ground(shot, 0.5f, 6);
-  shot.material.push_back(dielectric("water", kIndex, V3f(0.5f, 0.2f, 0.1f)));
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
+  Shot shot = puddle_shot(V3f(0.5f, 0.2f, 0.1f));
   Light sun;
   sun.type = LightType::sun;
   sun.direction = {1, -2, 0};

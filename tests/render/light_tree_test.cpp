@@ -10,7 +10,6 @@
 #include "render/lights.h"
 #include "tests/render/chi_square.h"
 #include "tests/render/puddle.h"
-#include "tests/render/support.h"
 
 namespace drench::test {
 namespace {
@@ -227,12 +226,7 @@ TEST(LightTree, GivesThePictureOfSurfaceSamples) {
 
 // Photons and walks share what many lamps send as they share that of one.
 TEST(LightTree, GivesPhotonsAndWalksThePictureOfPaths) {
-  Shot shot = plain_shot(512, 8);
-  add_ground(shot, 0.5f, 6);
-  shot.material.push_back(dielectric("water", 1.333, V3f(0.3f)));
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
+  Shot shot = puddle_shot(V3f(0.3f));
   shot.light = many_lamps(4, {0, 2.5, 0}, 0.4, 0.2);
   for (Light& lamp : shot.light) lamp.center.y = std::max(lamp.center.y, 1.2);
   expect_photons_as_paths(shot, {waves(), {}});

@@ -7,7 +7,7 @@
 
 #include "render/color.h"
 #include "render/lights.h"
-#include "tests/render/support.h"
+#include "tests/render/puddle.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::test {
@@ -233,23 +233,14 @@ TEST(MapSuns, AreSeenInTheSky) {
 // Under waves: photons and guided rays of the sun against a map that is left whole, by paths alone.
 TEST(MapSuns, GiveTheCausticThatPathsFindInTheMap) {
   const TemporaryFolder folder;
-  Shot shot = plain_shot(512, 8);
-  add_ground(shot, 0.5f, 6);
-  shot.material.push_back(dielectric("water", 1.333, V3f(0.3f)));
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
-  TriangleMesh waves = sphere_mesh(5);
-  for (V3f& p : waves.position)
-    p = {2 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 2 * p.z};
-  waves.normal.clear();
+  Shot shot = puddle_shot(V3f(0.3f));
   shot.light = {map_light(sky_map(360, {{kToward, 6, V3f(300)}}), folder / "sun.exr")};
-  const Mean guided = mean_over_seeds(shot, {waves, {}}, {}, 8);
+  const Mean guided = mean_over_seeds(shot, {waves(), {}}, {}, 8);
   shot.render.photons = 6;
-  const Mean photons = mean_over_seeds(shot, {waves, {}}, {}, 8);
+  const Mean photons = mean_over_seeds(shot, {waves(), {}}, {}, 8);
   shot.render.photons = 0;
   shot.light[0].split_suns = false;
-  const Mean paths = mean_over_seeds(shot, {waves, {}}, {}, 24);
+  const Mean paths = mean_over_seeds(shot, {waves(), {}}, {}, 24);
   EXPECT_LT(paths.error, 0.01 * paths.value);
   for (const Mean& mean : {guided, photons}) {
     EXPECT_LT(mean.error, paths.error);

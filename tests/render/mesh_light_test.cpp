@@ -7,7 +7,7 @@
 #include "render/photons.h"
 #include "render/sampler.h"
 #include "render/scene.h"
-#include "tests/render/support.h"
+#include "tests/render/puddle.h"
 
 namespace drench::test {
 namespace {
@@ -152,20 +152,12 @@ TEST(MeshLight, EstimatorsAgree) {
 
 /// A wavy pool with a lamp and a ball that shines, above the water or in it.
 struct Pool {
-  Shot shot = plain_shot(512, 8);
+  Shot shot = puddle_shot(V3f(0.3f));
   FrameGeometry geometry;
 
   explicit Pool(const V3f& ball_at, float radius, float radiance) {
-    add_ground(shot, 0.5f, 6);
-    shot.material.push_back(dielectric("water", 1.333, V3f(0.3f)));
-    shot.camera.position = V3d(0, 3, 1);
-    shot.camera.target = V3d(0, 0, 0);
-    shot.camera.fov_deg = 20.0;
     shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 20)};
-    geometry.fluid = sphere_mesh(5);
-    for (V3f& p : geometry.fluid.position)
-      p = {2 * p.x, p.y > 0 ? 0.4f * p.y + 0.02f * std::sin(9 * p.x) * p.y : 0.3f * p.y, 2 * p.z};
-    geometry.fluid.normal.clear();
+    geometry.fluid = waves();
     TriangleMesh ball = sphere_mesh(3);
     for (V3f& p : ball.position) p *= radius;
     add_shining(shot, geometry, ball, radiance, ball_at);

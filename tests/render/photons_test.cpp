@@ -122,22 +122,14 @@ TEST(Photons, FollowTheShutterOfTheCamera) {
 
 // The same picture from photons and from paths, of a wavy pool with a lamp and a sun.
 TEST(Photons, GiveThePictureThatPathsGive) {
-  Shot shot = pool_shot(kIndex, 0.3f);
-  shot.render.samples = 512;
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
+  Shot shot = puddle_shot(V3f(0.3f));
   shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sun({1, -2, 0}, 5), sky(0.2f)};
   expect_photons_as_paths(shot, {waves(), {}});
 }
 
 // And with a disk, which photons start from as from other lamps.
 TEST(Photons, OfADiskGiveThePictureThatPathsGive) {
-  Shot shot = pool_shot(kIndex, 0.3f);
-  shot.render.samples = 512;
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
+  Shot shot = puddle_shot(V3f(0.3f));
   Light disk;
   disk.type = LightType::disk;
   disk.center = {-0.6, 1.8, 0.4};
@@ -364,11 +356,7 @@ TEST(Photons, AreThoseOfTheirTime) {
 // A lamp in the midst of a splash is in none of its drops; one that a drop holds, touches or meets
 // while the shutter is open leaves its light to paths.
 TEST(Photons, KnowALampAmongDropsFromOneInADrop) {
-  Shot shot = pool_shot(kIndex, 0);
-  shot.camera.position = V3d(0, 3, 1);
-  shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 20.0;
-  shot.render.samples = 512;
+  Shot shot = puddle_shot(V3f(0));
   Light lamp;
   lamp.type = LightType::sphere;
   lamp.name = "lamp";

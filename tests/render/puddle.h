@@ -16,6 +16,17 @@ inline Light sun(const V3d& direction, double angle_deg) {
   return light;
 }
 
+/// Looks down on water of an absorption (1/m) over a grey ground, 512 samples.
+inline Shot puddle_shot(const V3f& absorption) {
+  Shot shot = plain_shot(512, 8);
+  add_ground(shot, 0.5f, 6);
+  shot.material.push_back(dielectric("water", 1.333, absorption));
+  shot.camera.position = V3d(0, 3, 1);
+  shot.camera.target = V3d(0, 0, 0);
+  shot.camera.fov_deg = 20.0;
+  return shot;
+}
+
 /// A puddle of 4 m with waves.
 inline TriangleMesh waves() {
   TriangleMesh mesh = sphere_mesh(6);
