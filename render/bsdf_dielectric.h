@@ -49,12 +49,13 @@ inline InterfaceSplit split_at_interface(const V3f& direction, const V3f& normal
 
 /// Normal to shade with, on the side of `direction`'s origin. A smooth normal is used only if both
 /// outgoing directions then lie on the side of the real surface where they belong.
-inline V3f interface_normal(const V3f& direction, const V3f& geometric, const V3f& smooth) {
+template <class Vector>
+Vector interface_normal(const Vector& direction, const Vector& geometric, const Vector& smooth) {
   const float side = dot(direction, geometric) < 0 ? 1.f : -1.f;
-  const V3f n = smooth * side, g = geometric * side;
+  const Vector n = smooth * side, g = geometric * side;
   const float cos_in = -dot(direction, n);
   if (!(cos_in > 0)) return g;
-  const V3f reflected = direction + n * (2 * cos_in);
+  const Vector reflected = direction + n * (2 * cos_in);
   return dot(reflected, g) > 0 ? n : g;
 }
 

@@ -66,8 +66,9 @@ std::pair<V3f, V3f> Scene::yarns_along(const Hit& hit, float time) const {
   const SceneObject& object = objects_[hit.index];
   if (object.uv.empty()) return {V3f(0), V3f(0)};
   const auto& t = object.triangle[hit.triangle];
-  const V3f corner = object.at(t.x, time);
-  const V3f e = object.at(t.y, time) - corner, f = object.at(t.z, time) - corner;
+  const Corners at = object.corners(hit.triangle, time);
+  const V3f e = (at.position[1] - at.position[0]).unpacked(),
+            f = (at.position[2] - at.position[0]).unpacked();
   const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
   return {e * q.y - f * p.y, f * p.x - e * q.x};  // either may run the other way
 }
@@ -106,7 +107,7 @@ float Scene::transmitted(const Ray& ray, float distance, World world) const {
          hit = meet(k, rest, reach)) {
       share *= gap;
       reach -= hit.distance;
-      rest.origin = surface<true>(rest, hit).leave(ray.direction);
+      rest.origin = surface(rest, hit).leave(ray.direction);
     }
   }
   return share;
@@ -115,7 +116,7 @@ float Scene::transmitted(const Ray& ray, float distance, World world) const {
 bool Scene::fluid_beyond(const Ray& ray) const {
   const Hit hit = intersect(ray, Coherence::incoherent);
   if (hit.kind == Hit::Kind::object && objects_[hit.index].body == fluid_) {
-    const Surface s = surface<true>(ray, hit);
+    const Surface s = surface(ray, hit);
     return s.contact || dot(ray.direction, s.geometric_normal) > 0;
   }
   return bodies_at(ray.origin, ray.time) & fluid_;

@@ -21,9 +21,9 @@ struct BentWay {
   float density = 0;   // sr per m^2 of the lamp's plane, or per sr of a sun
   Ray beyond;          // from the interface on,
   float distance = 0;  // m, to the lamp; infinity for a sun
-  // Unit, across the direction, and how the place on the lamp's plane moves with it along each.
-  V3f axis[2];
-  V2f slope[2];
+  // How the place on the lamp's plane moves with the direction, m or, of a sun, the direction that
+  // is seen: of each of its two components the gradient, to be taken across the direction.
+  V3f slope[2];
 };
 
 /// The way that a walk ends on, if there is one. What stands between interface and lamp is not

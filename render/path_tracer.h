@@ -75,7 +75,7 @@ class PathTracer {
       add_emission(state, hit);
       return false;
     }
-    const Surface surface = scene_.surface<kMoving>(state.ray, hit);
+    const Surface surface = scene_.surface(state.ray, hit);
     if (kWater && surface.contact && !enters_by_gap(state, surface)) {
       pass_contact(state, surface, hit.distance);
       return true;

@@ -52,7 +52,7 @@ class InterfacePoints {
       first_.push_back(upto_.size());
       for (size_t t = 0; t < body.triangle.size(); ++t) {
         if (!scene.is_rough(body) && (body.contact.empty() || !body.contact[t]))
-          sum += double(corners(body, t, 0).area());
+          sum += double(area_of(body, t, 0));
         upto_.push_back(sum);
       }
     }
@@ -79,22 +79,15 @@ class InterfacePoints {
     const uint32_t index = scene_.bodies()[bit];
     const SceneObject& body = scene_.object(index);
     const float root = std::sqrt(uv.x);  // uniform on the triangle
-    const float at_open = corners(body, triangle, 0).area();
+    const float at_open = area_of(body, triangle, 0);
     return {{Hit::Kind::object, 0, index, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
-            at_open > 0 ? corners(body, triangle, time).area() / at_open : 0.f};
+            at_open > 0 ? area_of(body, triangle, time) / at_open : 0.f};
   }
 
  private:
-  struct Corners {
-    V3f a, b, c;
-    float area() const {
-      const V3f n = cross(b - a, c - a);
-      return 0.5f * std::sqrt(dot(n, n));
-    }
-  };
-  static Corners corners(const SceneObject& body, size_t triangle, float time) {
-    const auto& t = body.triangle[triangle];
-    return {body.at(t.x, time), body.at(t.y, time), body.at(t.z, time)};
+  static float area_of(const SceneObject& body, size_t triangle, float time) {
+    const Packed n = body.corners(uint32_t(triangle), time).across();
+    return 0.5f * std::sqrt(dot(n, n));
   }
 
   const Scene& scene_;
@@ -159,7 +152,7 @@ class PhotonTracer {
     flight.ray.time = curve.time(sampler.one(kTime), curve.rolls() ? sampler.one(kRow) : 0.f);
     const auto [hit, area_ratio] = starts_.sample((number + double(sampler.one(kStart))) / count_,
                                                   sampler.two(kStartPoint), flight.ray.time, from);
-    surface = scene_.surface<true>(flight.ray, hit);
+    surface = scene_.surface(flight.ray, hit);
     const LightSample light =
         scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
     const float facing = dot(light.direction, surface.geometric_normal);
@@ -241,7 +234,7 @@ class PhotonTracer {
       const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
       ++rays;
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
-      surface = scene_.surface<true>(flight.ray, hit);
+      surface = scene_.surface(flight.ray, hit);
       const bool outwards = dot(flight.ray.direction, surface.geometric_normal) > 0;
       if (!outwards) flight.in &= ~surface.body;
       absorb(flight, hit.distance);  // as paths do

@@ -32,14 +32,17 @@ RTCRay embree_ray(const Ray& ray, float reach) {
 
 /// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
 /// else it may lie beyond the face that meets this one there, and a ray from it is lost.
-void keep_off_edges(const V3f& a, const V3f& b, const V3f& c, const Hit& hit, Surface& s) {
-  const float longest = std::max({(b - a).length(), (c - a).length(), (c - b).length()});
-  const float twice_area = cross(b - a, c - a).length();
-  const float least = std::min(largest(s.error) * longest / twice_area, 1.f / 3);
+void keep_off_edges(const Corners& corner, const Hit& hit, Surface& s) {
+  const auto& [a, b, c] = corner.position;
+  const Packed side[] = {b - a, c - a, c - b}, across = cross(side[0], side[1]);
+  float longest2 = 0;
+  for (const Packed& along : side) longest2 = std::max(longest2, dot(along, along));
+  const float least =
+      std::min(largest(s.error) * std::sqrt(longest2 / dot(across, across)), 1.f / 3);
   if (!(least > 0)) return;
   const float w = std::max(1 - hit.u - hit.v, least), u = std::max(hit.u, least),
               v = std::max(hit.v, least);
-  s.position = (a * w + b * u + c * v) * (1 / (w + u + v));
+  ((a * w + b * u + c * v) * (1 / (w + u + v))).store(s.position);
 }
 
 }  // namespace
@@ -280,14 +283,12 @@ bool Scene::occluded(const Ray& ray, float distance, World world, Gaps gaps) con
 namespace {
 
 /// Where a ray met a sphere, on it to rounding.
-template <bool moving>
 void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surface& s) {
   Imath::V4f sphere = object.sphere[hit.triangle], way(0);
-  if constexpr (moving)
-    if (object.moves()) {
-      way = object.sphere_close[hit.triangle] - sphere;
-      sphere += way * ray.time;
-    }
+  if (object.moves()) {
+    way = object.sphere_close[hit.triangle] - sphere;
+    sphere += way * ray.time;
+  }
   const V3f center(sphere.x, sphere.y, sphere.z);
   s.geometric_normal = s.shading_normal =
       normalized(ray.origin + ray.direction * hit.distance - center);
@@ -300,18 +301,17 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
 
 /// Surface::lift. Normals of corners that lean farther than 45 degrees are those of edges; what is
 /// no more than rounding is that of a flat or hollow surface.
-V3f lift_to_patch(const V3f (&corner)[3], const V3f (&normal)[3], const float (&weight)[3],
-                  const V3f& from, const Surface& s) {
-  const float side = dot(from, s.geometric_normal) > 0 ? -1.f : 1.f;
-  V3f lift(0);
+V3f lift_to_patch(const Corners& corner, const float (&weight)[3], const V3f& from,
+                  const Packed& position, const Packed& flat, const Packed& error) {
+  const float side = dot(Packed::load(from), flat) > 0 ? -1.f : 1.f;
+  Packed lift(V3f(0));
   for (int k = 0; k < 3; ++k) {
-    const V3f n = normal[k] * side;
-    const float along = dot(normal[k], s.geometric_normal), length2 = dot(n, n);
+    const Packed n = corner.normal[k] * side;
+    const float along = dot(corner.normal[k], flat), length2 = dot(n, n);
     if (!(along > 0 && along * along > 0.5f * length2)) return V3f(0);
-    lift -= n * (weight[k] * std::min(dot(s.position - corner[k], n), 0.f) / length2);
+    lift = lift - n * (weight[k] * std::min(dot(position - corner.position[k], n), 0.f) / length2);
   }
-  const float rounding = dot(absolute(s.geometric_normal), s.error);
-  return dot(lift, s.geometric_normal) * side > rounding ? lift : V3f(0);
+  return dot(lift, flat) * side > dot(absolute(flat), error) ? lift.unpacked() : V3f(0);
 }
 
 /// Turns the shading normal as the material's map says, unless that is out of the real surface.
@@ -322,7 +322,33 @@ void map_normal(Surface& s, const V3f& along_u, const V3f& along_v) {
 
 }  // namespace
 
-template <bool moving>
+Corners SceneObject::moved(uint32_t of, float time) const {
+  const auto& t = triangle[of];
+  const auto a = moved_vertex(t.x, time), b = moved_vertex(t.y, time), c = moved_vertex(t.z, time);
+  return {{a.first, b.first, c.first}, {a.second, b.second, c.second}};
+}
+
+std::pair<Packed, Packed> SceneObject::moved_vertex(uint32_t vertex, float time) const {
+  const auto between = [&](const std::vector<V3f>& from, const std::vector<V3f>& to, float at) {
+    const Packed a = Packed::load(from[vertex]);
+    return a + (Packed::load(to[vertex]) - a) * at;
+  };
+  if (key.empty()) return {between(position, position_close, time), Packed::load(normal[vertex])};
+  const size_t first = segment(time);
+  const float at = time * float(key.size() - 1) - float(first);
+  return {between(key[first].position, key[first + 1].position, at),
+          between(key[first].normal, key[first + 1].normal, at)};
+}
+
+V3f SceneObject::way(const Hit& hit, float time) const {
+  const size_t first = key.empty() ? 0 : segment(time);
+  const auto& open = key.empty() ? position : key[first].position;
+  const auto& close = key.empty() ? position_close : key[first + 1].position;
+  const auto& t = triangle[hit.triangle];
+  const auto of = [&](uint32_t vertex) { return absolute(close[vertex] - open[vertex]); };
+  return of(t.x) * (1 - hit.u - hit.v) + of(t.y) * hit.u + of(t.z) * hit.v;
+}
+
 Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   Surface s;
   if (hit.kind == Hit::Kind::ground) {
@@ -339,31 +365,27 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   s.material = &materials_[object.material];
   s.body = object.body;
   if (!object.sphere.empty()) {
-    meet_sphere<moving>(object, ray, hit, s);
+    meet_sphere(object, ray, hit, s);
     return s;
   }
-  const auto& t = object.triangle[hit.triangle];
-  const auto at = [&](uint32_t v) { return moving ? object.at(v, ray.time) : object.position[v]; };
-  const V3f a = at(t.x), b = at(t.y), c = at(t.z);
+  const Corners corner = object.corners(hit.triangle, ray.time);
+  const auto& [a, b, c] = corner.position;
   const float w = 1 - hit.u - hit.v;
-  s.position = a * w + b * hit.u + c * hit.v;
-  V3f size = absolute(a * w) + absolute(b * hit.u) + absolute(c * hit.v);
-  if constexpr (moving) {
-    const auto way = [&](uint32_t v) { return object.way(v, ray.time); };
-    size += way(t.x) * w + way(t.y) * hit.u + way(t.z) * hit.v;
-  }
-  s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
-  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(a, b, c, hit, s);
-  s.geometric_normal = normalized(cross(b - a, c - a));
-  const auto normal = [&](uint32_t v) {
-    return moving ? object.normal_at(v, ray.time) : object.normal[v];
-  };
-  const V3f corner_normal[3] = {normal(t.x), normal(t.y), normal(t.z)};
-  s.shading_normal =
-      normalized(corner_normal[0] * w + corner_normal[1] * hit.u + corner_normal[2] * hit.v);
+  const Packed position = a * w + b * hit.u + c * hit.v;
+  Packed size = absolute(a) * w + absolute(b) * hit.u + absolute(c) * hit.v;
+  if (object.moves()) size = size + Packed(object.way(hit, ray.time));
+  const Packed error = size * kRelativeError + Packed(_mm_set1_ps(largest(size) * kSharedError));
+  position.store(s.position);
+  error.store(s.error);
+  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(corner, hit, s);
+  const Packed flat = normalized(corner.across());
+  const Packed smooth =
+      normalized(corner.normal[0] * w + corner.normal[1] * hit.u + corner.normal[2] * hit.v);
+  flat.store(s.geometric_normal);
+  (dot(smooth, flat) > 0.01f ? smooth : flat).store(s.shading_normal);
   if (s.material->is_opaque_diffuse())
-    s.lift = lift_to_patch({a, b, c}, corner_normal, {w, hit.u, hit.v}, ray.direction, s);
-  if (!(dot(s.shading_normal, s.geometric_normal) > 0.01f)) s.shading_normal = s.geometric_normal;
+    s.lift = lift_to_patch(corner, {w, hit.u, hit.v}, ray.direction, position, flat, error);
+  const auto& t = object.triangle[hit.triangle];
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
   s.light = object.light;
@@ -371,14 +393,12 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (s.material->normal_map && !object.uv.empty()) {
     const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
     const float turn = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
-    map_normal(s, ((b - a) * q.y - (c - a) * p.y) * turn, ((c - a) * p.x - (b - a) * q.x) * turn);
+    const V3f e = (b - a).unpacked() * turn, f = (c - a).unpacked() * turn;
+    map_normal(s, e * q.y - f * p.y, f * p.x - e * q.x);
   }
   s.contact = !object.contact.empty() && object.contact[hit.triangle];
   return s;
 }
-
-template Surface Scene::surface<false>(const Ray&, const Hit&) const;
-template Surface Scene::surface<true>(const Ray&, const Hit&) const;
 
 V3f Scene::velocity(const Hit& hit) const {
   if (hit.kind != Hit::Kind::object) return V3f(0);
@@ -409,7 +429,7 @@ bool Scene::is_inside(uint32_t object, const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};
   // The mesh is closed and outward: a point is inside if the first side met is an inner one.
   const Hit hit = meet(object, up, kInfinity);
-  return hit.kind != Hit::Kind::nothing && surface<true>(up, hit).geometric_normal.y > 0;
+  return hit.kind != Hit::Kind::nothing && surface(up, hit).geometric_normal.y > 0;
 }
 
 }  // namespace drench

@@ -14,6 +14,7 @@
 #include "render/lights.h"
 #include "render/material.h"
 #include "render/options.h"
+#include "render/packed.h"
 
 namespace drench {
 
@@ -27,6 +28,24 @@ struct Medium {
 };
 
 class Turn;
+
+/// What a ray met first.
+struct Hit {
+  enum class Kind { nothing, light, ground, object };
+  Kind kind = Kind::nothing;
+  float distance = 0;     // m; infinity for nothing
+  uint32_t index = 0;     // of the light or object
+  uint32_t triangle = 0;  // or sphere
+  float u = 0, v = 0;     // barycentric weights of vertices 1 and 2
+};
+
+/// Of a triangle.
+struct Corners {
+  Packed position[3];  // m
+  Packed normal[3];    // of any length; of what moves straight those of shutter open
+
+  Packed across() const { return cross(position[1] - position[0], position[2] - position[0]); }
+};
 
 /// One mesh, or many spheres, at shutter open and, if it moves, at shutter close.
 struct SceneObject {
@@ -61,45 +80,24 @@ struct SceneObject {
     if (key.empty() && !position_close.empty()) out.push_back(position_close.data());
     return out;
   }
-  /// Where a vertex is at a time of the shutter, m.
-  V3f at(uint32_t vertex, float time) const {
-    const V3f& open = position[vertex];
-    if (position_close.empty()) return open;
-    if (key.empty()) return open + (position_close[vertex] - open) * time;
-    return between(&Key::position, vertex, time);
+  /// At a time of the shutter.
+  Corners corners(uint32_t of, float time) const {
+    if (!position_close.empty()) return moved(of, time);
+    const auto& t = triangle[of];
+    const V3f *p = position.data(), *n = normal.data();
+    return {{Packed::load(p[t.x]), Packed::load(p[t.y]), Packed::load(p[t.z])},
+            {Packed::load(n[t.x]), Packed::load(n[t.y]), Packed::load(n[t.z])}};
   }
-  /// How far a vertex comes on the straight way that it is on, along each axis, m. By so much its
-  /// ends, of which a place between is made, may be larger than that place.
-  V3f way(uint32_t vertex, float time) const {
-    if (position_close.empty()) return V3f(0);
-    if (key.empty()) return absolute(position_close[vertex] - position[vertex]);
-    const size_t k = segment(time);
-    return absolute(key[k + 1].position[vertex] - key[k].position[vertex]);
-  }
-  /// Not of unit length. Surfaces that move straight keep theirs.
-  V3f normal_at(uint32_t vertex, float time) const {
-    return key.empty() ? normal[vertex] : between(&Key::normal, vertex, time);
-  }
+  /// How far a point of a triangle comes on the straight way that it is on, along each axis, m. By
+  /// so much its ends, of which a place between is made, may be larger than that place.
+  V3f way(const Hit& hit, float time) const;
 
  private:
-  V3f between(std::vector<V3f> Key::*column, uint32_t vertex, float time) const {
-    const size_t k = segment(time);
-    const V3f &a = (key[k].*column)[vertex], &b = (key[k + 1].*column)[vertex];
-    return a + (b - a) * (time * float(key.size() - 1) - float(k));
-  }
+  Corners moved(uint32_t of, float time) const;
+  std::pair<Packed, Packed> moved_vertex(uint32_t vertex, float time) const;
   size_t segment(float time) const {
     return std::min(size_t(time * float(key.size() - 1)), key.size() - 2);
   }
-};
-
-/// What a ray met first.
-struct Hit {
-  enum class Kind { nothing, light, ground, object };
-  Kind kind = Kind::nothing;
-  float distance = 0;     // m; infinity for nothing
-  uint32_t index = 0;     // of the light or object
-  uint32_t triangle = 0;  // or sphere
-  float u = 0, v = 0;     // barycentric weights of vertices 1 and 2
 };
 
 /// What rays meet: all there is, or what the plate shows, holdouts and shadow catchers alone.
@@ -174,7 +172,6 @@ class Scene {
       if (object->moves()) __builtin_prefetch(&object->position_close[vertex]);
     }
   }
-  template <bool moving>
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
   std::pair<V3f, V3f> yarns_along(const Hit& hit, float time) const;

@@ -19,7 +19,7 @@ inline bool loses_ray(const Scene& scene, const V3f& start, uint32_t chain, int 
     if (dot(ray.direction, side) > 0) ray.direction = -ray.direction;
     const Hit hit = scene.intersect(ray, Coherence::incoherent);
     if (hit.kind != Hit::Kind::object) return true;
-    const Surface surface = scene.surface<false>(ray, hit);
+    const Surface surface = scene.surface(ray, hit);
     if (!(dot(ray.direction, surface.geometric_normal) >= 0)) return true;
     side = surface.geometric_normal;
     ray.origin = surface.leave(-side);

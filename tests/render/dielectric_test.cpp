@@ -375,7 +375,7 @@ TEST(WaterMesh, LosesNoRayThroughItsEdges) {
       ray.origin = V3f(10, 2, -3);
       continue;
     }
-    const Surface surface = scene.surface<false>(ray, hit);
+    const Surface surface = scene.surface(ray, hit);
     wrong_side += surface.geometric_normal.dot(ray.direction) > 0 ? 0 : 1;
     V3f d = direction();
     if (d.dot(surface.geometric_normal) > 0) d = -d;
@@ -412,7 +412,7 @@ TEST(WaterMesh, LetsRaysGoOnWhereItFliesPast) {
       ++lost;
       continue;
     }
-    const Surface surface = scene.surface<true>(ray, hit);
+    const Surface surface = scene.surface(ray, hit);
     ray.origin = surface.leave(d);
     caught += scene.intersect(ray, Coherence::incoherent).kind == Hit::Kind::object ? 1 : 0;
     ray = {surface.leave(-d), d, time};
