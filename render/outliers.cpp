@@ -10,8 +10,8 @@ namespace {
 using Plane = NoisyPicture::Plane;
 
 /// Luck is this many times brighter than all but a few of the 24 pixels around it, and its own
-/// samples do not know its brightness to this part; many may lie together that one or two samples
-/// found each.
+/// samples do not know its brightness to this part. Many may lie together that one or two samples
+/// found each: these are held against half of what is around them, and brought down to it.
 constexpr float kLuck = 4, kUnsure = 0.25f, kOneSample = 0.9f;
 constexpr size_t kFew = 3, kHalf = 12;
 /// A glint is this many times brighter than half of what is around it, with its noise; if few of
@@ -76,7 +76,8 @@ class Brightness {
     const float far = std::max(farther_around(p), picture_);
     if (mean_[p] > kGlint * far)
       return {std::min(usual, far) / mean_[p], true, seen(window), knows_shape(window)};
-    const float most = kLuck * beyond(around_, one_sample ? kHalf : kFew);
+    if (one_sample) return {mean_[p] > kLuck * usual ? usual / mean_[p] : 1};
+    const float most = kLuck * beyond(around_, kFew);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
 

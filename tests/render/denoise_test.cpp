@@ -79,13 +79,22 @@ TEST(Denoise, KeepsEdgesAndSlopes) {
 /// bright pixel that its samples are sure of stays.
 TEST(Denoise, TakesAwayLoneOutliersOnly) {
   const auto truth = [](int, int) { return 1.f; };
+  const auto add = [](NoisyPicture& picture, size_t p, float lone) {
+    for (int c = 0; c < 3; ++c) {
+      picture.half[0][c][p] += lone;
+      picture.variance[c][p] = lone * lone / 2;
+    }
+  };
   NoisyPicture picture = made(truth, none, kNoise, 9);
   for (const size_t p : {size_t(20 * kSize + 20), size_t(21 * kSize + 22), size_t(50 * kSize + 7)})
-    for (int c = 0; c < 3; ++c) {
-      picture.half[0][c][p] += 4000;
-      picture.variance[c][p] = 1e7f;
-    }
+    add(picture, p, 4000);
   EXPECT_LT(rms(denoise(picture), truth), 0.2 * kNoise);
+
+  // One of many samples, on a small drop before a clear sky: the drop's guide is no reason for it.
+  const auto drop = [](int x, int y) { return x == 20 && y == 20 ? 0.9f : 0.f; };
+  NoisyPicture sky = made(truth, drop, 0, 9);
+  add(sky, 20 * kSize + 20, 14);
+  EXPECT_NEAR(denoise(sky)[1][20 * kSize + 20], 1, 0.1);
 
   NoisyPicture sure = made(truth, none, kNoise, 10);
   const size_t star = 30 * kSize + 30;
