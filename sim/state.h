@@ -50,7 +50,8 @@ struct FluidState {
   Column<int>
       shaded;  // 1 where a sheet may hide neighbours; after the density pass: where one does
   Column<float> cloth_share;  // share of density that the sheet replaces
-  VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end
+  VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end and,
+                              // incompressible, would end
   VecColumn start;            // m, position at the start of the step
   VecColumn drift;            // m, of a path beside dt times the velocity (incompressible)
   Column<int> moved;          // 1: cannot meet a sheet, has made its whole step

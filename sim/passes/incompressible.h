@@ -105,13 +105,14 @@ inline void move_with_sheets(State& state) {
   FluidState& f = state.fluid;
   const float dt = float(state.dt);
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
-                drift = f.drift.view();
+                drift = f.drift.view(), end = f.impulse.view();
   finish_sheets(state);
   if (state.contact.near > 0) take_sheets_off_walls(state);
   parallel_for(
       "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> from = start[i];
         drift.set(i, x[i] - from - v[i] * dt);
+        end.set(i, x[i]);
         x.set(i, from);
       });
   move_coupled(state);

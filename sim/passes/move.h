@@ -211,7 +211,7 @@ inline void move_unguarded_particles(State& state) {
   // Others than the near ones are only known to be a support away, and may have come nearer since.
   state.contact.cloth_reach = std::min(reach, 0.4f * state.parameters.support_radius);
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
-                normal = f.normal.view();
+                normal = f.normal.view(), end = f.impulse.view();
   const float* distance = f.sheet_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
@@ -236,7 +236,7 @@ inline void move_unguarded_particles(State& state) {
           if (!near) far_by[i] -= path;
           return near ? 0 : 1;
         }
-        x.set(i, mover(x[i] + drift[i], velocity));
+        x.set(i, drift.any ? end[i] : mover(x[i], velocity));  // to the bit, as without sheets
         v.set(i, velocity);
         far_by[i] -= length(x[i] - start[i]);
         return 0;

@@ -75,6 +75,12 @@ Shot beside_ball(FluidSolver solver) {
   ball(shot, V3d(0.06, -0.98, 0));
   return shot;
 }
+/// The same with walls that hold it.
+Shot held_by_walls(FluidSolver solver) {
+  Shot shot = water(solver);
+  shot.domain.slip = Slip::none, shot.fluid.kinematic_viscosity = 1e-5;
+  return shot;
+}
 void inlet(Shot& shot, double start) {
   FluidEmitter emitter;
   emitter.center = V3d(0, -0.5, 0), emitter.radius = 0.03, emitter.speed = 1, emitter.start = start;
@@ -109,6 +115,22 @@ const Term terms[] = {
      Leaves::the_plan,
      {"apply_viscosity"},
      {"implicit viscosity"}},
+    {"no_slip_walls",
+     projected,
+     water,
+     [](Shot& s) { s.domain.slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.domain.slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {}},
+    {"moving_wall",
+     projected,
+     held_by_walls,
+     [](Shot& s) { s.domain.wall_velocity.y_low = V3d(0.5, 0, 0); },
+     [](Shot& s) { s.domain.wall_velocity.y_high = V3d(0.5, 0, 0); },
+     Leaves::the_plan,
+     {},
+     {}},
     {"no_slip_obstacle",
      projected,
      beside_ball,
@@ -230,6 +252,16 @@ const Term terms[] = {
      Leaves::the_bits,
      {"predict_around_obstacles", "project_around_obstacles"},
      {"obstacles"}},
+    {"sheet",
+     projected,
+     water,
+     [](Shot& s) { pin_edges(add_sheet(s, 0.2, -0.99, 8)); },
+     [](Shot& s) { pin_edges(add_sheet(s, 0.2, 0.5, 8)); },
+     Leaves::the_bits,
+     {"polygon_grid", "nearest_triangle", "sheet_side", "sort_near", "start_rows",
+      "linearise_cloth", "move_with_sheets"},
+     {"sheets", "implicit step of sheets", "nearest triangles", "remembered sides",
+      "rows of sheets", "paths"}},
     {"obstacle_under_cloth",
      projected,
      on_sheet,

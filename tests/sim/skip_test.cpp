@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <set>
+
 #include "sim/probe_series.h"
 #include "tests/sim/support.h"
 
@@ -42,6 +45,44 @@ TEST(Skip, EachCouplingBringsItsOwnPassesOnly) {
       EXPECT_EQ(pass.name.rfind("paper", 0) == 0 && !published, false) << pass.name;
     }
     EXPECT_EQ((run.solver->allocated() & sim::column_memory) != 0, !published);
+  }
+}
+
+std::set<std::string> names(const std::vector<sim::PassInfo>& plan) {
+  std::set<std::string> out;
+  for (const sim::PassInfo& pass : plan) out.insert(pass.name);
+  return out;
+}
+
+TEST(Skip, OnlyAFullBoxMakesItsDensityEven) {
+  Shot full = empty_shot();
+  full.fluid.solver = FluidSolver::incompressible;
+  full.domain.axis = {Axis::walls, Axis::periodic, Axis::walls};
+  full.domain.min = V3d(0), full.domain.max = V3d(8 * full.fluid.spacing);
+  add_box(full, V3d(0), {8, 8, 8});
+  Shot missing = full;  // a layer
+  missing.fluid.box.clear();
+  add_box(missing, V3d(0), {8, 8, 7});
+  const auto with = names(Stepper(full).solver->plan()),
+             without = names(Stepper(missing).solver->plan());
+  EXPECT_TRUE(with.count("project_full_box") && !with.count("project_density"));
+  EXPECT_TRUE(!without.count("project_full_box") && without.count("project_density"));
+}
+
+TEST(Skip, AWeaklyCompressibleFluidHasNothingOfThePressureSolve) {
+  Shot shot = empty_shot();
+  add_box(shot, V3d(0), {4, 4, 4});
+  for (const auto solver : {FluidSolver::weakly_compressible, FluidSolver::incompressible}) {
+    shot.fluid.solver = solver;
+    const Stepper run(shot);
+    const bool solves = solver == FluidSolver::incompressible;
+    EXPECT_EQ(names(run.solver->plan()).count("find_neighbours"), solves);
+    const auto groups = run.solver->memory();
+    EXPECT_EQ(std::any_of(groups.begin(), groups.end(),
+                          [](const sim::ColumnMemory& group) {
+                            return group.name.find("pressure solve") != std::string::npos;
+                          }),
+              solves);
   }
 }
 
