@@ -144,6 +144,7 @@ void martin_moyce(const Emit& emit) {
     line.more["shift"] = result.shift;
     line.more["slope"] = result.slope;
     line.more["height_rms"] = result.height;
+    line.more["energy_across"] = result.thickness;
     emit(line);
   }
 }
@@ -182,6 +183,7 @@ void lobovsky(const Emit& emit) {
     line.more["peak"] = result.peak;
     line.more["plateau"] = result.plateau;
     line.more["plateau_P"] = result.wall;
+    line.more["energy_across"] = result.thickness;
     emit(line);
   }
 }

@@ -64,6 +64,7 @@ void body_drag(const Emit& emit) {
     line.error = trough.error, line.gate = 0.07;
     line.error_of = "L2 of u over U";
     line.more["return_flow"] = trough.scale;
+    line.more["energy_across"] = trough.thickness;
     emit(line);
   }
   constexpr const char* name[] = {"plane", "box", "sheet"};
@@ -76,10 +77,12 @@ void body_drag(const Emit& emit) {
       line.method = std::string("film on a ") + name[int(floor)];
       line.threads = hardware_threads();
       line.resolution = std::to_string(layers) + " layers, " + std::to_string(film.particles);
-      line.error = std::abs(film.scale - 1), line.gate = 0.03;
+      line.error = std::abs(film.scale - 1);
+      if (layers == 24) line.gate = 0.03;
       line.error_of = "mean speed over Nusselt's, less 1";
       line.more["l2"] = film.error;
       line.more["force"] = film.force;
+      line.more["energy_across"] = film.thickness;
       emit(line);
     }
   }

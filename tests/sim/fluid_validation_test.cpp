@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/validation/fluid.h"
+#include "tests/validation/lobovsky.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -14,19 +17,29 @@ struct CollapseGate {
 };
 class MartinMoyce : public testing::TestWithParam<CollapseGate> {};
 
-// Measured: front 2.1, 2.4, 2.5 %, shift -0.11, -0.20, -0.24, slope 1.46, 1.49, 1.50 (experiment
-// 1.33 to T = 3), height 0.040, 0.029, 0.021.
+// Measured: front 2.0, 2.3, 2.5 %, shift -0.09, -0.19, -0.23, slope 1.46, 1.49, 1.51 (experiment
+// 1.33 to T = 3), height 0.035, 0.023, 0.023, energy across the plane 0.0016, 0.0006, 0.0002.
 TEST_P(MartinMoyce, FrontAndHeightFollowTheExperiment) {
   const validation::Collapse collapse = validation::martin_moyce(GetParam().across, 1e-4);
   EXPECT_LT(collapse.front, 0.05);
   EXPECT_LT(collapse.slope, 2);  // Ritter's front, which no friction slows
   EXPECT_LT(collapse.height, GetParam().height);
+  EXPECT_LT(collapse.thickness, 0.01);
 }
 
 INSTANTIATE_TEST_SUITE_P(Across, MartinMoyce,
                          testing::Values(CollapseGate{10, 0.045}, CollapseGate{20, 0.033},
                                          CollapseGate{40, 0.03}),
                          [](const auto& gate) { return std::to_string(gate.param.across); });
+
+// The first peak is a few particles' and falls by chance: the bench has it. Measured: time 1.1 %,
+// impulse 2 %, energy across the plane 0.019.
+TEST(Lobovsky, TheWallIsHitWhenTheExperimentSays) {
+  const validation::Impact impact = validation::lobovsky(20, 1e-4);
+  EXPECT_LT(std::abs(impact.time), 0.03);
+  EXPECT_LT(std::abs(impact.impulse), 0.15);
+  EXPECT_LT(impact.thickness, 0.05);
+}
 
 struct RestGate {
   int layers;

@@ -75,6 +75,13 @@ void Stepper::advance(double end) {
 
 V3d at(const sim::HostVec& v, size_t i) { return V3d(v.x[i], v.y[i], v.z[i]); }
 
+double energy_across(const sim::HostVec& velocity) {
+  double all = 0, across = 0;
+  for (size_t i = 0; i < velocity.x.size(); ++i)
+    all += at(velocity, i).length2(), across += velocity.z[i] * velocity.z[i];
+  return across / all;
+}
+
 std::vector<int> place_of_id(const sim::HostState& state) {
   std::vector<int> place(state.id.size());
   for (size_t i = 0; i < state.id.size(); ++i) place.at(state.id[i]) = int(i);

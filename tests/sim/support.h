@@ -47,6 +47,8 @@ struct Stepper {
 };
 
 V3d at(const sim::HostVec& v, size_t i);
+/// What a plane flow has across its plane: kinetic energy along z over all of it.
+double energy_across(const sim::HostVec& velocity);
 /// Index of every id in the columns of a state.
 std::vector<int> place_of_id(const sim::HostState& state);
 

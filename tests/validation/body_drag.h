@@ -8,6 +8,7 @@ struct Dragged {
   double scale = 0;       // m/s or what the function says
   double force = 0;       // what the function says
   double iterations = 0;  // of the viscous solve, a step
+  double thickness = 0;   // of plane flows: kinetic energy across the plane over all of it
   int particles = 0, steps = 0;
 };
 

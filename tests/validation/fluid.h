@@ -4,13 +4,14 @@
 
 namespace drench::validation {
 
-/// Collapse of a column twice as high as wide onto a dry floor, between free-slip walls that make
-/// it plane (Martin and Moyce 1952, tables 2 and 6; n^2 = 2, a = 0.05715 m).
+/// Collapse of a column twice as high as wide onto a dry floor, plane (Martin and Moyce 1952,
+/// tables 2 and 6; n^2 = 2, a = 0.05715 m).
 struct Collapse {
   double front = 0;   // RMS of the front's relative error, after the best shift in time
   double shift = 0;   // in T, at most 0.3 either way: the experiment's gate
   double slope = 0;   // dZ/dT past Z = 2; Ritter's limit is 2
   double height = 0;  // RMS of the error of the height at the back wall over the first, unshifted
+  double thickness = 0;  // kinetic energy across the plane over all of it, at the end
   int particles = 0;
 };
 /// @param across  particles across the width of the column.
@@ -22,7 +23,7 @@ struct Rest {
   double pressure = 0;  // RMS over the height of the error of the mean pressure, over rho g H
   double density = 0;   // mean of |rho / rho_0 - 1| a support below the surface
   double drift = 0;     // RMS speed at the end over sqrt(g H)
-  double volume = 0;  // twice the centre of mass' height over that of the start, less 1
+  double volume = 0;    // twice the centre of mass' height over that of the start, less 1
   int particles = 0;
 };
 Rest resting_column(int layers, double seconds, double tolerance);

@@ -52,6 +52,7 @@ fps = 100
 [domain]
 min = [0, 0, 0]
 max = [1.61, 0.9, {1}]
+z = "periodic"
 [fluid]
 spacing = {0}
 tolerance = {2}
@@ -66,7 +67,7 @@ position = [1.61, 0.003, {4}]
 normal = [1, 0, 0]
 radius = 0.0021
 )",
-                     a, 8 * a, tolerance, depth, 4 * a);
+                     a, 5 * a, tolerance, depth, 2.5 * a);
 }
 
 }  // namespace
@@ -87,6 +88,10 @@ Impact lobovsky(int across, double tolerance) {
   impact.peak = signal.peak() / data.peak() - 1;
   impact.wall = signal.mean(3.5, 5.5);
   impact.plateau = impact.wall / data.mean(3.5, 5.5) - 1;
+  double all = 0, across_plane = 0;
+  for (const V3f& u : run.simulator.particles().velocity)
+    all += u.length2(), across_plane += u.z * u.z;
+  impact.thickness = across_plane / all;
   impact.particles = int(run.simulator.particles().position.size());
   return impact;
 }

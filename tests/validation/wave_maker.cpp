@@ -100,11 +100,7 @@ WaveMaker wave_maker(int layers, double tolerance) {
   result.made = std::exp(log - slope * x), result.decay = -slope * 2 * pi / k;
   const double turned = std::remainder(wave.front().phase() - wave.back().phase(), 2 * pi);
   result.length = k * apart / std::abs(turned);
-  const sim::HostState s = run.solver->save();
-  double all = 0, across = 0;
-  for (size_t i = 0; i < s.id.size(); ++i)
-    all += sim_tests::at(s.velocity, i).length2(), across += s.velocity.z[i] * s.velocity.z[i];
-  result.thickness = across / all;
+  result.thickness = sim_tests::energy_across(run.solver->save().velocity);
   result.particles = run.solver->particles(), result.steps = run.steps;
   return result;
 }
