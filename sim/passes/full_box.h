@@ -50,6 +50,24 @@ struct Relaxation {
   }
 };
 
+/// First guess: the pressures of the last step less their mean. No divergence asks for a mean where
+/// there is no free surface, and hardly any takes it back: left to itself it grew to 0.15 of the
+/// friction in Couette's channel, and what a sheared packing answers to it bent the profile by 2.5
+/// %.
+inline void start_without_mean(State& state) {
+  start_from_last_step(state);
+  Float4* place = state.pressure.place.data();
+  float* before = state.pressure.before.data();
+  SolveControl* control = state.pressure.control.data();
+  const int n = state.fluid.count;
+  reduce_then(
+      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); },
+      AddDoubles{}, DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
+  parallel_for(
+      "full: first guess", n,
+      DRENCH_LAMBDA(int i) { place[i].w = before[i] = before[i] - control->mean; });
+}
+
 /// Velocities free of divergence at the places that they predict, and positions with them.
 inline void project_velocities(State& state, const Mover& move) {
   FluidState& f = state.fluid;
@@ -67,7 +85,7 @@ inline void project_velocities(State& state, const Mover& move) {
   density_rate(state);
   parallel_for(
       "full: divergence", f.count, DRENCH_LAMBDA(int i) { source[i] = product[i]; });
-  start_from_last_step(state);
+  start_without_mean(state);
   find_pressures(state, any_pressure);
   keep_pressures(state);
   find_kick(state, 0.5f * dt);

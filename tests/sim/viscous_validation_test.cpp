@@ -26,12 +26,12 @@ struct ChannelCase {
 };
 class Channels : public testing::TestWithParam<ChannelCase> {};
 
-// From a lattice shaken by a quarter spacing. Early errors fall with the resolution, late ones do
-// not (docs/benchmarks.md).
+// From a lattice shaken by a quarter spacing. Measured at 10, 20 and 40, at the last time: Couette
+// 0.22, 0.29, 0.56 %, Poiseuille 2.2, 1.2, 0.7 %, which slips beside the walls' first layer.
 TEST_P(Channels, StartAsTheSeriesSays) {
   const ChannelCase c = GetParam();
   const validation::Channel channel = validation::start_up(c.flow, c.across, 0.25);
-  const double most = c.across == 10 ? 0.025 : 0.02;  // Poiseuille at 10: 2.1 %, at 20: 0.4 %
+  const double most = c.flow == Flow::couette ? 0.01 : c.across == 10 ? 0.025 : 0.016;
   for (const double error : channel.error) EXPECT_LT(error, most);
   EXPECT_LT(channel.error[0], 0.2 / c.across);  // below a line of first order
 }
