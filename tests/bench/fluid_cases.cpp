@@ -183,6 +183,7 @@ void lobovsky(const Emit& emit) {
     line.more["peak"] = result.peak;
     line.more["plateau"] = result.plateau;
     line.more["plateau_P"] = result.wall;
+    line.more["plateau_over_frictionless"] = result.frictionless;
     line.more["energy_across"] = result.thickness;
     emit(line);
   }

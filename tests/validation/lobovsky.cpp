@@ -43,6 +43,14 @@ Signal measured() {
   return signal;
 }
 
+/// Of Ritter's wave (1892) where the wall stands: depth and speed head, (2 + (x / T)^2) / 3 in
+/// units of H, which is what the foot of the wall feels of a stream without friction. The
+/// reservoir's end tells on it from T = 6 on.
+double mean_head_at_wall(double from, double to) {
+  constexpr double x = (1.61 - 0.6) / depth;  // from the gate
+  return (2 + x * x / (from * to)) / 3;
+}
+
 std::string shot_text(int across, double tolerance) {
   const double a = depth / across;
   return fmt::format(R"(
@@ -88,6 +96,7 @@ Impact lobovsky(int across, double tolerance) {
   impact.peak = signal.peak() / data.peak() - 1;
   impact.wall = signal.mean(3.5, 5.5);
   impact.plateau = impact.wall / data.mean(3.5, 5.5) - 1;
+  impact.frictionless = impact.wall / mean_head_at_wall(3.5, 5.5) - 1;
   double all = 0, across_plane = 0;
   for (const V3f& u : run.simulator.particles().velocity)
     all += u.length2(), across_plane += u.z * u.z;
