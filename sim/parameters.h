@@ -39,6 +39,7 @@ struct Parameters {
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
   bool paper = false;            // coupling scheme
+  bool every_path = false;       // is tested, also of what cannot meet a sheet: for tests
   // air, which moves as WindNow says; 0: none
   float air_density = 0;                     // kg/m^3
   float cloth_drag = 0, cloth_friction = 0;  // coefficients across and along a sheet

@@ -110,11 +110,14 @@ inline Tested tested_of(const State& state, float cloth_moved) {
 
 DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-/// One round: where each particle ends, into f.impulse.
-inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt) {
+/// One round: where each particle ends, into f.impulse. In the first of an incompressible step it
+/// is there, as the pressure solve found it.
+inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt,
+                             int round) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
   const Drift drift = drift_of(state);
+  const bool found = drift.any && round == 0;
   const Mover mover = path_mover_of(state.parameters, dt);
   const ObstacleGuard guard = obstacle_guard_of(state, 0);
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
@@ -125,7 +128,7 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
         const int i = tested[k];
         const bool still = held[i] || moved[i];
         Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-        Vec3<float> to = still ? x[i] : mover(x[i] + drift[i], velocity);
+        Vec3<float> to = still ? x[i] : found ? end[i] : mover(x[i] + drift[i], velocity);
         if (!still) v.set(i, velocity);
         GuardCount result;
         if (triangle[i] < 0 || test.in_reach(i, to)) {
@@ -220,6 +223,7 @@ inline void move_unguarded_particles(State& state) {
   const Drift drift = drift_of(state);
   const float room = reach + 2.f * path_clearance * spacing,
               support = state.parameters.support_radius;
+  const bool every_path = state.parameters.every_path;
   const int far_ones = parallel_reduce(
       "guard: move", f.count, 0,
       DRENCH_LAMBDA(int i) {
@@ -230,7 +234,8 @@ inline void move_unguarded_particles(State& state) {
                     least = near ? d : support + max0(far_by[i]),
                     path = dt * length(velocity) + length(drift[i]);
         // Beyond a free edge the distance is not kept.
-        const bool guard = (near && length2(normal[i]) == 0.f) || least <= path + room;
+        const bool guard =
+            every_path || (near && length2(normal[i]) == 0.f) || least <= path + room;
         moved[i] = !guard;
         if (guard) {
           if (!near) far_by[i] -= path;
@@ -273,7 +278,7 @@ inline float guard_substep(State& state, float dt, float moved) {
   c.held.clear_bytes(0);
   c.stop_sum.clear_bytes(0);
   for (int round = 0;; ++round) {
-    const GuardCount count = test_paths(state, test, tested, dt);
+    const GuardCount count = test_paths(state, test, tested, dt, round);
     state.guard_hits += count.hits;
     state.owes |= count.hits > 0;
     if (count.unresolved == 0) break;
@@ -283,7 +288,7 @@ inline float guard_substep(State& state, float dt, float moved) {
     test = path_test_of(state, moved);
     if (!everywhere) continue;
     f.held.clear_bytes(1);
-    test_paths(state, test, tested, dt);
+    test_paths(state, test, tested, dt, round + 1);
     break;
   }
   accept_paths(state, tested);

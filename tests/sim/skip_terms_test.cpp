@@ -75,6 +75,12 @@ Shot beside_ball(FluidSolver solver) {
   ball(shot, V3d(0.06, -0.98, 0));
   return shot;
 }
+/// The same with a surface that is tense.
+Shot tense(FluidSolver solver) {
+  Shot shot = water(solver);
+  shot.fluid.surface_tension = 0.072;
+  return shot;
+}
 /// The same with walls that hold it.
 Shot held_by_walls(FluidSolver solver) {
   Shot shot = water(solver);
@@ -155,6 +161,14 @@ const Term terms[] = {
      Leaves::the_plan,
      {"apply_surface_tension"},
      {"surface tension"}},
+    {"contact_angle",
+     projected,
+     tense,
+     [](Shot& s) { s.domain.contact_angle_deg = 60; },
+     [](Shot& s) { s.domain.contact_angle_deg = 90; },
+     Leaves::the_plan,
+     {"apply_contact_angles"},
+     {"contact angles"}},
     {"wind_on_fluid",
      projected,
      water,
