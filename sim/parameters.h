@@ -26,7 +26,8 @@ struct Parameters {
   bool no_slip = false;                                    // at the domain's walls
   bool no_slip_obstacles = false, no_slip_sheets = false;  // at any of them
   float wall_velocity[3][2][3] = {};  // m/s, of an axis' lower and upper wall, along them
-  float gravity[3] = {0, 0, 0};       // m/s^2
+  float gravity[3] = {0, 0, 0};       // m/s^2, that moves what is free to
+  float held[3] = {0, 0, 0};          // m/s^2, gravity between the walls of a full box: pressure
   float surface_tension = 0;          // N/m
   float wetting = 0;                  // cosine of the contact angle at the domain's walls
   bool wets = false;                  // at anything at another angle than a right one

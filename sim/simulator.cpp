@@ -275,7 +275,7 @@ struct Simulator::Implementation {
     }
     if (report.sheets_cut_short > 0) {
       log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
-                                     "they lack some of the water's momentum. Shorter steps "
+                                     "they lack some of what pushed them. Shorter steps "
                                      "(shot.time_step) or softer cloth ask for less",
                                      frame, report.sheets_cut_short, report.steps));
     }

@@ -135,12 +135,13 @@ class BackendSolver : public Solver {
     Limits limits = measure_limits(state_);
     if (state_.parameters.incompressible && state_.fluid.count > 0) {
       const SolveControl solve = value_at(state_.pressure.control, 0);
-      limits.residual = solve.residual, limits.iterations = std::max(solve.spent, solve.iterations);
+      limits.residual = std::max(solve.left, solve.residual);
+      limits.iterations = std::max(solve.spent, solve.iterations);
       limits.step = float(dt), limits.pressure = solve.peak;
-      if (allocated_ & column_cloth_system) {
-        const ClothControl sheets = value_at(state_.cloth_system.control, 0);
-        limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
-      }
+    }
+    if (allocated_ & column_cloth_system) {
+      const ClothControl sheets = value_at(state_.cloth_system.control, 0);
+      limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
     }
     if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
       const ViscousControl solve = value_at(state_.viscosity.control, 0);

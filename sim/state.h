@@ -161,7 +161,8 @@ struct SolveControl {
   float relaxation = 0.4f;  // below 1 / the largest eigenvalue of the scaled matrix: 0.5 diverges
   float momentum = 1.f, extrapolation = 0.f;
   float mean = 0.f;  // where the fluid is full: of the first guess, then kg/m^3, of the source
-  int spent = 0;     // iterations of a solve before in the same step
+  int spent = 0;     // iterations of a solve before in the same step, and what it left
+  float left = 0.f;
   int levels = 1;    // 1 while coarse levels take part
   float peak = 0.f;  // p / rho_0, m^2/s^2: the greatest of a column at rest with the same moments
 };

@@ -123,9 +123,10 @@ inline void begin_next_solve(PressureState& s) {
   SolveControl* control = s.control.data();
   parallel_for(
       "solve: control", 1, DRENCH_LAMBDA(int) {
-        const int spent = control->iterations;
+        const SolveControl first = *control;
         *control = {};
-        control->spent = spent;
+        control->spent = first.iterations, control->left = first.residual;
+        control->peak = first.peak;
       });
 }
 

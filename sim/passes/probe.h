@@ -11,13 +11,31 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// Pressure of what gravity the walls of a full box hold up, Pa; none in its middle.
+inline double held_pressure(const Parameters& p, const float (&place)[3]) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k)
+    sum += double(p.rest_density) * p.held[k] * (place[k] - 0.5 * (p.low[k] + p.high[k]));
+  return sum;
+}
+
 /// Force of the fluid on a domain wall, N: what the step took from the fluid's momentum through the
 /// wall's pressure and viscosity, over dt. A particle that the pressure fails to stop and the last
 /// tenth of a spacing does (move.h) is not in it.
 inline std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
-  return to_vector(parallel_reduce("probe: wall force", state.fluid.count, Totals<3>{},
-                                   WallForce{step_pressure_of(state), {query.axis, query.side}},
-                                   AddTotals<3>{}));
+  const Parameters& p = state.parameters;
+  Totals<3> sum =
+      parallel_reduce("probe: wall force", state.fluid.count, Totals<3>{},
+                      WallForce{step_pressure_of(state), {query.axis, query.side}}, AddTotals<3>{});
+  float centre[3];
+  double area = query.side == 0 ? -1 : 1;  // along the axis
+  for (int k = 0; k < 3; ++k) {
+    centre[k] = 0.5f * (p.low[k] + p.high[k]);
+    if (k != query.axis) area *= double(p.high[k]) - p.low[k];
+  }
+  centre[query.axis] = query.side == 0 ? p.low[query.axis] : p.high[query.axis];
+  if (p.held[query.axis] != 0.f) sum.value[query.axis] += area * held_pressure(p, centre);
+  return to_vector(sum);
 }
 
 /// The same with the weights of a sensor, over their area, along the wall's normal, Pa.
@@ -27,7 +45,7 @@ inline double wall_pressure(const State& state, const ProbeQuery& query) {
                       WallSensor{{step_pressure_of(state), {query.axis, query.side}},
                                  soft_disc_of(query, state.parameters)},
                       AddTotals<1>{});
-  return sum.value[0] / query.extent;
+  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
 }
 
 /// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
@@ -38,7 +56,7 @@ inline double inner_pressure(const State& state, const ProbeQuery& query) {
                                                     soft_disc_of(query, state.parameters),
                                                     {f.grid, f.cell_start.data()}},
                                         AddTotals<1>{});
-  return sum.value[0] / query.extent;
+  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
 }
 
 struct VertexForce {
@@ -93,7 +111,8 @@ inline std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
   const FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
-  const Vec3<float> gravity{p.gravity[0], p.gravity[1], p.gravity[2]};
+  const Vec3<float> gravity{p.gravity[0] + p.held[0], p.gravity[1] + p.held[1],
+                            p.gravity[2] + p.held[2]};
   const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
   const AddTotals<3> add;
   const Totals<3> fluid = parallel_reduce(
@@ -149,6 +168,8 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
     case ProbeKind::wall_pressure:
       return {wall_pressure(state, query)};
     case ProbeKind::inner_pressure:
+      // What evens out a full box has had rows of its own since.
+      if (state.parameters.full) correct_gradients(state);
       return {inner_pressure(state, query)};
     case ProbeKind::wall_force:
       return wall_force(state, query);

@@ -125,7 +125,7 @@ struct WallForce {
     const float along = wall.axis == 0 ? g.x : wall.axis == 1 ? g.y : g.z;
     return step.mass * step.term[i] * along;
   }
-  /// The incompressible fluid slips.
+  /// Of the weakly compressible fluid; what no-slip walls take from the other is not in it.
   DRENCH_HD float drag(int i) const {
     if (step.wall || step.wall_viscosity == 0.f || !near(i)) return 0.f;
     const Vec3<float> p = step.at(i);
