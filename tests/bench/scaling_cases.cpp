@@ -128,13 +128,59 @@ void gpu_pool(const Pool& pool, const Emit& emit) {
   emit(line);
 }
 
+/// Rates of a GPU: the bar from a million particles on, and what the memory of an H200 (4.3 TB/s)
+/// bounds the rate at.
+struct Rate {
+  const char* name;
+  double bar, roof;  // 1/s
+};
+constexpr Rate iterations{"particle_iterations_per_s", 3e9, 11e9},
+    weak_steps{"particle_steps_per_s", 1.5e9, 6e9};
+
+void add_rate(Line& line, const Rate& rate, double value, double particles) {
+  line.more[rate.name] = value, line.more["of_roofline"] = value / rate.roof;
+  if (particles < 1e6) return;
+  line.error = rate.bar / value, line.gate = 1;
+  line.error_of = "the rate that is needed over the one reached";
+}
+
 void gpu_column(int side, const Emit& emit) {
   Pair pair(side, Where::cuda);
   Cost cost;
   for (int r = 0; r < 7; ++r) pair.round(cost);
   Line line = line_of(pair.scene, Where::cuda, cost);
-  line.more["us_a_step"] = 1e6 * median(cost.step) * double(pair.scene.start.id.size());
-  line.more["particle_iterations_per_s"] = 1 / median(cost.iteration);
+  const double n = double(pair.scene.start.id.size());
+  line.more["us_a_step"] = 1e6 * median(cost.step) * n;
+  add_rate(line, iterations, 1 / median(cost.iteration), n);
+  emit(line);
+}
+
+/// The same column, weakly compressible.
+void weak_column(int side, Where where, const Emit& emit) {
+  Shot shot = column_shot(side);
+  shot.fluid.solver = FluidSolver::weakly_compressible;
+  const sim::Scene scene = sim::build_scene(shot);
+  const auto solver = make_solver(scene.parameters, scene.cloth, where);
+  solver->load(scene.start);
+  sim::Limits limits = solver->measure();
+  const auto steps = [&](int count) {
+    for (int k = 0; k < count; ++k)
+      limits = solver->step(sim::stable_step(scene.parameters, limits).dt, 1);
+  };
+  steps(5);
+  std::vector<double> step;
+  Line line;
+  line.cost = Measured{};
+  for (int r = 0; r < 7; ++r) {
+    const Measured now = measure([&] { steps(10); });
+    step.push_back(seconds(now, where) / 10), add(*line.cost, now);
+  }
+  const double n = double(scene.start.id.size());
+  line.method = "weakly compressible";
+  line.resolution = std::to_string(scene.start.id.size()) + " particles";
+  line.device = name_of(where), line.threads = hardware_threads();
+  line.more["us_a_step"] = 1e6 * median(step);
+  if (where == Where::cuda) add_rate(line, weak_steps, n / median(step), n);
   emit(line);
 }
 
@@ -143,6 +189,7 @@ void fluid_gpu(const Emit& emit) {
 #if defined(DRENCH_HAS_CUDA)
   if (sim::cuda::device_available(reason)) {
     for (const int side : {40, 100, 200}) gpu_column(side, emit);
+    for (const int side : {40, 100, 200}) weak_column(side, Where::cuda, emit);
     for (const Pool& pool : {Pool{64, 16, 90}, Pool{128, 64, 180}}) gpu_pool(pool, emit);
     return;
   }
@@ -158,7 +205,10 @@ void fluid_gpu(const Emit& emit) {
 const Registration gpu{"fluid_gpu", "the same on a CUDA device to 8M, and coupling there",
                        fluid_gpu};
 const Registration scaling{"fluid_scaling", "time and memory of a particle from 64k to 4M",
-                           fluid_scaling};
+                           [](const Emit& emit) {
+                             fluid_scaling(emit);
+                             for (const int side : {40, 100}) weak_column(side, Where::cpu, emit);
+                           }};
 
 }  // namespace
 }  // namespace drench::bench
