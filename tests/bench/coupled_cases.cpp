@@ -1,4 +1,5 @@
-// Cases sheet_pool and strip_pool: a pool on a pinned sheet of light cotton against the springs'
+// Case coupled_momentum: what water and a free sheet lose of their momentum. Cases sheet_pool and
+// strip_pool: a pool on a pinned sheet of light cotton against the springs'
 // own static solution (tests/validation/coupled.h, strip_pool.h), run time against error.
 
 #include <cmath>
@@ -43,6 +44,23 @@ void strips(const Emit& emit) {
     emit(line);
   }
 }
+
+void momentum(const Emit& emit) {
+  for (const int across : {8, 12, 16}) {
+    validation::CoupledMomentum result;
+    Line line;
+    line.cost = measure([&] { result = validation::coupled_momentum(across, 1000); });
+    line.method = "incompressible, strong coupling, 1000 steps";
+    line.resolution = std::to_string(across) + " across, " + std::to_string(result.particles);
+    line.error = result.drift, line.gate = 1e-5;
+    line.error_of = "momentum of fluid and sheet, |p - p_0| over sum m max(speed, sqrt(g H))";
+    line.more["given_kg_m_s"] = result.given;
+    emit(line);
+  }
+}
+
+const Registration coupled_momentum{
+    "coupled_momentum", "momentum of a block of water and the free sheet that it hits", momentum};
 
 const Registration strip_pool{
     "strip_pool", "a pool on a sheet that spans a periodic axis: time and error of the sag",

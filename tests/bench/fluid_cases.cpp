@@ -153,7 +153,7 @@ void resting_column(const Emit& emit) {
   for (const int layers : {10, 20, 40}) {
     validation::Rest result;
     Line line;
-    line.cost = measure([&] { result = validation::resting_column(layers, 5, 1e-5); });
+    line.cost = measure([&] { result = validation::resting_column(layers, 5, 10, 1e-5); });
     line.method = "incompressible, tolerance 0.001 %";
     line.resolution =
         std::to_string(result.particles) + " particles, " + std::to_string(layers) + " layers";
@@ -193,7 +193,7 @@ const Registration impact{"fluid_lobovsky", "a collapsing column hits a wall wit
                           lobovsky};
 const Registration collapse{"fluid_martin_moyce", "a collapsing column against the experiment",
                             martin_moyce};
-const Registration rest{"fluid_rest", "a column at rest for 5 s", resting_column};
+const Registration rest{"fluid_rest", "a column at rest for 10 s", resting_column};
 
 }  // namespace
 }  // namespace drench::bench

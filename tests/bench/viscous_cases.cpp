@@ -31,6 +31,7 @@ void channels(const Emit& emit) {
         for (const double error : result.error) line.more["errors"].push_back(error);
         line.more["strength"] = result.strength;
         line.more["iterations"] = result.iterations;
+        line.more["energy_across"] = result.thickness;
         emit(line);
       }
     }
@@ -49,6 +50,7 @@ void spreading(const Emit& emit) {
     line.error_of = "RMS of the front's relative error";
     line.more["exponent"] = result.exponent;
     line.more["energy_gain"] = result.energy_gain;
+    line.more["energy_across"] = result.thickness;
     line.more["steps"] = result.steps;
     emit(line);
   }

@@ -13,13 +13,13 @@
 namespace drench::sim_tests {
 namespace {
 
-// Measured at 12 and 25 to the radius: axes 1.07 and 0.61 %, energy -3.3 and -1.8 %.
+// Measured at 12 and 25 to the radius: axes 0.86 and 0.49 %, energy -2.1 and -0.96 %.
 TEST(PlaneFlow, ADropInAStrainingFlowBecomesTheEllipse) {
   const validation::EllipticalDrop coarse = validation::elliptical_drop(12, 1e-4, 0.8),
                                    fine = validation::elliptical_drop(25, 1e-4, 0.8);
   EXPECT_LT(coarse.axis, 0.02);
   EXPECT_LT(fine.axis, 0.01);
-  EXPECT_LT(fine.energy, 0.025);
+  EXPECT_LT(fine.energy, 0.02);
   EXPECT_LT(fine.energy, 0.7 * coarse.energy);
   EXPECT_LT(fine.thickness, 0.01);
 }

@@ -149,4 +149,31 @@ PinnedPool pinned_pool(int across, double seconds, double areal_density) {
   return pool;
 }
 
+CoupledMomentum coupled_momentum(int across, int steps) {
+  constexpr double speed = 1, size = 0.08;  // m/s, m
+  Shot shot = empty_shot();
+  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = size / across;
+  add_box(shot, V3d(-0.5 * size, 2 * shot.fluid.spacing, -0.5 * size), {across, across, across},
+          V3d(0, -speed, 0));
+  Cloth& sheet = add_sheet(shot, 0.2, 0, 2 * across);
+  sheet.damping = 0, sheet.areal_density = 0.2;
+  Stepper run(shot);
+  const V3d before = total_momentum(run.scene, run.scene.start);
+  CoupledMomentum result;
+  result.particles = run.solver->particles();
+  const double longest = 0.25 * shot.fluid.spacing / speed / 10;  // s: nothing leaves the domain
+  for (int k = 0; k < steps; ++k) {
+    run.step(std::min(run.stable_dt(), longest));
+    const sim::HostState state = run.solver->save();
+    const double scale = momentum_scale(run.scene, state, speed / std::sqrt(2.));
+    result.drift =
+        std::max(result.drift, (total_momentum(run.scene, state) - before).length() / scale);
+    V3d sheets(0);
+    for (size_t v = 0; v < state.cloth_velocity.size(); ++v)
+      sheets += at(state.cloth_velocity, v) * double(run.scene.cloth.mass[v]);
+    result.given = std::max(result.given, sheets.length());
+  }
+  return result;
+}
+
 }  // namespace drench::validation

@@ -20,12 +20,14 @@ enum class Ends { periodic, walls, boxes, sheets };
 Drop oscillating_cylinder(double radius, Ends ends);
 
 /// Half a ball of water of this radius in spacings on a plane, or a block of about that volume on a
-/// wall of the domain or a held sheet, without gravity, with viscosity to come to rest: the angle of the cap that it becomes. The mean over a Rayleigh period after five.
+/// wall of the domain or a held sheet, without gravity, with viscosity to come to rest: the angle
+/// of the cap that it becomes. The mean over a Rayleigh period after five.
 struct Sessile {
   double by_centre = 0, by_height = 0;  // deg: from the volume and the centre of mass, the top
   double speed = 0;                     // RMS, over R omega
-  double lost = 0;  // momentum of the fluid and of the plane (of no other), over the mass times R omega
-  int away = 0;     // particles farther than 3 radii off
+  double lost =
+      0;  // momentum of the fluid and of the plane (of no other), over the mass times R omega
+  int away = 0;  // particles farther than 3 radii off
   int particles = 0;
 };
 enum class Ground { plane, wall, sheet };

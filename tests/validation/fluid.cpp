@@ -125,7 +125,7 @@ Collapse martin_moyce(int across, double tolerance) {
   return result;
 }
 
-Rest resting_column(int layers, double seconds, double tolerance) {
+Rest resting_column(int layers, double seconds, double until, double tolerance) {
   constexpr double depth = 0.2;
   const double a = depth / layers;
   const int side = std::max(12, layers / 2);
@@ -160,7 +160,8 @@ Rest resting_column(int layers, double seconds, double tolerance) {
   rest.pressure = std::sqrt(squares / double(error.size())) / (1000 * g * depth);
   rest.density = density / below;
   rest.drift = std::sqrt(speed2 / double(state.id.size()) / (g * depth));
-  rest.volume = sim_tests::centre_of_mass(state).y / start - 1;
+  run.advance(until);
+  rest.volume = sim_tests::centre_of_mass(run.solver->save()).y / start - 1;
   rest.particles = run.solver->particles();
   return rest;
 }

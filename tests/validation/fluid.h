@@ -17,15 +17,15 @@ struct Collapse {
 /// @param across  particles across the width of the column.
 Collapse martin_moyce(int across, double tolerance);
 
-/// A column of 0.2 m at rest between walls, `layers` deep, averaged over the last tenth of the
-/// time.
+/// A column of 0.2 m at rest between walls, `layers` deep, averaged over the last tenth of
+/// `seconds`; its volume is that after `until` s.
 struct Rest {
   double pressure = 0;  // RMS over the height of the error of the mean pressure, over rho g H
   double density = 0;   // mean of |rho / rho_0 - 1| a support below the surface
-  double drift = 0;     // RMS speed at the end over sqrt(g H)
-  double volume = 0;    // twice the centre of mass' height over that of the start, less 1
+  double drift = 0;     // RMS speed after `seconds` over sqrt(g H)
+  double volume = 0;    // the centre of mass' height over that of the start, less 1
   int particles = 0;
 };
-Rest resting_column(int layers, double seconds, double tolerance);
+Rest resting_column(int layers, double seconds, double until, double tolerance);
 
 }  // namespace drench::validation

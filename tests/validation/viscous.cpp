@@ -82,7 +82,9 @@ Channel start_up(Flow flow, int across, double shaken) {
       run.step(dt);
       result.iterations += double(run.limits.viscous_iterations) / result.steps;
     }
-    result.error[k] = l2_error(flow, times[k], width, viscosity / width, run.solver->save());
+    const sim::HostState state = run.solver->save();
+    result.error[k] = l2_error(flow, times[k], width, viscosity / width, state);
+    result.thickness = sim_tests::energy_across(state.velocity);
   }
   return result;
 }
@@ -120,6 +122,7 @@ Spreading huppert(int high) {
     const double now = energy_of(state), front = front_of(state) / height;
     result.energy_gain = std::max(result.energy_gain, (now - before) / start);
     before = now;
+    result.thickness = std::max(result.thickness, sim_tests::energy_across(state.velocity));
     if (front > 4.5) break;
     if (front < 2.5) continue;
     squares += std::pow(front * height / (rate * std::pow(run.time, 0.2)) - 1, 2), ++count;

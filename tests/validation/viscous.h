@@ -21,6 +21,7 @@ struct Channel {
   double error[3] = {};   // L2 over all particles, of u_x over u_max, at 0.05, 0.2 and 1
   double iterations = 0;  // of the viscous solve, a step
   double strength = 0;    // dt nu / h^2
+  double thickness = 0;   // kinetic energy across the plane over all of it, at the end
   int particles = 0, steps = 0;
 };
 /// @param across  particles from wall to wall; 100 times as many steps.
@@ -33,6 +34,7 @@ struct Spreading {
   double front = 0;        // RMS of the front's relative error while 2.5 to 4.5 times the start's
   double exponent = 0;     // of time, fitted there; 1/5
   double energy_gain = 0;  // largest of a step, over that of the start
+  double thickness = 0;    // kinetic energy across the plane over all of it, most of all steps
   int particles = 0, steps = 0;
 };
 /// @param high  particles from the floor to the top of the block.
