@@ -59,6 +59,10 @@ Gates squeezed() {
   return gates;
 }
 
+bool holds(const Watch& watch, const Gates& gates) {
+  return broken(watch.figures(), gates).empty();
+}
+
 void report(const std::string& stress, const std::string& setting, const Watch& watch,
             const Gates& gates, const std::string& measured) {
   const Figures f = watch.figures();

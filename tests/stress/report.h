@@ -28,6 +28,9 @@ struct Gates {
 /// Compression is reported alone where fluid is squeezed between closing sheets.
 Gates squeezed();
 
+/// Do the gates hold?
+bool holds(const Watch& watch, const Gates& gates);
+
 /// Adds a row and expects the gates to hold. The row says which of the common gates fail, whatever
 /// the test itself asks for.
 /// @param measured  the row's own figure, in words.
