@@ -11,7 +11,7 @@ namespace drench {
 namespace {
 
 /// Changes with the layout of what is archived.
-constexpr uint64_t kFormat = 0x6472656e63680003;  // "drench", 3
+constexpr uint64_t kFormat = 0x6472656e63680004;  // "drench", 4
 
 struct Head {
   uint64_t format = kFormat;
@@ -24,6 +24,7 @@ void archive(CheckpointArchive& file, Sums& sums) {
   sums.layers.archive(file);
   sums.plate.archive(file);
   sums.plan.archive(file);
+  sums.rounds.archive(file);
 }
 
 }  // namespace

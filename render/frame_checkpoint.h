@@ -6,6 +6,7 @@
 #include "render/layers.h"
 #include "render/matte.h"
 #include "render/options.h"
+#include "render/photon_rounds.h"
 #include "render/sample_plan.h"
 
 namespace drench {
@@ -16,11 +17,25 @@ struct Sums {
   LayerFilm layers;
   PlateFilm plate;
   SamplePlan plan;
+  PhotonRounds rounds;
   std::vector<PixelSum> without_plate{};  // with catchers, once settled
 
   /// Takes what shadow catchers leave to the plate out of the picture.
   void settle() {
     if (plate.has_catchers()) without_plate = plate.beauty(pixel);
+  }
+  /// Decides on the next pass. @return whether there is one
+  bool begin_pass() {
+    if (!plan.next(beauty())) return false;
+    rounds.begin_pass(plan.share());
+    return true;
+  }
+  /// Samples that a pixel shall have after a round of this pass.
+  int wanted(size_t p, int round) const { return rounds.upto(round, plan.wanted(p)); }
+  bool is_through(int round) const {
+    for (size_t p = 0; p < pixel.size(); ++p)
+      if (pixel[p].samples() < wanted(p, round)) return false;
+    return true;
   }
   /// Sums of the beauty.
   const std::vector<PixelSum>& beauty() const {

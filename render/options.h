@@ -57,6 +57,7 @@ struct RenderOptions {
   Walks walks = Walks::if_calm;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
+  double most_photons = 1e7;    // of a round, see photon_rounds.h: 1.5 GB while they are sorted
   FrameCheckpoint checkpoint{};
   Denoised denoised = Denoised::alone;
   std::shared_ptr<KeptParts> parts{};  // of frames of the same shot before; null: none

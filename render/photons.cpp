@@ -4,6 +4,7 @@
 #include <tbb/parallel_sort.h>
 
 #include <atomic>
+#include <bit>
 
 #include "render/bsdf_dielectric.h"
 #include "render/embree.h"
@@ -33,14 +34,17 @@ constexpr double kDotShare = 0.1;   // of a disc's light that one may bring wher
 constexpr float kCrowd = 4;         // times the photons of the median one's disc
 constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
 constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
-constexpr double kHand = 4;         // photons of the median one's disc in a hand, at least
+// Rounds after which hands are twice as many, log2: time is divided ever finer, and noise still
+// falls where eight samples in a row then miss photons of a round.
+constexpr unsigned kMoreHands = 4;
+constexpr double kHand = 4;  // photons of the median one's disc in a hand, at least
 // Share of the light that walks must find to be taken: each costs a path four rays, and where much
 // is left to photons the error is theirs (render_walks).
 constexpr double kCalm = 0.8;
 constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
-double wanted_count(size_t photons) { return 20 * std::sqrt(double(photons) / 1e5); }
+double wanted_count(double photons) { return 20 * std::sqrt(photons / 1e5); }
 
 /// The smooth bodies' triangles by area; those on sheets let light pass and start none.
 class InterfacePoints {
@@ -109,12 +113,14 @@ struct Flight {
 
 class PhotonTracer {
  public:
-  PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count, Walks walks)
+  PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count, int rounds,
+               Walks walks)
       : scene_(scene),
         starts_(starts),
         count_(count),
         walks_(walks),
-        most_power_(std::max(kMostPower, float(kDotShare * wanted_count(count)))) {}
+        most_power_(std::max(kMostPower, float(kDotShare * wanted_count(double(count) * rounds)))) {
+  }
 
   enum class Fate { lost, lies, walked };
 
@@ -295,7 +301,7 @@ double typical_count(const std::vector<Photon>& photons, float edge) {
 }
 
 float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& bounds) {
-  const double wanted = wanted_count(photons.size());
+  const double wanted = wanted_count(double(photons.size()));
   const float diagonal = std::max((bounds.max - bounds.min).length(), 1e-6f);
   // Cells stay countable, however far from the origin the photons lie.
   const float far = std::max(largest(absolute(bounds.min)), largest(absolute(bounds.max)));
@@ -312,26 +318,30 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-PhotonMap::PhotonMap(std::vector<Photon> photons, int samples) {
+PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, int rounds) {
   if (photons.empty()) return;
   size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
-  radius_ = choose_radius(photons, reach_);
+  radius_ = choose_radius(photons, reach_) / std::sqrt(std::sqrt(float(rounds)));
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
-  while (hands_log2_ < kMostHands && int(2 * hands()) <= samples &&
-         wanted_count(size_) >= kHand * 2 * hands())
+  const unsigned most_hands =
+      kMostHands + unsigned(std::bit_width(unsigned(rounds)) - 1) / kMoreHands;
+  const double wanted = wanted_count(double(size_) * rounds);
+  while (hands_log2_ < most_hands && int(2 * hands()) <= samples && wanted >= kHand * 2 * hands())
     ++hands_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
   while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
-  choose_radii(photons);
+  choose_radii(photons, rounds);
   deal(photons);
 }
 
-void PhotonMap::choose_radii(const std::vector<Photon>& photons) {
+void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
   std::vector<uint32_t> count(size_t{mask_} + size_t(cell_of(reach_.max).x) + 2);
   for (const Photon& p : photons) ++count[bucket_of(cell_of(p.position))];
-  const uint32_t crowd = std::max(kFewest, uint32_t(kCrowd * 4 / kPi * wanted_count(size_)));
+  const double wanted = wanted_count(double(size_) * rounds) / rounds;
+  const uint32_t crowd =
+      std::max({1u, kFewest / uint32_t(rounds), uint32_t(kCrowd * 4 / kPi * wanted)});
   for (const uint32_t c : count)
     radius2_.push_back(radius_ * radius_ * (c > crowd ? float(crowd) / float(c) : 1.f));
 }
@@ -383,11 +393,13 @@ bool can_trace_photons(const Scene& scene) {
 }
 
 Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
-                       uint64_t& rays) {
+                       uint64_t& rays, const PhotonRound& round) {
   constexpr uint32_t chunk = 4096;
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
-  const PhotonTracer tracer(scene, starts, count, walks);
+  const uint32_t index = uint32_t(round.index), slot = index & ((1u << round.slots_log2) - 1);
+  const uint32_t round_seed = seed ^ kSeed ^ hash_bits(index >> round.slots_log2);
+  const PhotonTracer tracer(scene, starts, count, round.rounds, walks);
   struct Found {
     Photon photon;
     bool walked;
@@ -399,7 +411,8 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
     uint64_t chunk_rays = 0;
     size_t from = starts.triangle_at(double(c) * chunk / count);
     for (uint32_t k = uint32_t(c) * chunk; k < std::min(count, (uint32_t(c) + 1) * chunk); ++k) {
-      const Sampler sampler(PixelOrder::separate, seed ^ kSeed, 0, 0, 0, k);
+      const Sampler sampler(PixelOrder::separate, round_seed, 0, 0, 0,
+                            k << round.slots_log2 | slot);
       Photon photon;
       const PhotonTracer::Fate fate = tracer.trace(k, sampler, from, photon, chunk_rays);
       if (fate != PhotonTracer::Fate::lost)
@@ -424,7 +437,7 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
   for (const std::vector<Found>& part : found)
     for (const Found& f : part)
       if (walks == Walks::none || !f.walked) left.push_back(f.photon);
-  out.photons = PhotonMap(std::move(left), samples);
+  out.photons = PhotonMap(std::move(left), samples, round.rounds);
   return out;
 }
 

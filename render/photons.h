@@ -13,6 +13,10 @@
 // pixel, each of which finds its own hand, a map of its own with as much light. Together they see
 // what each would have seen, at a fraction of the cost. They are dealt by their time in the
 // shutter, so that a sample of what moves finds those of about its own time.
+//
+// More photons than fit into memory come in rounds, each a map of its own that lights a part of
+// every pixel's samples (photon_rounds.h). Radius and power are those of all rounds together, whose
+// light a pixel averages, as one map of all would have it.
 
 #include <immintrin.h>
 
@@ -58,7 +62,8 @@ class PhotonMap {
  public:
   PhotonMap() = default;
   /// @param samples  of a pixel, which may share the photons
-  explicit PhotonMap(std::vector<Photon> photons, int samples = 1);
+  /// @param rounds   maps of as many photons whose light is averaged
+  explicit PhotonMap(std::vector<Photon> photons, int samples = 1, int rounds = 1);
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
@@ -99,7 +104,7 @@ class PhotonMap {
     return p.x >= low.x && p.y >= low.y && p.z >= low.z && p.x <= high.x && p.y <= high.y &&
            p.z <= high.z;
   }
-  void choose_radii(const std::vector<Photon>& photons);
+  void choose_radii(const std::vector<Photon>& photons, int rounds);
   /// Sorts them by hand and by bucket.
   void deal(const std::vector<Photon>& photons);
   /// From 0 on within `reach_`.
@@ -174,6 +179,14 @@ class PhotonMap {
 /// of them in a body.
 bool can_trace_photons(const Scene& scene);
 
+/// One of several maps of as many photons whose light is averaged: each photon of one map and those
+/// of its number in the others are drawn as the samples of a pixel are.
+struct PhotonRound {
+  int index = 0;
+  int rounds = 1;           // until the radius is chosen again
+  uint32_t slots_log2 = 0;  // of a photon; those of later rounds draw apart
+};
+
 /// The light of lamps that comes through bodies: photons, and walks (manifold.h) for what these
 /// leave out.
 struct Caustics {
@@ -188,6 +201,6 @@ struct Caustics {
 /// @param walks    which are tried
 /// @param rays     counts rays traced
 Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
-                       uint64_t& rays);
+                       uint64_t& rays, const PhotonRound& round = {});
 
 }  // namespace drench

@@ -48,11 +48,6 @@ void check_settings(const RenderSettings& r) {
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
 }
 
-uint32_t photon_count(const RenderSettings& r) {
-  constexpr double kMost = 1e7;  // 1.5 GB while they are sorted
-  return uint32_t(std::clamp(r.photons * r.samples * r.width * r.height, 1., kMost));
-}
-
 /// What every tile reads.
 struct Job {
   const Scene& scene;
@@ -133,8 +128,9 @@ void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
   sums.layers.clear(*sample.record);
 }
 
-/// Brings the pixels of a tile to the numbers of samples that are planned. @return those added
-uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
+/// Brings the pixels of a tile to the numbers of samples that are planned until the end of a round.
+/// @return those added
+uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
   std::vector<PathRecord> record(kPathsAtOnce, sums.layers.blank());
   const bool records = sums.layers.records();
@@ -145,7 +141,7 @@ uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
     for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
       FilmPoints film(job, x + job.window.x, y + job.window.y);
-      const int wanted = sums.plan.wanted(pixel);
+      const int wanted = sums.wanted(pixel, round);
       for (int s = sums.pixel[pixel].samples(); s < wanted; s = sums.pixel[pixel].samples()) {
         samples.clear();
         for (size_t k = 0; k < kPathsAtOnce && s + int(k) < wanted; ++k)
@@ -161,9 +157,9 @@ uint64_t render_tile(const Job& job, int tile, Sums& sums, uint64_t& rays) {
 
 using Clock = std::chrono::steady_clock;
 
-/// One pass over the tiles, which breaks off between two of them at `until`. Samples are whole
-/// then, and the same call goes on. @return whether the pass is through
-bool render_tiles(const Job& job, Sums& sums, Clock::time_point until, uint64_t& rays,
+/// One round of a pass over the tiles, which breaks off between two of them at `until`. Samples are
+/// whole then, and the same call goes on. @return whether the round is through
+bool render_tiles(const Job& job, int round, Sums& sums, Clock::time_point until, uint64_t& rays,
                   Progress& progress) {
   std::atomic<uint64_t> traced{0};
   std::atomic<bool> through{true};
@@ -176,7 +172,7 @@ bool render_tiles(const Job& job, Sums& sums, Clock::time_point until, uint64_t&
         }
         uint64_t here = 0;
         for (int tile = range.begin(); tile < range.end(); ++tile)
-          progress.done(render_tile(job, tile, sums, here));
+          progress.done(render_tile(job, tile, round, sums, here));
         traced += here;
       },
       tbb::simple_partitioner{});
@@ -185,23 +181,27 @@ bool render_tiles(const Job& job, Sums& sums, Clock::time_point until, uint64_t&
 }
 
 /// All passes, with checkpoints in between and when `progress` throws.
-void render_passes(const Job& job, const FrameCheckpoint& checkpoint, Sums& sums, uint64_t& rays,
-                   Progress& progress) {
+void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& photons, Sums& sums,
+                   uint64_t& rays, Progress& progress) {
   const bool keeps = !checkpoint.file.empty();
   const auto every = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(std::min(checkpoint.every_s, 1e6)));
-  bool more = read_checkpoint(checkpoint, sums) || sums.plan.next(sums.pixel);
+  bool more = read_checkpoint(checkpoint, sums) || sums.begin_pass();
   progress.had(sums.pixel);
   try {
     while (more) {
       progress.expect(sums.plan.expected());
-      const Clock::time_point until = keeps ? Clock::now() + every : Clock::time_point::max();
-      if (!render_tiles(job, sums, until, rays, progress)) {
-        write_checkpoint(checkpoint, sums);
-        continue;
+      for (int round = sums.rounds.first(); round < sums.rounds.end(); ++round) {
+        const bool last = round + 1 == sums.rounds.end();  // whose photons are told of
+        if (!last && sums.is_through(round)) continue;
+        photons.turn_to(round, sums.rounds, rays);
+        job.path.walks = photons.caustics().walks;
+        const auto until = [&] { return keeps ? Clock::now() + every : Clock::time_point::max(); };
+        while (!render_tiles(job, round, sums, until(), rays, progress))
+          write_checkpoint(checkpoint, sums);
       }
       sums.settle();
-      more = sums.plan.next(sums.beauty());
+      more = sums.begin_pass();
     }
   } catch (...) {
     if (keeps) write_checkpoint(checkpoint, sums);
@@ -302,33 +302,28 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   path.refraction_alpha = shot.render.refraction_alpha;
   path.camera_in = scene.bodies_at(scene.camera().open().position, 0);
   const uint32_t seed = hash_bits(shot.render.seed ^ hash_bits(uint32_t(frame)));
-  uint64_t photon_rays = 0;
-  Caustics caustics;
-  if (shot.render.photons > 0 && can_trace_photons(scene)) {
-    caustics = trace_photons(scene, seed, photon_count(shot.render), shot.render.samples,
-                             options.walks, photon_rays);
-    path.photons = &caustics.photons;
-    path.walks = caustics.walks;
-  }
+  FramePhotons photons(scene, shot.render, options.walks, seed);
+  if (photons.any()) path.photons = &photons.caustics().photons;
   const FilmWindow window = window_of(shot.render);
   const bool whole = window.frame_width == 0;
-  const Job job{scene,
-                path,
-                path_function(scene.features() | options.force_features),
-                PixelFilter(),
-                options.pixel_order,
-                seed,
-                uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
-                window,
-                whole ? shot.render.width : shot.render.crop_max.x - window.x,
-                whole ? shot.render.height : shot.render.crop_max.y - window.y};
-  Sums sums{std::vector<PixelSum>(size_t(job.width) * job.height),
-            LayerFilm(shot, frame, scene, job.width, job.height),
-            plate_film(shot, scene, size_t(job.width) * job.height),
-            SamplePlan(job.width, job.height, shot.render.samples, shot.render.error)};
+  Job job{scene,
+          path,
+          path_function(scene.features() | options.force_features),
+          PixelFilter(),
+          options.pixel_order,
+          seed,
+          uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
+          window,
+          whole ? shot.render.width : shot.render.crop_max.x - window.x,
+          whole ? shot.render.height : shot.render.crop_max.y - window.y};
+  const size_t pixels = size_t(job.width) * job.height;
+  Sums sums{std::vector<PixelSum>(pixels), LayerFilm(shot, frame, scene, job.width, job.height),
+            plate_film(shot, scene, pixels),
+            SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
+            photons.rounds(shot.render, options.most_photons)};
   Progress report(progress);
-  uint64_t rays = photon_rays;
-  render_passes(job, options.checkpoint, sums, rays, report);
+  uint64_t rays = 0;
+  render_passes(job, options.checkpoint, photons, sums, rays, report);
   if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
@@ -337,8 +332,8 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
               rays,
               picture_error(sums.beauty()),
               process_cpu_seconds() - cpu_start,
-              caustics.photons.empty() ? 0 : caustics.photons.radius(),
-              caustics.walked};
+              sums.rounds.radius(photons.caustics().photons.radius()),
+              photons.caustics().walked};
   }
   return film;
 }

@@ -51,7 +51,8 @@ struct RenderStats {
   uint64_t camera_samples = 0, rays = 0;
   double relative_mse = 0;  // of the frame, as its samples tell; 0 with fewer than 16 a pixel
   double cpu_s = 0;         // of the whole process during the call
-  /// m: photons blur caustics by that at most; 0: all is right in the mean.
+  /// m: photons blur caustics by that at most, of several rounds in the mean; 0: all is right in
+  /// the mean.
   double photon_radius = 0;
   double walked = 0;  // share of photons' light that walks (manifold.h) would find
 };

@@ -52,9 +52,16 @@ void SamplePlan::archive(CheckpointArchive& file) {
   file.column(wanted_);
 }
 
+double SamplePlan::share() const {
+  if (wanted_.empty()) return 1;
+  double sum = 0;
+  for (const int wanted : wanted_) sum += wanted;
+  return sum / (double(most_) * double(wanted_.size()));
+}
+
 bool SamplePlan::next(const std::vector<PixelSum>& pixels) {
   if (passes_++ == 0) {
-    if (target_ > 0 && most_ > kFirst) wanted_.assign(pixels.size(), kFirst);
+    if (target_ > 0 && most_ > kFirst) wanted_.assign(size_t(width_) * height_, kFirst);
     return true;
   }
   if (wanted_.empty()) return false;

@@ -27,6 +27,8 @@ class SamplePlan {
   /// Samples that a pixel shall have after this pass.
   int wanted(size_t pixel) const { return wanted_.empty() ? most_ : wanted_[pixel]; }
   void archive(CheckpointArchive& file);
+  /// Samples that all pixels will have after this pass, over the most.
+  double share() const;
   /// How many all pixels are expected to have at the end.
   double expected() const { return expected_; }
 
