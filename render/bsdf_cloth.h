@@ -10,6 +10,11 @@ namespace drench {
 /// Of photons, on the side that is looked at and on the other, W/m^2.
 struct Irradiance {
   V3f front{0, 0, 0}, back{0, 0, 0};
+
+  void add(const Irradiance& other, float factor) {
+    front += other.front * factor;
+    back += other.back * factor;
+  }
 };
 
 class ClothBsdf {

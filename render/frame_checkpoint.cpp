@@ -25,6 +25,7 @@ void archive(CheckpointArchive& file, Sums& sums) {
   sums.plate.archive(file);
   sums.plan.archive(file);
   sums.rounds.archive(file);
+  file.column(sums.split);
 }
 
 }  // namespace

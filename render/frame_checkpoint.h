@@ -18,6 +18,7 @@ struct Sums {
   PlateFilm plate;
   SamplePlan plan;
   PhotonRounds rounds;
+  std::vector<PixelSum> split{};          // of what photons bring; empty without any
   std::vector<PixelSum> without_plate{};  // with catchers, once settled
 
   /// Takes what shadow catchers leave to the plate out of the picture.
@@ -25,8 +26,8 @@ struct Sums {
     if (plate.has_catchers()) without_plate = plate.beauty(pixel);
   }
   /// Decides on the next pass. @return whether there is one
-  bool begin_pass() {
-    if (!plan.next(beauty())) return false;
+  bool begin_pass(double photon_error) {
+    if (!plan.next(beauty(), photon_error)) return false;
     rounds.begin_pass(plan.share());
     return true;
   }

@@ -23,7 +23,7 @@ void finish(const PathTracer<features>& path, CameraSample& sample, uint64_t& ra
   sample.found = path.sample();
   PathRecord* const record = sample.record;
   if (finite(sample.found.radiance) && !(record && !finite(record->matte.without))) return;
-  sample.found.radiance = V3f(0);
+  sample.found.radiance = sample.found.split = V3f(0);
   if (record) clear_light(*record);
 }
 

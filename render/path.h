@@ -28,6 +28,7 @@ enum CameraDimension : uint32_t { kFilterDimension, kLensDimension, kTimeDimensi
 struct PathSample {
   V3f radiance;     // W/(sr m^2)
   float alpha = 1;  // less where the camera sees the background or a holdout
+  V3f split{0.f};   // of what photons bring: GatheredLight
 };
 
 /// What a camera sample met, for the layers of a film.

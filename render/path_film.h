@@ -15,7 +15,7 @@ class PathFilm {
  public:
   explicit PathFilm(PathRecord* record) : record_(record) {}
 
-  PathSample sample() const { return {radiance_, alpha_}; }
+  PathSample sample() const { return {radiance_, alpha_, split_}; }
   bool records() const { return record_ != nullptr; }
 
   World world() const {
@@ -95,11 +95,14 @@ class PathFilm {
     if (record_ && !record_->light.empty()) record_->light[group] += found;
   }
 
+  /// By how much one half of the photons adds more to that than the other.
+  void split(const V3f& found) { split_ += found; }
+
   [[no_unique_address]] std::conditional_t<has_plate, PlateWalk, std::monostate> plate;
 
  private:
   PathRecord* record_;
-  V3f radiance_{0, 0, 0};
+  V3f radiance_{0, 0, 0}, split_{0, 0, 0};
   float alpha_ = 1;
 };
 

@@ -489,17 +489,21 @@ class PathTracer {
                     const Bsdf& bsdf) {
     const float gathers = state.diffuse > 1 ? kLaterGathers : 1.f;
     if (!(u[kLightChoice].y < gathers)) return;
-    Irradiance light;
+    GatheredLight light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
     const unsigned hand = settings_.photons->hand_at(sampler_.one(kTimeDimension));
     if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
       light = settings_.photons->irradiance(hand, at, normal, bsdf.front());
     else
-      settings_.photons->for_each_near(hand, at, normal,
-                                       [&](const V3f& flight, const V3f& power, float share) {
-                                         bsdf.receive(light, -flight, power * share);
-                                       });
-    V3f found = bsdf.radiance(light);
+      settings_.photons->for_each_near(
+          hand, at, normal, [&](const V3f& flight, const V3f& power, float share, float half) {
+            Irradiance one;
+            bsdf.receive(one, -flight, power * share);
+            light.all.add(one, 1);
+            light.split.add(one, half);
+          });
+    film_.split(state.throughput * bsdf.radiance(light.split) * (1 / gathers));
+    V3f found = bsdf.radiance(light.all);
     if (settings_.walks == Walks::some) found += walked_light(state, surface, u, bsdf);
     film_.deposit(state.throughput * found * (1 / gathers), scene_.lights().caustics_group());
   }

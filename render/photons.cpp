@@ -367,8 +367,8 @@ void PhotonMap::deal(const std::vector<Photon>& photons) {
   }
 }
 
-Irradiance PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& normal,
-                                 const V3f& front) const {
+GatheredLight PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& normal,
+                                    const V3f& front) const {
   __m256 sum[2][3] = {};
   for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
     const __m256 along = unpack_unit<0>(p.flight) * front.x + unpack_unit<1>(p.flight) * front.y +
@@ -379,13 +379,15 @@ Irradiance PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& nor
     for (int side = 0; side < 2; ++side)
       for (int c = 0; c < 3; ++c) sum[side][c] += shares[side] * _mm256_load_ps(power[c]->data());
   });
-  const auto total = [&](int side) {
+  const auto total = [&](int side, const auto& factor) {
     V3f out(0);
     for (int c = 0; c < 3; ++c)
-      for (int k = 0; k < 8; ++k) out[c] += sum[side][c][k];
+      for (int k = 0; k < 8; ++k) out[c] += sum[side][c][k] * factor(k);
     return out;
   };
-  return {total(0), total(1)};
+  const auto all = [](int) { return 1.f; };
+  const auto half = [](int k) { return kHalf[k]; };
+  return {{total(0, all), total(1, all)}, {total(0, half), total(1, half)}};
 }
 
 bool can_trace_photons(const Scene& scene) {

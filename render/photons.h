@@ -17,6 +17,9 @@
 // More photons than fit into memory come in rounds, each a map of its own that lights a part of
 // every pixel's samples (photon_rounds.h). Radius and power are those of all rounds together, whose
 // light a pixel averages, as one map of all would have it.
+//
+// Every second photon of a bucket belongs to one half of the map, the others to the other: what the
+// halves bring differs by as much as their sum errs, since both are drawn alike.
 
 #include <immintrin.h>
 
@@ -37,6 +40,11 @@ struct Photon {
   V3f normal;      // unit, of the surface it lies on
   V3f power;       // W; of one that came through water divided by the squared index, as radiance is
   float turn = 0;  // from 0 to 1: of its time among those of the others
+};
+
+/// What photons bring, and by how much one half of them brings more than the other.
+struct GatheredLight {
+  Irradiance all, split;  // W/m^2
 };
 
 /// Eight photons as packs, four lines of the cache in a row.
@@ -72,9 +80,10 @@ class PhotonMap {
   /// The hand of those whose turn it is.
   unsigned hand_at(float turn) const { return std::min(unsigned(turn * hands()), hands() - 1); }
 
-  /// Calls f(direction of flight, power, share) for photons of a hand near a point of a surface:
-  /// the sum of share x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel over a
-  /// disc, which is smaller where photons crowd: there fewer do, and its blur shows most.
+  /// Calls f(direction of flight, power, share, half) for photons of a hand near a point of a
+  /// surface: the sum of share x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel
+  /// over a disc, which is smaller where photons crowd: there fewer do, and its blur shows most.
+  /// The half is 1 or -1.
   template <class F>
   void for_each_near(unsigned hand, const V3f& point, const V3f& normal, const F& f) const {
     for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
@@ -86,17 +95,18 @@ class PhotonMap {
       for (unsigned k = 0; k < 8; ++k)
         if (shares[k] > 0)
           f(V3f(flight[0][k], flight[1][k], flight[2][k]), V3f(p.red[k], p.green[k], p.blue[k]),
-            shares[k]);
+            shares[k], kHalf[k]);
     });
   }
 
-  /// The irradiance that they sum up to, W/m^2, on the side that `front` points to and on the
-  /// other.
-  Irradiance irradiance(unsigned hand, const V3f& point, const V3f& normal, const V3f& front) const;
+  /// What they sum up to on the side that `front` points to and on the other.
+  GatheredLight irradiance(unsigned hand, const V3f& point, const V3f& normal,
+                           const V3f& front) const;
 
  private:
   static constexpr float kSameSurface = 0.7f;  // cosine between normals
   static constexpr float kThickness = 0.5f;    // of the disc, radii: curved surfaces count whole
+  static constexpr float kHalf[8] = {1, -1, 1, -1, 1, -1, 1, -1};  // by place in a pack
 
   /// Also false for a point that is not finite.
   bool reaches(const V3f& p) const {

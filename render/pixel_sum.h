@@ -37,6 +37,11 @@ class PixelSum {
     }
     return float(square / (whole_ - 1) / (double(size_) * samples_));
   }
+  /// Of the mean's square what its batches have in common: that less the mean's variance. Right in
+  /// the mean, if not above 0; 0 while there are fewer than two batches.
+  float common_square(int channel) const {
+    return whole_ < 2 ? 0 : mean(channel) * mean(channel) - variance(channel);
+  }
   /// This, less a share of the colours that the same samples add up to elsewhere.
   PixelSum less(const PixelSum& other, const V3f& share) const {
     PixelSum out = *this;

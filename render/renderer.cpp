@@ -122,6 +122,7 @@ class Progress {
 
 void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
   sums.pixel[pixel].add(sample.found.radiance, sample.found.alpha);
+  if (!sums.split.empty()) sums.split[pixel].add(sample.found.split, 0);
   if (!sample.record) return;
   sums.layers.add(pixel, *sample.record);
   sums.plate.add(pixel, sample.record->matte);
@@ -186,7 +187,7 @@ void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& ph
   const bool keeps = !checkpoint.file.empty();
   const auto every = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(std::min(checkpoint.every_s, 1e6)));
-  bool more = read_checkpoint(checkpoint, sums) || sums.begin_pass();
+  bool more = read_checkpoint(checkpoint, sums) || sums.begin_pass(0);
   progress.had(sums.pixel);
   try {
     while (more) {
@@ -201,7 +202,7 @@ void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& ph
           write_checkpoint(checkpoint, sums);
       }
       sums.settle();
-      more = sums.begin_pass();
+      more = sums.begin_pass(photon_error(sums.beauty(), sums.split));
     }
   } catch (...) {
     if (keeps) write_checkpoint(checkpoint, sums);
@@ -317,10 +318,12 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
           whole ? shot.render.width : shot.render.crop_max.x - window.x,
           whole ? shot.render.height : shot.render.crop_max.y - window.y};
   const size_t pixels = size_t(job.width) * job.height;
-  Sums sums{std::vector<PixelSum>(pixels), LayerFilm(shot, frame, scene, job.width, job.height),
+  Sums sums{std::vector<PixelSum>(pixels),
+            LayerFilm(shot, frame, scene, job.width, job.height),
             plate_film(shot, scene, pixels),
             SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
-            photons.rounds(shot.render, options.most_photons)};
+            photons.rounds(shot.render, options.most_photons),
+            std::vector<PixelSum>(photons.any() ? pixels : 0)};
   Progress report(progress);
   uint64_t rays = 0;
   render_passes(job, options.checkpoint, photons, sums, rays, report);
@@ -328,9 +331,11 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
+    const double by_photons = photon_error(sums.beauty(), sums.split);
     *stats = {report.samples(),
               rays,
-              picture_error(sums.beauty()),
+              picture_error(sums.beauty()) + by_photons,
+              by_photons,
               process_cpu_seconds() - cpu_start,
               sums.rounds.radius(photons.caustics().photons.radius()),
               photons.caustics().walked};

@@ -50,6 +50,7 @@ struct Film {
 struct RenderStats {
   uint64_t camera_samples = 0, rays = 0;
   double relative_mse = 0;  // of the frame, as its samples tell; 0 with fewer than 16 a pixel
+  double photon_error = 0;  // the part of it that photons have
   double cpu_s = 0;         // of the whole process during the call
   /// m: photons blur caustics by that at most, of several rounds in the mean; 0: all is right in
   /// the mean.

@@ -14,6 +14,16 @@ float relative_error(const PixelSum& pixel) {
   return sum / 3;
 }
 
+double photon_error(const std::vector<PixelSum>& pixels, const std::vector<PixelSum>& split) {
+  double sum = 0;
+  for (size_t p = 0; p < split.size(); ++p)
+    for (int c = 0; c < 3; ++c) {
+      const float mean = pixels[p].mean(c);
+      sum += split[p].common_square(c) / (mean * mean + 0.01f) / 3;
+    }
+  return std::max(0., sum / double(pixels.size()));
+}
+
 SamplePlan::SamplePlan(int width, int height, int most, double target)
     : width_(width),
       height_(height),
@@ -59,7 +69,7 @@ double SamplePlan::share() const {
   return sum / (double(most_) * double(wanted_.size()));
 }
 
-bool SamplePlan::next(const std::vector<PixelSum>& pixels) {
+bool SamplePlan::next(const std::vector<PixelSum>& pixels, double photon_error) {
   if (passes_++ == 0) {
     if (target_ > 0 && most_ > kFirst) wanted_.assign(size_t(width_) * height_, kFirst);
     return true;
@@ -75,12 +85,13 @@ bool SamplePlan::next(const std::vector<PixelSum>& pixels) {
       sum += double(deviation[p]) * deviation[p] / samples(p, per_deviation);
     return sum / double(pixels.size());
   };
+  const double target = std::max(target_ - photon_error, target_ / 2);
   // The number that meets the target lies where the error has fallen to it: found by halving.
   double low = 0, high = 1;
-  while (error(high) > target_ && high < 1e12) low = high, high *= 4;
+  while (error(high) > target && high < 1e12) low = high, high *= 4;
   for (int k = 0; k < 20; ++k) {
     const double middle = (low + high) / 2;
-    (error(middle) > target_ ? low : high) = middle;
+    (error(middle) > target ? low : high) = middle;
   }
   bool more = false;
   expected_ = 0;

@@ -12,6 +12,12 @@ namespace drench {
 /// / (mean^2 + 0.01). Its mean over a picture is the picture's relative MSE.
 float relative_error(const PixelSum& pixel);
 
+/// What the error of photons adds to a picture's relative MSE: it is alike in all of a pixel's
+/// samples that find the same photons, so that their scatter does not tell it. A half of the
+/// photons differs from the other as the whole differs from what many more would bring.
+/// @param split  of each pixel, of GatheredLight; empty: there are no photons
+double photon_error(const std::vector<PixelSum>& pixels, const std::vector<PixelSum>& split);
+
 /// With a target, samples go where they lower the mean of the pixels' errors most: in proportion to
 /// the scatter of a pixel's samples (Neyman 1934, "On the Two Different Aspects of the
 /// Representative Method"). It is told by the samples themselves, in passes: each looks at all
@@ -22,8 +28,10 @@ class SamplePlan {
   /// @param target  relative MSE of the picture; 0: all pixels get `most`
   SamplePlan(int width, int height, int most, double target);
 
-  /// Decides on the next pass. @return whether there is one
-  bool next(const std::vector<PixelSum>& pixels);
+  /// Decides on the next pass. Samples are to bring what the target leaves beside the error of
+  /// photons, or half of it: they would be without end where that alone is above the target.
+  /// @return whether there is one
+  bool next(const std::vector<PixelSum>& pixels, double photon_error = 0);
   /// Samples that a pixel shall have after this pass.
   int wanted(size_t pixel) const { return wanted_.empty() ? most_ : wanted_[pixel]; }
   void archive(CheckpointArchive& file);

@@ -218,12 +218,17 @@ class ShotStages final : public Stages {
         {"camera_samples", stats.camera_samples},
         {"rays", stats.rays},
         {"relative_mse", stats.relative_mse},
+        {"photon_error", stats.photon_error},
         {"photon_radius", stats.photon_radius},
         {"walked", stats.walked},
         {"cpu_s",
          stats.cpu_s}}.dump();
     report.line = fmt::format("camera_samples={} rays={} relative_mse={:.2g}", stats.camera_samples,
                               stats.rays, stats.relative_mse);
+    if (shot_.render.error > 0 && stats.photon_error > shot_.render.error / 2)
+      report.line += fmt::format(
+          " photon_error={:.2g}: samples alone do not bring render.error, raise render.photons",
+          stats.photon_error);
     return report;
   }
 

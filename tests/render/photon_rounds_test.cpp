@@ -1,4 +1,4 @@
-// Photons in rounds: more than one map holds.
+// Photons in rounds, and their error as a frame tells it.
 
 #include "render/photon_rounds.h"
 
@@ -138,6 +138,7 @@ TEST(PhotonRounds, GiveTheSameBitsAfterStops) {
                  Stopped);
   EXPECT_EQ(frame.picture().rgba, whole.rgba);
   EXPECT_EQ(frame.stats.relative_mse, told.relative_mse);
+  EXPECT_EQ(frame.stats.photon_error, told.photon_error);
   EXPECT_EQ(frame.stats.photon_radius, told.photon_radius);
 }
 
@@ -153,6 +154,94 @@ TEST(PhotonRounds, OfACropAreThoseOfTheFrame) {
     for (int k = 0; k < 4 * part.width; ++k)
       ASSERT_EQ(part.rgba[size_t(4 * part.width * y + k)],
                 whole.rgba[size_t(4 * 32 * (y + 11) + 4 * 7 + k)]);
+}
+
+/// mean of variance / (mean^2 + 0.01) over seeds, and what the frames told in the mean.
+struct Scatter {
+  double error = 0, told = 0;
+};
+Scatter over_seeds(Puddle puddle, int seeds) {
+  std::vector<Film> films;
+  Scatter out;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    puddle.shot.render.seed = uint32_t(seed);
+    films.push_back(puddle.picture());
+    out.told += puddle.stats.relative_mse / seeds;
+  }
+  for (size_t k = 0; k < films[0].rgba.size(); ++k) {
+    if (k % 4 == 3) continue;
+    double mean = 0, square = 0;
+    for (const Film& film : films) mean += double(film.rgba[k]) / seeds;
+    for (const Film& film : films) square += std::pow(film.rgba[k] - mean, 2) / (seeds - 1);
+    out.error += square / (mean * mean + 0.01);
+  }
+  out.error /= double(films[0].rgba.size()) * 3 / 4;
+  return out;
+}
+
+// Most of these errors is that of photons, which a pixel's samples have in common.
+TEST(PhotonError, IsToldAsSeedsScatter) {
+  Puddle puddle;
+  for (const bool moving : {false, true})
+    for (const double photons : {0.2, 2.})
+      for (const int samples : {32, 96}) {
+        puddle.shot.render.motion_blur = moving;
+        puddle.shot.camera.shutter_open = -0.25, puddle.shot.camera.shutter_close = 0.25;
+        for (V3f& v : puddle.geometry.fluid.velocity) v = V3f(0.3f, -1, 0);
+        puddle.shot.render.samples = samples;
+        puddle.shot.render.photons = photons;
+        const Scatter scatter = over_seeds(puddle, 10);
+        const double ratio = scatter.told / scatter.error;
+        EXPECT_GT(ratio, 1 / 1.3) << moving << " " << photons << " " << samples;
+        EXPECT_LT(ratio, 1.3) << moving << " " << photons << " " << samples;
+      }
+}
+
+// Where rounds bring photons of their own, the samples' scatter tells their error, and it is not
+// told twice. All rounds together are spread more evenly than a few, so that it is told too high.
+TEST(PhotonError, OfRoundsIsToldOnce) {
+  Puddle puddle;
+  puddle.shot.render.samples = 128;
+  puddle.shot.render.photons = 1;
+  for (const int rounds : {2, 4, 8}) {
+    puddle.options.most_photons = 128. * 32 * 32 / rounds;
+    const Scatter scatter = over_seeds(puddle, 10);
+    EXPECT_GT(scatter.told, 0.8 * scatter.error) << rounds;
+    EXPECT_LT(scatter.told, 2 * scatter.error) << rounds;
+  }
+}
+
+// More samples would not help: they go to half of the target and no further.
+TEST(PhotonError, AboveTheTargetEndsTheFrame) {
+  Puddle puddle;
+  puddle.shot.render.samples = 4096;
+  puddle.shot.render.photons = 1e-3;
+  puddle.shot.render.error = 0.002;
+  puddle.picture();
+  EXPECT_GT(puddle.stats.photon_error, 0.01);
+  EXPECT_GT(puddle.stats.relative_mse, puddle.stats.photon_error);
+  EXPECT_LT(puddle.stats.relative_mse - puddle.stats.photon_error, 0.6 * 0.002);
+  EXPECT_LT(puddle.stats.camera_samples, uint64_t(1024 * 32 * 32));
+}
+
+// Where the target leaves room for it, samples reach what is left.
+TEST(PhotonError, IsWithinTheTarget) {
+  Puddle puddle;
+  puddle.shot.render.samples = 2048;
+  puddle.shot.render.photons = 1;
+  puddle.shot.render.error = 0.002;
+  puddle.picture();
+  EXPECT_GT(puddle.stats.photon_error, 0);
+  EXPECT_LT(puddle.stats.relative_mse, 1.1 * 0.002);
+}
+
+TEST(PhotonError, IsNoneWithoutPhotons) {
+  Puddle puddle;
+  puddle.shot.render.samples = 16;
+  puddle.shot.render.photons = 0;
+  puddle.picture();
+  EXPECT_EQ(puddle.stats.photon_error, 0);
+  EXPECT_GT(puddle.stats.relative_mse, 0);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ template <class F>
 void for_each_near(const PhotonMap& map, const V3f& at, const F& f) {
   for (unsigned hand = 0; hand < map.hands(); ++hand)
     map.for_each_near(hand, at, V3f(0, 1, 0),
-                      [&](const V3f& flight, const V3f& power, float share) {
+                      [&](const V3f& flight, const V3f& power, float share, float) {
                         f(flight, power, share / float(map.hands()));
                       });
 }
@@ -186,9 +186,8 @@ TEST(Photons, AreAllFoundOnce) {
       });
       Irradiance found;
       for (unsigned hand = 0; hand < map.hands(); ++hand) {
-        const Irradiance part = map.irradiance(hand, at, V3f(0, 1, 0), V3f(0, 1, 0));
-        found.front += part.front * (1 / float(map.hands()));
-        found.back += part.back * (1 / float(map.hands()));
+        const GatheredLight part = map.irradiance(hand, at, V3f(0, 1, 0), V3f(0, 1, 0));
+        found.add(part.all, 1 / float(map.hands()));
       }
       const double slack = 1e-4 * (1 + side[0] + side[1]);
       ASSERT_NEAR(found.front.x, side[0], slack) << count << " " << k;
@@ -343,7 +342,7 @@ TEST(Photons, AreThoseOfTheirTime) {
     for (float x = -0.8f; x < 0.8f; x += 0.05f)
       for (float z = -0.8f; z < 0.8f; z += 0.05f, ++points)
         map.for_each_near(map.hand_at(turn), V3f(x, 0, z), V3f(0, 1, 0),
-                          [&](const V3f&, const V3f& power, float share) {
+                          [&](const V3f&, const V3f& power, float share, float) {
                             const float its = power.y / power.x;
                             ASSERT_GE(its, eighth);
                             ASSERT_LT(its, eighth + 0.125f);
