@@ -32,7 +32,7 @@ LayerFilm::LayerFilm(const Shot& shot, int frame, const Scene& scene, int width,
       corner_(shot.render.crop_min),
       fps_(shot.timeline.fps),
       shutter_open_(shutter(shot, shot.camera.shutter_open)),
-      shutter_frames_(shutter(shot, shot.camera.shutter_close) - shutter_open_),
+      shutter_frames_(shutter(shot, ShutterCurve::end(shot.camera)) - shutter_open_),
       frame_camera_(shot.camera, frame, frame + 1, shot.render.width, shot.render.height),
       before_camera_(shot.camera, frame - 1, frame, shot.render.width, shot.render.height),
       catchers_(scene.has_catchers()) {

@@ -89,9 +89,10 @@ class LayerFilm {
   size_t shown_groups_ = 0;
   int width_, height_;
   V2i corner_;  // of the part in the frame, pixels
-  double fps_, shutter_open_, shutter_frames_;
-  ShutterCamera frame_camera_;   // at this frame and the next
-  ShutterCamera before_camera_;  // at the frame before and this one
+  double fps_;
+  double shutter_open_, shutter_frames_;  // of all rows together
+  ShutterCamera frame_camera_;            // at this frame and the next
+  ShutterCamera before_camera_;           // at the frame before and this one
   NameIndex objects_, materials_;
   std::vector<Pixel> pixel_;
   std::vector<Imath::V3d> light_;       // by pixel, then group

@@ -223,6 +223,35 @@ TEST(Motion, IsThatOfThingsAndOfTheCamera) {
   EXPECT_NEAR(at(render_frame(shot, 1001, geometry), "motion", 16, 16, 2), 0.1, 1e-5);
 }
 
+/// What approaches is farther out on the film the later it is seen: late rows must tell of where it
+/// is at the frame, too.
+TEST(Motion, OfLateRowsStartsAtTheFrame) {
+  Shot shot = plain_shot(4, 32);
+  shot.layers.motion = shot.layers.position = true;
+  shot.render.motion_blur = true;
+  shot.camera.rolling_shutter = 2;
+  shot.light = {sky(1)};
+  shot.material.push_back(diffuse("ground", 0.5f));
+  Obstacle box;
+  box.name = "box";
+  shot.obstacle = {box};
+  shot.camera.fov_deg = 40.0;
+  shot.camera.position = V3d(0, 0, 4);
+  shot.camera.target = V3d(0, 0, 0);
+  FrameGeometry geometry;
+  ObstacleFrame moving{"box", box_mesh({-4, -4, -1}, {4, 4, 0})};
+  for (V3f& v : moving.mesh.velocity) v = V3f(0, 0, 24);  // 1 m a frame
+  geometry.obstacle = {moving};
+  const Film film = render_frame(shot, 1001, geometry);
+  // Its face is 4 m away at the frame and 3 m at the next.
+  const double growth = 32 / (2 * std::tan(20 * kPi64 / 180)) * (1. / 3 - 1. / 4);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 32; ++x)
+      for (size_t c = 0; c < 2; ++c)
+        EXPECT_NEAR(at(film, "motion", x, y, c), growth * at(film, "P", x, y, c), 1e-4);
+  EXPECT_GT(at(film, "P", 16, 31, 2), 0.7) << "the last row's shutter opens at 0.75 frames";
+}
+
 // Published values of MurmurHash3_x86_32 with seed 0.
 TEST(Cryptomatte, HashesAsTheSpecificationDoes) {
   EXPECT_EQ(murmur3(""), 0u);
