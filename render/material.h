@@ -44,13 +44,14 @@ struct ShadingMaterial {
   bool has_facets() const {
     return type == MaterialType::metal || type == MaterialType::coated || alpha > 0;
   }
-  /// Whether light meets more than a diffuse sheet where it is dry.
   /// Whether it ends light where its smooth normals say (Surface::lift). Mapped ones say other
   /// things.
-  bool is_opaque_diffuse() const {
-    return (type == MaterialType::diffuse || type == MaterialType::cloth) &&
-           is_black(transmittance) && !normal_map;
+  bool ends_light_smoothly() const {
+    const bool diffuse = type == MaterialType::diffuse || type == MaterialType::cloth ||
+                         type == MaterialType::coated;
+    return diffuse && is_black(transmittance) && !normal_map;
   }
+  /// Whether light meets more than a diffuse sheet where it is dry.
   bool is_fabric() const { return !is_black(sheen) || !is_black(yarn); }
   /// Diffuse reflectance at a surface point; with the transmittance never above 1.
   V3f reflectance_at(const V2f& uv) const;

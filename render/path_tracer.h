@@ -378,8 +378,9 @@ class PathTracer {
   bool scatter_coated(PathState& state, const Surface& surface) {
     if (++state.diffuse > settings_.depth) return false;
     const ShadingMaterial& material = *surface.material;
-    const CoatedBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
-                          material.alpha, material.ior / scene_.medium(state.in).ior,
+    const auto [side, normal] = surface.normals(-state.ray.direction);
+    const CoatedBsdf bsdf(-state.ray.direction, side, normal, material.alpha,
+                          material.ior / scene_.medium(state.in).ior,
                           material.reflectance_at(surface.uv),
                           scene_.coat_albedo(material, state.in));
     const CoatLobe coat = bsdf.coat();
@@ -428,7 +429,8 @@ class PathTracer {
   /// As coats: one lobe is followed, lights are sampled for both, photons gathered by the soft one.
   bool scatter_fabric(PathState& state, const Surface& surface, const Hit& hit, float wetness) {
     if (++state.diffuse > settings_.depth) return false;
-    const FabricBsdf bsdf(-state.ray.direction, surface.geometric_normal, surface.shading_normal,
+    const auto [side, normal] = surface.normals(-state.ray.direction);
+    const FabricBsdf bsdf(-state.ray.direction, side, normal,
                           fabric_at(scene_, surface, hit, state.ray.time, wetness, state.in));
     film_.record_albedo(state.survival * bsdf.albedo());
     const bool photons = gathers_photons(surface);

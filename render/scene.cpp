@@ -383,7 +383,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
       normalized(corner.normal[0] * w + corner.normal[1] * hit.u + corner.normal[2] * hit.v);
   flat.store(s.geometric_normal);
   (dot(smooth, flat) > 0.01f ? smooth : flat).store(s.shading_normal);
-  if (s.material->is_opaque_diffuse())
+  if (s.material->ends_light_smoothly())
     s.lift = lift_to_patch(corner, {w, hit.u, hit.v}, ray.direction, position, flat, error);
   const auto& t = object.triangle[hit.triangle];
   if (!object.uv.empty())

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/hash.h"
+#include "render/bsdf.h"
 #include "render/camera.h"
 #include "render/embree.h"
 #include "render/lights.h"
@@ -117,10 +118,18 @@ struct Surface {
   bool small = false;    // a sphere of foam: too small for a density of photons
 
   /// From the triangle up to the curved patch that the normals of its corners make of it, on the
-  /// side that was met, m; 0 where that is no opaque diffuse surface, or hollow. Hanika 2021,
+  /// side that was met, m; 0 of what ends light by its triangles, or is hollow. Hanika 2021,
   /// "Hacking the Shadow Terminator".
   V3f lift{0, 0, 0};
   bool lifts() const { return !is_black(lift); }
+
+  /// Of coats and fabric: the normal that light must be in front of, and that to shade with. Where
+  /// the patch is they are one.
+  std::pair<V3f, V3f> normals(const V3f& outgoing) const {
+    if (!lifts()) return {geometric_normal, shading_normal};
+    const V3f facing = FacingFrame(outgoing, geometric_normal, shading_normal).basis.normal;
+    return {facing, facing};
+  }
 
   /// Whether a direction leads out of the patch and into the triangle.
   bool passes_over(const V3f& direction) const {
