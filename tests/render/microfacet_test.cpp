@@ -263,6 +263,34 @@ TEST(Metal, IsReciprocalBeforeWhatIsGivenBack) {
   }
 }
 
+// The base by its factors of either direction, whatever the coat; the coat before what its facets
+// give back, which is by the one that light leaves to.
+TEST(Coated, IsReciprocalButForWhatTheCoatGivesBack) {
+  Tilted t;
+  const AlbedoTable none, glass = AlbedoTable::dielectric(0.25f, 1.5f);
+  int compared = 0;
+  for (int k = 0; k < 4000; ++k) {
+    t.next();
+    const V3f n = t.geometric, a = t.outgoing;
+    t.next();
+    const V3f b = t.outgoing;
+    const float cos_a = std::abs(dot(a, n)), cos_b = std::abs(dot(b, n));
+    if (cos_a < 0.05f || cos_b < 0.05f || dot(a, n) * dot(b, n) < 0) continue;
+    const auto seen = [&](const V3f& o, const AlbedoTable& coat) {
+      return CoatedBsdf(o, n, n, 0.25f, 1.5f, V3f(0.6f), coat);
+    };
+    float pdf = 0;
+    const double base = seen(a, glass).base().value(b, pdf).x / cos_b,
+                 base_back = seen(b, glass).base().value(a, pdf).x / cos_a,
+                 coat = seen(a, none).coat().value(b, pdf).x / cos_b,
+                 coat_back = seen(b, none).coat().value(a, pdf).x / cos_a;
+    ++compared;
+    ASSERT_NEAR(base, base_back, 1e-5 * base + 1e-7);
+    ASSERT_NEAR(coat, coat_back, 1e-4 * coat + 1e-7);  // roundings, squared by facets of 0.25
+  }
+  EXPECT_GT(compared, 1000);
+}
+
 // The model's three numbers: facing, at acos(1/7) = 81.8 degrees, and white at grazing.
 TEST(Metal, HasTheColoursItIsGiven) {
   const V3f facing(0.9f, 0.5f, 0.2f), edge(1, 0.8f, 0.3f);
