@@ -3,6 +3,7 @@ water of radius 0.1 m, 2 m before the camera, that flies 4 m/s along x; its geom
 must hold. The frame of plate.toml is put over a plate."""
 
 import math
+import struct
 import sys
 import tempfile
 from pathlib import Path
@@ -89,6 +90,30 @@ def test_cryptomatte_covers_the_ball():
         area = compositor.picture(node.outputs["Matte"])[:, :, 0].sum()
         radius = math.tan(math.asin(0.1 / 2)) * PIXELS_PER_RADIAN
         numpy.testing.assert_allclose(area, math.pi * radius**2, rtol=0.08)
+
+
+def png_texts(path):
+    data, at, texts = path.read_bytes(), 8, {}
+    while at < len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"tEXt":
+            key, text = data[at + 8:at + 8 + size].split(b"\0", 1)
+            texts[key.decode()] = text.decode("latin-1")
+        at += 12 + size
+    return texts
+
+
+def test_the_header_is_read():
+    """Blender 3.4 shows no header to Python, but writes what it read into what it saves."""
+    for name, folder in (("ball", BALL), ("plate", PLATE)):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        image = bpy.data.images.load(str(folder / f"{name}.1001.exr"))
+        with tempfile.TemporaryDirectory() as there:
+            bpy.context.scene.render.image_settings.file_format = "PNG"
+            image.save_render(str(Path(there) / "a.png"))
+            texts = png_texts(Path(there) / "a.png")
+        told = {key: texts.get(key) for key in ("shot", "frame", "seed")}
+        assert told == {"shot": name, "frame": "1001", "seed": "1"}, texts
 
 
 def test_a_frame_goes_over_a_plate():
