@@ -1,4 +1,7 @@
 // The real program as a child process: what a user sees.
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -8,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/mesh_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/output_folder.h"
 #include "tests/driver/child.h"
@@ -405,6 +408,51 @@ TEST(Program, RunsThePrerollOnce) {
   EXPECT_EQ(second.code, done) << second.err;
   EXPECT_FALSE(has(second.err, "pre-roll")) << second.err;
   EXPECT_EQ(shot.digests(), expected);
+}
+
+/// What the picture of a frame says of itself; empty where it says nothing.
+std::string header_of(const TinyShot& shot, int frame, const char* key) {
+  const Imf::InputFile file((shot.out() / layout::image("tiny", frame)).c_str());
+  const auto* text = file.header().findTypedAttribute<Imf::StringAttribute>(key);
+  return text ? text->value() : "";
+}
+
+json stats_of(const TinyShot& shot, const std::string& step, int frame) {
+  std::istringstream lines(text_of(shot.out() / layout::stats));
+  json last;
+  for (std::string line; std::getline(lines, line);) {
+    const json entry = json::parse(line);
+    if (entry.at("step") == step && entry.at("frame") == frame) last = entry;
+  }
+  return last;
+}
+
+// The header to its three digits, and only of what there is.
+TEST(Program, TellsTheErrorAndThePhotonsBlurOfAFrame) {
+  const TinyShot shot(2);
+  put_text(shot.file(), text_of(shot.file()) + R"(
+[[light]]
+type = "sphere"
+center = [0.2, 0.8, 0.2]
+radius = 0.05
+radiance = [20, 20, 20]
+)");
+  const Ended aimed =
+      shot.run("run", {"--set", "render.samples=1024", "--set", "render.error=0.01"});
+  ASSERT_EQ(aimed.code, done) << aimed.err;
+  for (const int frame : {1001, 1002}) {
+    const json stats = stats_of(shot, "render", frame);
+    const double error = stats.at("relative_mse"), blur = stats.at("photon_radius");
+    EXPECT_GT(error, 0.001) << "far more samples than asked for";
+    EXPECT_LE(error, 0.0105);
+    EXPECT_GT(blur, 1e-4);
+    EXPECT_LT(blur, 0.08) << "m; wider than the ball of water";
+    EXPECT_NEAR(std::stod(header_of(shot, frame, "relative_mse")), error, 0.005 * error);
+    EXPECT_NEAR(std::stod(header_of(shot, frame, "photon_radius_m")), blur, 0.005 * blur);
+  }
+  ASSERT_EQ(shot.run("run", {"--set", "render.photons=0"}).code, done);
+  EXPECT_EQ(header_of(shot, 1001, "relative_mse") + header_of(shot, 1001, "photon_radius_m"), "");
+  EXPECT_EQ(stats_of(shot, "render", 1001).at("photon_radius"), 0);
 }
 
 }  // namespace
