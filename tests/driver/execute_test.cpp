@@ -80,22 +80,33 @@ TEST(Execute, MeshesAndRendersWhileItSimulates) {
   EXPECT_TRUE(overlapped);
 }
 
-// The image of frame 1 waits until frame 2 is in work, too.
-TEST(Execute, BeginsTheNextImageWhileOneIsMade) {
-  const TemporaryFolder folder;
-  const ToySettings settings;
-  ToyStages stages(settings);
-  std::atomic<bool> overlapped{false};
-  stages.hook = [&](Step step, int frame) {
-    if (step != Step::render || frame != 1) return;
-    for (int k = 0; k < 2000 && !overlapped; ++k) {
-      const std::vector<Event> events = stages.events();
-      overlapped = position(events, Step::render, 2, true) < events.size();
-      std::this_thread::sleep_for(10ms);
-    }
-  };
-  make_toy(settings, stages, folder.path());
-  EXPECT_TRUE(overlapped);
+/// Frames that a step was at work on at once, at most.
+int most_at_once(const std::vector<Event>& events, Step step) {
+  int now = 0, most = 0;
+  for (const Event& event : events)
+    if (event.step == step) most = std::max(most, now += event.begin ? 1 : -1);
+  return most;
+}
+
+// Images wait until as many are in work as there should be, and a little for one too many.
+TEST(Execute, RendersMoreFramesAtOnceOnMoreCores) {
+  for (const auto& [threads, expected] : {std::pair(2, 2), {31, 2}, {32, 3}, {64, 4}, {256, 4}}) {
+    const TemporaryFolder folder;
+    ToySettings settings;
+    settings.last = 9;
+    ToyStages stages(settings);
+    stages.hook = [&, expected = expected](Step step, int) {
+      if (step != Step::render) return;
+      for (int k = 0; k < 2000 && most_at_once(stages.events(), step) < expected; ++k)
+        std::this_thread::sleep_for(10ms);
+      std::this_thread::sleep_for(20ms);
+    };
+    ExecuteOptions options;
+    options.threads = threads;
+    make_toy(settings, stages, folder.path(), options);
+    EXPECT_EQ(most_at_once(stages.events(), Step::render), expected) << threads;
+    EXPECT_EQ(digests_in(folder.path()), undisturbed(settings)) << threads;
+  }
 }
 
 // Two frames in the queue, one in work, one waiting to be queued, one being simulated; the log of a
