@@ -3,6 +3,7 @@
 // samples by a target gain.
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -377,6 +378,42 @@ void render_adaptive(const Emit& emit) {
 const Registration render_adaptive_case{
     "render_adaptive", "a pool under the sky: error reached and samples taken by a target",
     render_adaptive};
+
+/// Wall time by threads, the median of three pictures each.
+void render_scaling(const Emit& emit) {
+  constexpr int kSamples = 16, kGated = 16;
+  constexpr double kLeastEfficiency = 0.85;
+  Shot shot = cloth_shot();
+  shot.render.width = 640, shot.render.height = 360;  // 920 tiles
+  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  double alone_s = 0;
+  std::vector<int> counts;
+  for (int n = 1; n < hardware_threads(); n *= 2) counts.push_back(n);
+  counts.push_back(hardware_threads());
+  for (const int threads : counts) {
+    const tbb::global_control some(tbb::global_control::max_allowed_parallelism, size_t(threads));
+    std::vector<Measured> costs;
+    for (uint32_t seed = 1; seed <= 3; ++seed)
+      costs.push_back(render(shot, geometry, kSamples, seed).cost);
+    std::sort(costs.begin(), costs.end(),
+              [](const Measured& a, const Measured& b) { return a.wall_s < b.wall_s; });
+    if (threads == 1) alone_s = costs[1].wall_s;
+    Line line;
+    line.method = "sheet over ground";
+    line.resolution = "640 x 360 pixels, 16 samples";
+    line.threads = threads;
+    line.cost = costs[1];
+    line.error = costs[1].wall_s * threads / alone_s;
+    line.error_of = "wall time times threads over that of one";
+    if (threads == kGated) line.gate = 1 / kLeastEfficiency;
+    line.more["efficiency"] = 1 / *line.error;
+    emit(line);
+  }
+}
+
+const Registration render_scaling_case{
+    "render_scaling", "cloth over ground: wall time by threads, 0.85 of even shares at 16",
+    render_scaling};
 
 }  // namespace
 
