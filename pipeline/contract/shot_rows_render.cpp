@@ -236,8 +236,8 @@ std::vector<Parameter> layer_rows() {
                                    "samples.Y: camera samples of the pixel"),
       row<&LayerSettings::light_groups>(
           "layers", "light_groups", "", none, render,
-          "light_GROUP.RGB: what the lights of a group add to the beauty; photons' light is "
-          "light_caustics"),
+          "light_GROUP.RGB: what the lights of a group add to the beauty; light of photons and of "
+          "walks is light_caustics"),
       row<&LayerSettings::cryptomatte>("layers", "cryptomatte", "", none, render,
                                        "CryptoObject and CryptoMaterial, of what is met first"),
       row<&LayerSettings::opacity>(
