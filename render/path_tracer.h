@@ -211,8 +211,7 @@ class PathTracer {
     return kFacets ? state.before + distance : distance;
   }
 
-  /// Straight on through a surface that is no vertex of the path. Light samples do not come through
-  /// there, so that whatever light is found beyond counts whole.
+  /// Straight on through what is no vertex: no light sample does, so light beyond counts whole.
   void pass(PathState& state, const Surface& surface) {
     state.bsdf_pdf = 0;
     state.ray.origin = surface.leave(state.ray.direction);
@@ -521,8 +520,7 @@ class PathTracer {
     return finite(found) ? found : V3f(0);
   }
 
-  /// Light from a sampled light by way of each lobe. @param beyond  bodies that the surface's other
-  /// side is in
+  /// A sampled light's light by each lobe. @param beyond  bodies that the other side is in
   template <class... Lobe>
   void add_direct(const PathState& state, const Surface& surface, Bodies beyond,
                   const VertexNumbers& u, const Lobe&... lobe) {
