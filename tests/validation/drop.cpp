@@ -78,7 +78,8 @@ std::vector<size_t> inner(const Stepper& run, const sim::HostState& state, const
   return inside;
 }
 
-/// What q does to a volume over rho^2 q, as InnerSensor of probe_pressure.h has it: a third of the sums' answer to dilation.
+/// What q does to a volume over rho^2 q, as InnerSensor of probe_pressure.h has it: a third of the
+/// sums' answer to dilation.
 double response(const Stepper& run, const sim::HostState& state,
                 const std::vector<size_t>& inside) {
   const sim::Parameters& p = run.scene.parameters;
