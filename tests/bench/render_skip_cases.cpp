@@ -1,24 +1,16 @@
-// What a feature costs that a frame has and does not use: instructions, counted by callgrind in a
-// process of each variant's own.
+// Case render_skips: what a feature costs that a frame has and does not use.
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include <array>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <stdexcept>
 #include <string>
 
+#include "tests/bench/instructions.h"
 #include "tests/bench/render_scenes.h"
 
 namespace drench::bench {
 
 namespace {
-
-constexpr const char* kVariable = "DRENCH_BENCH_SKIP";  // says to a process what it renders
 
 struct Frame {
   Shot shot;
@@ -75,39 +67,22 @@ constexpr std::array kVariants{
             }},
 };
 
-/// A number of the variant beyond the last renders nothing.
 void render_variant(Frame frame, size_t number) {
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  if (number >= kVariants.size()) return;
   kVariants[number].change(frame);
-  render(frame.shot, frame.geometry, 4, 1);
+  count_instructions([&] { render(frame.shot, frame.geometry, 4, 1); });
 }
 
-/// @throws std::runtime_error without callgrind
-double instructions(const char* picture, size_t number) {
-  const std::string self = std::filesystem::read_symlink("/proc/self/exe");
-  const std::string command = fmt::format(
-      "{}={}{} valgrind --tool=callgrind --callgrind-out-file=/dev/null '{}' render_skips 2>&1",
-      kVariable, picture, number, self);
-  FILE* pipe = popen(command.c_str(), "r");
-  if (!pipe) throw std::runtime_error("render_skips: valgrind cannot be started");
-  std::string said;
-  for (int c; (c = std::fgetc(pipe)) != EOF;) said += char(c);
-  const size_t found = said.find("Collected : ");
-  if (pclose(pipe) != 0 || found == std::string::npos)
-    throw std::runtime_error("render_skips: valgrind failed (./bench installs it): " + said);
-  return std::stod(said.substr(found + 12));
-}
-
-void emit_picture(const Emit& emit, const char* key, const std::string& picture) {
-  const double start = instructions(key, kVariants.size());
-  const double plain = instructions(key, 0) - start;
+void emit_picture(const Emit& emit, const std::string& key, const std::string& picture) {
+  const auto count = [&](size_t number) {
+    return instructions("render_skips", key + std::to_string(number));
+  };
+  const double plain = count(0);
   for (size_t k = 1; k < kVariants.size(); ++k) {
     Line line;
     line.method = picture + ", " + kVariants[k].name;
     line.resolution = fmt::format("{} x {} pixels, 4 samples", kSmallWidth, kSmallHeight);
     line.threads = 1;
-    line.error = (instructions(key, k) - start) / plain;
+    line.error = count(k) / plain;
     line.error_of = "instructions over those of the picture without it";
     line.gate = 1.01;
     line.more["million_instructions"] = plain * 1e-6;
@@ -116,7 +91,7 @@ void emit_picture(const Emit& emit, const char* key, const std::string& picture)
 }
 
 void render_skips(const Emit& emit) {
-  if (const char* variant = std::getenv(kVariable)) {
+  if (const char* variant = variant_to_count()) {
     render_variant(variant[0] == 'p' ? pool_frame() : cloth_frame(), std::stoul(variant + 1));
     return;
   }

@@ -1,0 +1,268 @@
+#include "tests/sim/skip_terms.h"
+
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+/// A block of water that falls onto a floor, all that may be left out left out.
+Shot water(FluidSolver solver) {
+  Shot shot = empty_shot();
+  shot.timeline = {1001, 1010, 100};
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.fluid.solver = solver;
+  shot.domain.axis[1] = Axis::walls;
+  shot.time_step = solver == FluidSolver::incompressible ? 1e-3 : 2e-4;
+  shot.fluid.xsph = shot.fluid.kinematic_viscosity = 0;
+  shot.fluid.sound_speed = 20;  // m/s; chosen by itself it is ready for emitters yet to start
+  add_box(shot, V3d(-0.04, -0.985, -0.04), {8, 8, 8}, V3d(0.3, -0.5, 0));
+  return shot;
+}
+/// The same above a sheet that is pinned at its edges.
+Shot on_sheet(FluidSolver solver) {
+  Shot shot = water(solver);
+  pin_edges(add_sheet(shot, 0.2, -0.99, 8));
+  Cloth& sheet = shot.cloth[0];
+  sheet.retardation_time = sheet.damping = sheet.spring_damping = 0;
+  return shot;
+}
+
+void blow(Shot& shot) {
+  shot.wind.present = true, shot.wind.velocity = V3d(9, 0, 0), shot.wind.fluid_drag = 0;
+}
+void blow_on_fluid(Shot& shot) { blow(shot), shot.wind.fluid_drag = 1; }
+void still_air(Shot& shot) { blow_on_fluid(shot), shot.wind.air_density = 0; }
+void ball(Shot& shot, const V3d& centre) {
+  Obstacle obstacle;
+  obstacle.name = "ball", obstacle.type = ObstacleType::sphere, obstacle.radius = 0.03;
+  obstacle.position = centre;
+  shot.obstacle.push_back(obstacle);
+}
+void drain(Shot& shot, const V3d& centre) {
+  Sink sink;
+  sink.shape.name = "drain", sink.shape.type = ObstacleType::sphere, sink.shape.radius = 0.03;
+  sink.shape.position = centre;
+  shot.sink.push_back(sink);
+}
+/// The same beside a ball, along which it slips whatever its viscosity.
+Shot beside_ball(FluidSolver solver) {
+  Shot shot = water(solver);
+  ball(shot, V3d(0.06, -0.98, 0));
+  return shot;
+}
+/// The same with a surface that is tense.
+Shot tense(FluidSolver solver) {
+  Shot shot = water(solver);
+  shot.fluid.surface_tension = 0.072;
+  return shot;
+}
+/// The same with walls that hold it.
+Shot held_by_walls(FluidSolver solver) {
+  Shot shot = water(solver);
+  shot.domain.slip = Slip::none, shot.fluid.kinematic_viscosity = 1e-5;
+  return shot;
+}
+void inlet(Shot& shot, double start) {
+  FluidEmitter emitter;
+  emitter.center = V3d(0, -0.5, 0), emitter.radius = 0.03, emitter.speed = 1, emitter.start = start;
+  shot.fluid.emitter.push_back(emitter);
+}
+
+constexpr FluidSolver projected = FluidSolver::incompressible,
+                      compressible = FluidSolver::weakly_compressible;
+
+const Term terms[] = {
+    {"xsph",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.xsph = 0.05; },
+     [](Shot& s) { s.fluid.xsph = 0; },
+     Leaves::the_plan,
+     {"smooth_velocities"},
+     {}},
+    {"explicit_viscosity",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.fluid.kinematic_viscosity = 0; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {}},
+    {"implicit_viscosity",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.kinematic_viscosity = 1e-2; },
+     [](Shot& s) { s.fluid.kinematic_viscosity = 0; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {"implicit viscosity"}},
+    {"no_slip_walls",
+     projected,
+     water,
+     [](Shot& s) { s.domain.slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.domain.slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity"},
+     {}},
+    {"moving_wall",
+     projected,
+     held_by_walls,
+     [](Shot& s) { s.domain.wall_velocity.y_low = V3d(0.5, 0, 0); },
+     [](Shot& s) { s.domain.wall_velocity.y_high = V3d(0.5, 0, 0); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"no_slip_obstacle",
+     projected,
+     beside_ball,
+     [](Shot& s) { s.obstacle[0].slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.obstacle[0].slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity", "find_body_drag"},
+     {"drag of obstacles and sheets"}},
+    {"no_slip_sheet",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.cloth[0].slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity", "find_body_drag"},
+     {"implicit viscosity", "drag of obstacles and sheets"}},
+    {"surface_tension",
+     projected,
+     water,
+     [](Shot& s) { s.fluid.surface_tension = 0.072; },
+     [](Shot& s) { s.fluid.surface_tension = 0; },
+     Leaves::the_plan,
+     {"apply_surface_tension"},
+     {"surface tension"}},
+    {"contact_angle",
+     projected,
+     tense,
+     [](Shot& s) { s.domain.contact_angle_deg = 60; },
+     [](Shot& s) { s.domain.contact_angle_deg = 90; },
+     Leaves::the_plan,
+     {"apply_contact_angles"},
+     {"contact angles"}},
+    {"wind_on_fluid",
+     projected,
+     water,
+     blow_on_fluid,
+     still_air,
+     Leaves::the_plan,
+     {"wind_on_fluid"},
+     {}},
+    {"drag_of_fluid",
+     projected,
+     water,
+     blow_on_fluid,
+     blow,
+     Leaves::the_plan,
+     {"wind_on_fluid"},
+     {}},
+    {"wind_on_cloth",
+     projected,
+     on_sheet,
+     blow,
+     still_air,
+     Leaves::the_plan,
+     {"wind_on_cloth"},
+     {}},
+    {"wind_on_explicit_cloth", compressible, on_sheet, blow, still_air, Leaves::the_plan, {}, {}},
+    {"retardation",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].retardation_time = 0.005; },
+     [](Shot& s) { s.cloth[0].retardation_time = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_of_springs",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].spring_damping = 0.1; },
+     [](Shot& s) { s.cloth[0].spring_damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping",
+     projected,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].damping = 20; },
+     [](Shot& s) { s.cloth[0].damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_of_explicit_cloth",
+     compressible,
+     on_sheet,
+     [](Shot& s) { s.cloth[0].damping = 20; },
+     [](Shot& s) { s.cloth[0].damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"emitter",
+     projected,
+     water,
+     [](Shot& s) { inlet(s, 0); },
+     [](Shot& s) { inlet(s, 1e6); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"emitter_weakly_compressible",
+     compressible,
+     water,
+     [](Shot& s) { inlet(s, 0); },
+     [](Shot& s) { inlet(s, 1e6); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"sink",
+     projected,
+     water,
+     [](Shot& s) { drain(s, V3d(0.02, -0.99, 0)); },
+     [](Shot& s) { drain(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {},
+     {"sinks"}},
+    {"sink_weakly_compressible",
+     compressible,
+     water,
+     [](Shot& s) { drain(s, V3d(0.02, -0.99, 0)); },
+     [](Shot& s) { drain(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {},
+     {"sinks"}},
+    {"obstacle",
+     projected,
+     water,
+     [](Shot& s) { ball(s, V3d(0.1, -0.99, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {"predict_around_obstacles", "project_around_obstacles"},
+     {"obstacles"}},
+    {"sheet",
+     projected,
+     water,
+     [](Shot& s) { pin_edges(add_sheet(s, 0.2, -0.99, 8)); },
+     [](Shot& s) { pin_edges(add_sheet(s, 0.2, 0.5, 8)); },
+     Leaves::the_bits,
+     {"polygon_grid", "nearest_triangle", "sheet_side", "sort_near", "start_rows",
+      "linearise_cloth", "move_with_sheets"},
+     {"sheets", "implicit step of sheets", "nearest triangles", "remembered sides",
+      "rows of sheets", "paths"}},
+    {"obstacle_under_cloth",
+     projected,
+     on_sheet,
+     [](Shot& s) { ball(s, V3d(0, -1.03, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {"predict_around_obstacles", "project_around_obstacles"},
+     {"obstacles", "sheets at obstacles"}},
+};
+
+}  // namespace
+
+std::span<const Term> skip_terms() { return terms; }
+
+}  // namespace drench::sim_tests
