@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
+#include <cstddef>
+#include <new>
+#include <type_traits>
 #include <utility>
 
 #include "render/path_tracer.h"
@@ -31,17 +33,25 @@ void finish(const PathTracer<features>& path, CameraSample& sample, uint64_t& ra
 template <unsigned features>
 void trace(const Scene& scene, const PathSettings& settings, std::span<CameraSample> samples,
            uint64_t& rays) {
-  std::array<std::optional<PathTracer<features>>, kPathsAtOnce> paths;
-  for (size_t k = 0; k < samples.size(); ++k) paths[k].emplace(scene, settings, samples[k]);
-  const auto each = [&](const auto& act) {
-    bool any = false;
-    for (size_t k = 0; k < samples.size(); ++k)
-      if (paths[k]->going()) act(*paths[k]), any = true;
-    return any;
+  using Path = PathTracer<features>;
+  static_assert(std::is_trivially_destructible_v<Path>);
+  alignas(Path) std::byte place[kPathsAtOnce][sizeof(Path)];
+  std::array<Path*, kPathsAtOnce> paths, going;
+  size_t left = 0;
+  const auto keep = [&](Path* path) {  // without a branch, which nothing foretells
+    going[left] = path;
+    left += path->going();
   };
-  while (each([](auto& path) { path.find(); })) {
-    each([](auto& path) { path.fetch(); });
-    each([](auto& path) { path.shade(); });
+  for (size_t k = 0; k < samples.size(); ++k)
+    keep(paths[k] = new (place[k]) Path(scene, settings, samples[k]));
+  while (const size_t n = left) {
+    for (size_t k = 0; k < n; ++k) going[k]->find();
+    for (size_t k = 0; k < n; ++k) going[k]->fetch();
+    left = 0;
+    for (size_t k = 0; k < n; ++k) {
+      going[k]->shade();
+      keep(going[k]);
+    }
   }
   for (size_t k = 0; k < samples.size(); ++k) finish(*paths[k], samples[k], rays);
 }

@@ -14,14 +14,23 @@ inline V2f sin_cos_of_eighth(float x) {
           1 + z * (-1.f / 2 + z * (1.f / 24 + z * (-1.f / 720 + z * (1.f / 40320))))};
 }
 
+/// Exchanges two numbers without a branch, for conditions that nothing foretells.
+inline void swap_if(bool condition, float& a, float& b) {
+  const uint32_t x = std::bit_cast<uint32_t>(a), y = std::bit_cast<uint32_t>(b);
+  const uint32_t differing = (x ^ y) & -uint32_t(condition);
+  a = std::bit_cast<float>(x ^ differing);
+  b = std::bit_cast<float>(y ^ differing);
+}
+
 /// Uniform on the unit disc. Shirley and Chiu 1997, the concentric map.
 inline V2f sample_disc(const V2f& u) {
-  const float a = 2 * u.x - 1, b = 2 * u.y - 1;
-  const bool wide = std::abs(a) > std::abs(b);
-  const float radius = wide ? a : b, other = wide ? b : a;
+  float radius = 2 * u.y - 1, other = 2 * u.x - 1;
+  const bool wide = std::abs(other) > std::abs(radius);
+  swap_if(wide, radius, other);
   if (radius == 0) return {0, 0};
-  const V2f d = sin_cos_of_eighth(kPi / 4 * (other / radius)) * radius;
-  return wide ? V2f(d.y, d.x) : d;
+  V2f d = sin_cos_of_eighth(kPi / 4 * (other / radius)) * radius;
+  swap_if(wide, d.x, d.y);
+  return d;
 }
 
 /// Cosine-weighted about +z; density cos/pi. Malley's method.

@@ -4,7 +4,9 @@
 #include <Imath/ImathVec.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 namespace drench {
@@ -24,9 +26,12 @@ inline V3f normalized(const V3f& a) { return a * (1.f / std::sqrt(dot(a, a))); }
 inline V3f absolute(const V3f& a) { return {std::abs(a.x), std::abs(a.y), std::abs(a.z)}; }
 inline float largest(const V3f& a) { return std::max(a.x, std::max(a.y, a.z)); }
 inline bool finite(const V3f& a) {
-  return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
+  return a.x * 0 + a.y * 0 + a.z * 0 == 0;  // else one of them is NaN
 }
-inline bool is_black(const V3f& a) { return a.x == 0 && a.y == 0 && a.z == 0; }
+inline bool is_black(const V3f& a) {
+  const auto bits = [](float f) { return std::bit_cast<uint32_t>(f); };
+  return (bits(a.x) | bits(a.y) | bits(a.z)) << 1 == 0;  // all but signs
+}
 
 /// An orthonormal basis around a unit vector. Duff et al. 2017, "Building an Orthonormal Basis,
 /// Revisited".
