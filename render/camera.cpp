@@ -115,21 +115,4 @@ V2f ShutterCamera::project(const CameraPose& pose, const V3f& point) const {
   return {0.5f * width_ + dot(to, pose.right) * scale, 0.5f * height_ - dot(to, pose.up) * scale};
 }
 
-template <bool thin_lens>
-Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f& lens,
-                             float time) const {
-  const float scale = 2 * pose.half_width / width_;
-  const V3f through = pose.forward + pose.right * ((film.x - 0.5f * width_) * scale) -
-                      pose.up * ((film.y - 0.5f * height_) * scale);
-  if constexpr (!thin_lens) return {pose.position, normalized(through), time};
-  const V2f d = aperture(lens) * pose.lens_radius;
-  const V3f shift = pose.right * d.x + pose.up * d.y;
-  // Divided by the focus distance, so that a lens of radius 0 gives the pinhole's bits.
-  return {pose.position + shift, normalized(through - shift * (1 / pose.focus_distance)), time};
-}
-
-template Ray ShutterCamera::from_pose<false>(const CameraPose&, const V2f&, const V2f&,
-                                             float) const;
-template Ray ShutterCamera::from_pose<true>(const CameraPose&, const V2f&, const V2f&, float) const;
-
 }  // namespace drench

@@ -93,16 +93,16 @@ void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std
   material.fibres = WetFibres(double(material.ior));
 }
 
-float Scene::transmitted(const Ray& ray, float distance, World world) const {
-  if (!has_gaps_) return occluded(ray, distance, world) ? 0.f : 1.f;
-  if (occluded(ray, distance, world, Gaps::open)) return 0;
+float Scene::transmitted(const Ray& ray, const Target& target, World world) const {
+  if (!has_gaps_) return occluded(ray, target, world) ? 0.f : 1.f;
+  if (occluded(ray, target, world, Gaps::open)) return 0;
   float share = 1;
   for (uint32_t k = 0; k < objects_.size(); ++k) {
     const float gap = materials_[objects_[k].material].gap;
     if (!(gap > 0) || (world == World::plate && objects_[k].matte == Matte::none)) continue;
     // Layer by layer, as paths go through them.
     Ray rest = ray;
-    float reach = distance * (1 - 1e-4f);
+    float reach = target.distance * (1 - 1e-4f);
     for (Hit hit = meet(k, rest, reach); hit.kind != Hit::Kind::nothing && share > 0;
          hit = meet(k, rest, reach)) {
       share *= gap;

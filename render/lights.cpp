@@ -107,16 +107,19 @@ SunLight make_sun(const MapSun& sun) {
 }  // namespace
 
 float ShapeLight::intersect(const V3f& origin, const V3f& direction, float reach) const {
-  const V3f to_center = center - origin;
   if (type != LightType::sphere) {
-    const float facing = dot(direction, normal), height = dot(to_center, normal);
-    if (!(facing < 0 && height < 0)) return kInfinity;  // it shines along its normal only
+    const float facing = dot(direction, normal);
+    if (!(facing < 0)) return kInfinity;  // it shines along its normal only
+    const V3f to_center = center - origin;
+    const float height = dot(to_center, normal);
+    if (!(height < 0)) return kInfinity;
     const float t = height / facing;
     if (!(t > 0 && t < reach)) return kInfinity;
     const V3f p = direction * t - to_center;
     if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : kInfinity;
     return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
   }
+  const V3f to_center = center - origin;
   const float along = dot(to_center, direction);
   const V3f nearest = to_center - direction * along;  // stays exact for far, small spheres
   const float inside2 = radius * radius - dot(nearest, nearest);
@@ -128,6 +131,7 @@ float ShapeLight::intersect(const V3f& origin, const V3f& direction, float reach
 LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
   LightSample out;
   out.radiance = radiance;
+  out.group = group;
   if (type != LightType::sphere) {
     const V2f square(2 * u2.x - 1, 2 * u2.y - 1);
     const V2f p = type == LightType::disk ? sample_disc(u2) : square;
@@ -226,6 +230,7 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         break;
     }
   }
+  count_ = environment_index() + (sample_environment_ ? 1 : 0);
 }
 
 uint32_t Lights::group_of(const Light& light) {
@@ -247,17 +252,22 @@ void Lights::finish() {
   tree_ = LightTree(kinds);
 }
 
-Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance) const {
+Lights::Hit Lights::intersect(const V3f& origin, const V3f& direction, float distance,
+                              int except) const {
   Hit hit{-1, distance};
-  const auto meet = [&](size_t k) {
-    const float t = shapes_[k].intersect(origin, direction, hit.distance);
-    if (t < hit.distance) hit = {int(k), t};
-    return hit.distance;
+  const auto meet = [&](int k, const ShapeLight& shape) {
+    if (k == except) return;
+    const float t = shape.intersect(origin, direction, hit.distance);
+    if (t < hit.distance) hit = {k, t};
   };
-  if (!tree_.empty())
-    tree_.along(origin, direction, distance, meet);
+  int k = 0;
+  if (tree_.empty())
+    for (const ShapeLight& shape : shapes_) meet(k++, shape);
   else
-    for (size_t k = 0; k < shapes_.size(); ++k) meet(k);
+    tree_.along(origin, direction, distance, [&](uint32_t light) {
+      meet(int(light), shapes_[light]);
+      return hit.distance;
+    });
   return hit;
 }
 
@@ -284,11 +294,10 @@ LightTree::Cut Lights::cut(size_t count, const V3f& from) const {
 }
 
 float Lights::choice_probability(size_t index, const V3f& from) const {
-  const size_t count = environment_index() + (sample_environment_ ? 1 : 0);
-  if (count == 1) return 1;
-  const LightTree::Cut cut = this->cut(count, from);
+  if (count_ == 1) return 1;
+  const LightTree::Cut cut = this->cut(count_, from);
   float total = cut.total;
-  for_each_alone(count, [&](size_t k) { total += importance(k, from); });
+  for_each_alone(count_, [&](size_t k) { total += importance(k, from); });
   if (!(total > 0)) return 0;
   const bool alone =
       tree_.empty() || index >= environment_index() || (index >= shapes_.size() && index < lamps());
@@ -301,8 +310,7 @@ float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float 
   return shapes_[light].pdf(from, direction, distance) * choice_probability(size_t(light), from);
 }
 
-std::pair<size_t, float> Lights::choose_first(size_t count, const V3f& from, float u_light) const {
-  if (count < 2) return {0, float(count)};
+Lights::Choice Lights::choose_of_many(size_t count, const V3f& from, float u_light) const {
   const LightTree::Cut cut = this->cut(count, from);
   float total = cut.total;
   for_each_alone(count, [&](size_t k) { total += importance(k, from); });
@@ -382,29 +390,39 @@ LampPoint Lights::lamp_point_of(size_t lamp, const V3f& from, const V3f& origin,
   return out;
 }
 
-LightSample Lights::sample_first(size_t count, const V3f& from, float time, float u_light,
-                                 const V2f& u) const {
-  const auto [chosen, probability] = choose_first(count, from, u_light);
-  if (!(probability > 0)) return {};
-  LightSample out;
-  if (chosen < shapes_.size()) {
-    out = shapes_[chosen].sample(from, u);
-    out.group = shapes_[chosen].group;
-  } else if (chosen < lamps()) {
-    const SunLight& sun = suns_[chosen - shapes_.size()];
-    out = {Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos)), kInfinity, sun.radiance,
-           1 / (2 * kPi * sun.one_minus_cos), sun.group};
-  } else if (chosen < environment_index()) {
-    out = meshes_[chosen - lamps()].sample(from, time, u);
-    out.group = mesh_group_[chosen - lamps()];
-    out.mesh = int(chosen - lamps());
-  } else {
-    const DirectionSample d = environment_->sample(u);
-    out = {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf, environment_group_};
-  }
-  out.pdf *= probability;
-  if (chosen < lamps()) out.lamp = int(chosen);
+LightSample Lights::sample_shape(const Choice& choice, const V3f& from, const V2f& u) const {
+  LightSample out = shapes_[choice.light].sample(from, u);
+  out.pdf *= choice.probability;
+  out.lamp = int(choice.light);
   return out;
+}
+
+LightSample Lights::sample_sun(const Choice& choice, const V2f& u) const {
+  const SunLight& sun = suns_[choice.light - shapes_.size()];
+  const V3f direction = Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos));
+  const float pdf = 1 / (2 * kPi * sun.one_minus_cos) * choice.probability;
+  return {direction, kInfinity, sun.radiance, pdf, sun.group, -1, int(choice.light)};
+}
+
+LightSample Lights::sample_mesh(const Choice& choice, const V3f& from, float time,
+                                const V2f& u) const {
+  const size_t mesh = choice.light - lamps();
+  LightSample out = meshes_[mesh].sample(from, time, u);
+  out.pdf *= choice.probability;
+  out.group = mesh_group_[mesh];
+  out.mesh = int(mesh);
+  return out;
+}
+
+LightSample Lights::sample_chosen(const Choice& choice, const V3f& from, float time,
+                                  const V2f& u) const {
+  if (!(choice.probability > 0)) return {};
+  if (choice.light < shapes_.size()) return sample_shape(choice, from, u);
+  if (choice.light < lamps()) return sample_sun(choice, u);
+  if (choice.light < environment_index()) return sample_mesh(choice, from, time, u);
+  const DirectionSample d = environment_->sample(u);
+  return {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf * choice.probability,
+          environment_group_};
 }
 
 }  // namespace drench

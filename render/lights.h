@@ -57,6 +57,7 @@ class Lights {
   int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {
     meshes_.emplace_back(faces, radiance);
     mesh_group_.push_back(group_named(group));
+    ++count_;
     return int(meshes_.size()) - 1;
   }
   /// To be called once all are there: many are drawn from a tree.
@@ -66,17 +67,16 @@ class Lights {
     int light = -1;
     float distance = 0;
   };
-  /// Nearest shape light closer than `distance`.
-  Hit intersect(const V3f& origin, const V3f& direction, float distance) const;
+  /// Nearest shape light closer than `distance`, of all but one.
+  Hit intersect(const V3f& origin, const V3f& direction, float distance, int except = -1) const;
 
   /// Draws a light, then a direction to it. `time` of the shutter, 0..1.
   LightSample sample(const V3f& from, float time, float u_light, const V2f& u) const {
-    return sample_first(environment_index() + (sample_environment_ ? 1 : 0), from, time, u_light,
-                        u);
+    return sample_chosen(choose_first(count_, from, u_light), from, time, u);
   }
   /// The same among lamps: shapes and suns.
   LightSample sample_lamps(const V3f& from, float u_light, const V2f& u) const {
-    return sample_first(lamps(), from, 0, u_light, u);
+    return sample_chosen(choose_first(lamps(), from, u_light), from, 0, u);
   }
 
   /// Draws a lamp, then a point of it.
@@ -127,7 +127,7 @@ class Lights {
   /// How many shapes and suns there are.
   size_t lamps() const { return shapes_.size() + suns_.size(); }
   bool has_environment() const { return environment_ != nullptr; }
-  bool can_sample() const { return environment_index() > 0 || sample_environment_; }
+  bool can_sample() const { return count_ > 0; }
   const std::vector<ShapeLight>& shapes() const { return shapes_; }
   const std::vector<SunLight>& suns() const { return suns_; }
   const std::vector<MeshLight>& meshes() const { return meshes_; }
@@ -139,8 +139,16 @@ class Lights {
  private:
   uint32_t group_of(const Light& light);
   uint32_t group_named(const std::string& name);
-  /// Of the first `count`. @return its number and the probability, 0 for none
-  std::pair<size_t, float> choose_first(size_t count, const V3f& from, float u_light) const;
+  struct Choice {
+    size_t light;       // its number
+    float probability;  // 0: none
+  };
+  /// Of the first `count`.
+  Choice choose_first(size_t count, const V3f& from, float u_light) const {
+    if (count < 2) return {0, float(count)};
+    return choose_of_many(count, from, u_light);
+  }
+  Choice choose_of_many(size_t count, const V3f& from, float u_light) const;
   /// Calls `visit(number)` for those of the first `count` that are not in the tree.
   template <class Visit>
   void for_each_alone(size_t count, const Visit& visit) const;
@@ -152,8 +160,11 @@ class Lights {
     };
   }
   LampPoint aim_at(size_t lamp, const V3f& from) const;
-  LightSample sample_first(size_t count, const V3f& from, float time, float u_light,
-                           const V2f& u) const;
+  /// Each makes the sample where it is returned to: a copy would wait for what was just written.
+  LightSample sample_shape(const Choice& choice, const V3f& from, const V2f& u) const;
+  LightSample sample_sun(const Choice& choice, const V2f& u) const;
+  LightSample sample_mesh(const Choice& choice, const V3f& from, float time, const V2f& u) const;
+  LightSample sample_chosen(const Choice& choice, const V3f& from, float time, const V2f& u) const;
   size_t environment_index() const { return lamps() + meshes_.size(); }
   float importance(size_t index, const V3f& from) const;
   float choice_probability(size_t index, const V3f& from) const;
@@ -161,6 +172,7 @@ class Lights {
   std::vector<ShapeLight> shapes_;
   std::vector<SunLight> suns_;
   std::vector<MeshLight> meshes_;
+  size_t count_ = 0;  // of all that `sample` draws from
   LightTree tree_;
   std::shared_ptr<const Environment> environment_;
   std::vector<std::string> groups_;

@@ -212,7 +212,7 @@ std::optional<WalkedLight> walk_to_lamps(const Scene& scene, const Surface& surf
   const std::optional<BentWay> way = walk_to_lamp(scene, surface, ray.time, in, lamp, rays);
   if (!way) return {};
   ++rays;
-  const float open = scene.transmitted(way->beyond, way->distance);
+  const float open = scene.transmitted(way->beyond, {way->distance, int(lamp.lamp)});
   if (open == 0) return {};
   return WalkedLight{way->direction,
                      way->share * lamp.radiance * (open * way->density / lamp.density)};

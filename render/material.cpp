@@ -64,7 +64,7 @@ void check(const Material& m) {
 
 }  // namespace
 
-V3f ShadingMaterial::reflectance_at(const V2f& uv) const {
+V3f ShadingMaterial::pictured_reflectance(const V2f& uv) const {
   V3f out = reflectance;
   if (checker) {
     const float squares =

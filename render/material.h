@@ -54,12 +54,15 @@ struct ShadingMaterial {
   /// Whether light meets more than a diffuse sheet where it is dry.
   bool is_fabric() const { return !is_black(sheen) || !is_black(yarn); }
   /// Diffuse reflectance at a surface point; with the transmittance never above 1.
-  V3f reflectance_at(const V2f& uv) const;
+  V3f reflectance_at(const V2f& uv) const {
+    return checker || texture ? pictured_reflectance(uv) : reflectance;
+  }
   /// The mapped normal. @param shading  unit  @param along_u, along_v  of growing u and v, any
   /// length
   V3f normal_at(const V2f& uv, const V3f& shading, const V3f& along_u, const V3f& along_v) const;
 
  private:
+  V3f pictured_reflectance(const V2f& uv) const;
   V2f picture_uv(const V2f& uv) const { return uv * inverse_texture_size; }
 };
 

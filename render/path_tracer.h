@@ -51,9 +51,8 @@ class PathTracer {
 
   /// Traces the next ray, and then asks for what it met: others have their turn meanwhile.
   void find() {
-    hit_ = scene_.intersect(state_.ray,
-                            state_.vertices == 0 ? Coherence::coherent : Coherence::incoherent,
-                            film_.world());
+    const Coherence coherence = state_.vertices == 0 ? Coherence::coherent : Coherence::incoherent;
+    new (&hit_) Hit(scene_.intersect(state_.ray, coherence, film_.world()));
     ++rays_;
     scene_.prefetch_triangle(hit_);
   }
@@ -548,11 +547,12 @@ class PathTracer {
     (add(lobe), ...);
     if (is_black(found)) return;
     const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
+    const Scene::Target target{light.distance, light.lamp};
     ++rays_;
     if constexpr (kFacets) {
-      found *= scene_.transmitted(shadow, light.distance, film_.world());
+      found *= scene_.transmitted(shadow, target, film_.world());
       if (is_black(found)) return;
-    } else if (scene_.occluded(shadow, light.distance, film_.world())) {
+    } else if (scene_.occluded(shadow, target, film_.world())) {
       return;
     }
     if constexpr (kWater)

@@ -164,8 +164,9 @@ class PhotonTracer {
     const float facing = dot(light.direction, surface.geometric_normal);
     if (!(light.pdf > 0) || !(facing > 0)) return false;
     ++rays;
-    const float share = scene_.transmitted(
-        {surface.leave(light.direction), light.direction, flight.ray.time}, light.distance);
+    const float share =
+        scene_.transmitted({surface.leave(light.direction), light.direction, flight.ray.time},
+                           {light.distance, light.lamp});
     if (share == 0) return false;
     flight.ray.direction = -light.direction;
     flight.most_gain = most_power_ / facing;

@@ -32,13 +32,12 @@ RTCRay embree_ray(const Ray& ray, float reach) {
 
 /// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
 /// else it may lie beyond the face that meets this one there, and a ray from it is lost.
-void keep_off_edges(const Corners& corner, const Hit& hit, Surface& s) {
+void keep_off_edges(const Corners& corner, const Hit& hit, const Packed& error, Surface& s) {
   const auto& [a, b, c] = corner.position;
   const Packed side[] = {b - a, c - a, c - b}, across = cross(side[0], side[1]);
   float longest2 = 0;
   for (const Packed& along : side) longest2 = std::max(longest2, dot(along, along));
-  const float least =
-      std::min(largest(s.error) * std::sqrt(longest2 / dot(across, across)), 1.f / 3);
+  const float least = std::min(largest(error) * std::sqrt(longest2 / dot(across, across)), 1.f / 3);
   if (!(least > 0)) return;
   const float w = std::max(1 - hit.u - hit.v, least), u = std::max(hit.u, least),
               v = std::max(hit.v, least);
@@ -238,6 +237,15 @@ float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
 }
 
+Hit Scene::meet(uint32_t object, const Ray& ray, float reach, Coherence coherence) const {
+  RTCRayHit query;
+  query.ray = embree_ray(ray, reach);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  embree_intersect(objects_[object].scene.get(), query, coherence);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {Hit::Kind::object, query.ray.tfar, object, query.hit.primID, query.hit.u, query.hit.v};
+}
+
 Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   Hit hit;
   hit.distance = kInfinity;
@@ -248,32 +256,28 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
   if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
   if (objects_.empty()) return hit;
-  RTCRayHit query{embree_ray(ray, hit.distance), {}};
   const BoxTest box(ray.origin, ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {
-    if (!box.meets(objects_[k].bounds, query.ray.tfar)) continue;
+    if (!box.meets(objects_[k].bounds, hit.distance)) continue;
     if (world == World::plate && objects_[k].matte == Matte::none) continue;
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree_intersect(objects_[k].scene.get(), query, coherence);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-    hit = {Hit::Kind::object, query.ray.tfar, uint32_t(k),
-           query.hit.primID,  query.hit.u,    query.hit.v};
+    const Hit nearer = meet(uint32_t(k), ray, hit.distance, coherence);
+    if (nearer.kind != Hit::Kind::nothing) hit = nearer;
   }
   return hit;
 }
 
-bool Scene::occluded(const Ray& ray, float distance, World world, Gaps gaps) const {
-  const float reach = distance * (1 - 1e-4f);
+bool Scene::occluded(const Ray& ray, const Target& target, World world, Gaps gaps) const {
+  const float reach = target.distance * (1 - 1e-4f);
   const bool ground = has_ground_ && (world == World::whole || ground_matte_ != Matte::none);
   if (ground && ground_distance(ray.origin, ray.direction) < reach) return true;
-  if (lights_.intersect(ray.origin, ray.direction, reach).light >= 0) return true;
+  if (lights_.intersect(ray.origin, ray.direction, reach, target.lamp).light >= 0) return true;
   if (objects_.empty()) return false;
-  RTCRay query = embree_ray(ray, reach);
   const BoxTest box(ray.origin, ray.direction);
   for (const SceneObject& object : objects_) {
     if (!box.meets(object.bounds, reach)) continue;
     if (world == World::plate && object.matte == Matte::none) continue;
     if (gaps == Gaps::open && materials_[object.material].gap > 0) continue;
+    RTCRay query = embree_ray(ray, reach);
     embree_occluded(object.scene.get(), query);
     if (query.tfar < 0) return true;
   }
@@ -296,13 +300,14 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.uv = V2f(0);
   s.small = true;
   const V3f size = absolute(center) + absolute(V3f(way.x, way.y, way.z)) + V3f(sphere.w);
-  s.error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  const V3f error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  s.reach = dot(absolute(s.geometric_normal), error);
 }
 
 /// Surface::lift. Normals of corners that lean farther than 45 degrees are those of edges; what is
 /// no more than rounding is that of a flat or hollow surface.
 V3f lift_to_patch(const Corners& corner, const float (&weight)[3], const V3f& from,
-                  const Packed& position, const Packed& flat, const Packed& error) {
+                  const Packed& position, const Packed& flat, float reach) {
   const float side = dot(Packed::load(from), flat) > 0 ? -1.f : 1.f;
   Packed lift(V3f(0));
   for (int k = 0; k < 3; ++k) {
@@ -311,7 +316,7 @@ V3f lift_to_patch(const Corners& corner, const float (&weight)[3], const V3f& fr
     if (!(along > 0 && along * along > 0.5f * length2)) return V3f(0);
     lift = lift - n * (weight[k] * std::min(dot(position - corner.position[k], n), 0.f) / length2);
   }
-  return dot(lift, flat) * side > dot(absolute(flat), error) ? lift.unpacked() : V3f(0);
+  return dot(lift, flat) * side > reach ? lift.unpacked() : V3f(0);
 }
 
 /// Turns the shading normal as the material's map says, unless that is out of the real surface.
@@ -354,7 +359,6 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (hit.kind == Hit::Kind::ground) {
     s.position = ray.origin + ray.direction * hit.distance;
     s.position.y = ground_center_.y;  // exactly: rays leave it without an offset
-    s.error = V3f(0);
     s.geometric_normal = s.shading_normal = V3f(0, 1, 0);
     s.uv = {s.position.x, s.position.z};
     s.material = &materials_[ground_material_];
@@ -376,15 +380,15 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   if (object.moves()) size = size + Packed(object.way(hit, ray.time));
   const Packed error = size * kRelativeError + Packed(_mm_set1_ps(largest(size) * kSharedError));
   position.store(s.position);
-  error.store(s.error);
-  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(corner, hit, s);
+  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(corner, hit, error, s);
   const Packed flat = normalized(corner.across());
+  s.reach = dot(absolute(flat), error);
   const Packed smooth =
       normalized(corner.normal[0] * w + corner.normal[1] * hit.u + corner.normal[2] * hit.v);
   flat.store(s.geometric_normal);
   (dot(smooth, flat) > 0.01f ? smooth : flat).store(s.shading_normal);
   if (s.material->ends_light_smoothly())
-    s.lift = lift_to_patch(corner, {w, hit.u, hit.v}, ray.direction, position, flat, error);
+    s.lift = lift_to_patch(corner, {w, hit.u, hit.v}, ray.direction, position, flat, s.reach);
   const auto& t = object.triangle[hit.triangle];
   if (!object.uv.empty())
     s.uv = object.uv[t.x] * w + object.uv[t.y] * hit.u + object.uv[t.z] * hit.v;
@@ -408,14 +412,6 @@ V3f Scene::velocity(const Hit& hit) const {
   const auto& t = object.triangle[hit.triangle];
   return object.velocity[t.x] * (1 - hit.u - hit.v) + object.velocity[t.y] * hit.u +
          object.velocity[t.z] * hit.v;
-}
-
-Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
-  RTCRayHit query{embree_ray(ray, reach), {}};
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  embree_intersect(objects_[object].scene.get(), query, Coherence::incoherent);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return {Hit::Kind::object, query.ray.tfar, object, query.hit.primID, query.hit.u, query.hit.v};
 }
 
 Bodies Scene::bodies_at(const V3f& point, float time) const {

@@ -106,7 +106,8 @@ enum class World { whole, plate };
 
 /// A point of a surface.
 struct Surface {
-  V3f position, error;   // m; |computed - exact| <= error per axis
+  V3f position;          // m
+  float reach = 0;       // m, along the normal: |computed - exact| of the position is less
   V3f geometric_normal;  // unit, outward
   V3f shading_normal;    // unit, in the hemisphere of geometric_normal
   V2f uv;
@@ -133,6 +134,7 @@ struct Surface {
 
   /// Whether a direction leads out of the patch and into the triangle.
   bool passes_over(const V3f& direction) const {
+    if (!lifts()) return false;
     const float up = dot(lift, geometric_normal);
     return up * dot(direction, geometric_normal) < 0 && up * dot(direction, shading_normal) > 0;
   }
@@ -140,10 +142,13 @@ struct Surface {
   /// Where a ray in `direction` starts: moved off the surface just beyond the rounding error, off
   /// the patch where it passes over the triangle.
   V3f leave(const V3f& direction) const {
-    const float reach = dot(absolute(geometric_normal), error);
-    const bool over = passes_over(direction);
-    const float out = dot(over ? lift : direction, geometric_normal);
-    return (over ? position + lift : position) + geometric_normal * (out > 0 ? reach : -reach);
+    if (passes_over(direction)) return position + lift + off(lift);
+    return position + off(direction);
+  }
+
+ private:
+  V3f off(const V3f& towards) const {
+    return geometric_normal * (dot(towards, geometric_normal) > 0 ? reach : -reach);
   }
 };
 
@@ -157,11 +162,16 @@ class Scene {
 
   Hit intersect(const Ray& ray, Coherence coherence, World world = World::whole) const;
   enum class Gaps { closed, open };  // open: what has gaps is not there
-  /// Whether anything but a light farther than `distance` (1 - 1e-4) lies on the ray before it.
-  bool occluded(const Ray& ray, float distance, World world = World::whole,
+  /// What a ray is aimed at: how far away it is, and its number if it is a lamp.
+  struct Target {
+    float distance;  // m
+    int lamp = -1;
+  };
+  /// Whether anything lies on the ray before (1 - 1e-4) of the distance of what it is aimed at.
+  bool occluded(const Ray& ray, const Target& target, World world = World::whole,
                 Gaps gaps = Gaps::closed) const;
   /// The share of light that comes along the ray: 0, 1, or what gaps of cloth let through.
-  float transmitted(const Ray& ray, float distance, World world = World::whole) const;
+  float transmitted(const Ray& ray, const Target& target, World world = World::whole) const;
   /// Whether the fluid fills a place in these bodies.
   bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
   /// Whether the fluid is where a ray starts that came through a gap of cloth.
@@ -255,7 +265,8 @@ class Scene {
     return &objects_[hit.index];
   }
   /// The nearest point of one object.
-  Hit meet(uint32_t object, const Ray& ray, float reach) const;
+  Hit meet(uint32_t object, const Ray& ray, float reach,
+           Coherence coherence = Coherence::incoherent) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
   double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames

@@ -47,12 +47,12 @@ RTCRayHit embree_query(const Ray& ray, float reach) {
 
 // Scene::intersect and Scene::occluded as the linker calls them, `this` first.
 #define DRENCH_INTERSECT "_ZNK6drench5Scene9intersectERKNS_3RayENS_9CoherenceENS_5WorldE"
-#define DRENCH_OCCLUDED "_ZNK6drench5Scene8occludedERKNS_3RayEfNS_5WorldENS0_4GapsE"
+#define DRENCH_OCCLUDED "_ZNK6drench5Scene8occludedERKNS_3RayERKNS0_6TargetENS_5WorldENS0_4GapsE"
 Hit real_intersect(const Scene*, const Ray&, Coherence, World) asm("__real_" DRENCH_INTERSECT);
-bool real_occluded(const Scene*, const Ray&, float, World,
+bool real_occluded(const Scene*, const Ray&, const Scene::Target&, World,
                    Scene::Gaps) asm("__real_" DRENCH_OCCLUDED);
 Hit wrapped_intersect(const Scene*, const Ray&, Coherence, World) asm("__wrap_" DRENCH_INTERSECT);
-bool wrapped_occluded(const Scene*, const Ray&, float, World,
+bool wrapped_occluded(const Scene*, const Ray&, const Scene::Target&, World,
                       Scene::Gaps) asm("__wrap_" DRENCH_OCCLUDED);
 
 Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence, World world) {
@@ -64,11 +64,11 @@ Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence, W
   return real_intersect(scene, ray, coherence, world);
 }
 
-bool wrapped_occluded(const Scene* scene, const Ray& ray, float distance, World world,
+bool wrapped_occluded(const Scene* scene, const Ray& ray, const Scene::Target& target, World world,
                       Scene::Gaps gaps) {
   if (recording)
-    recording->queries.push_back({embree_query(ray, distance * (1 - 1e-4f)), true, {}});
-  return real_occluded(scene, ray, distance, world, gaps);
+    recording->queries.push_back({embree_query(ray, target.distance * (1 - 1e-4f)), true, {}});
+  return real_occluded(scene, ray, target, world, gaps);
 }
 
 namespace {
