@@ -4,7 +4,7 @@
 #include <Imath/ImathBox.h>
 #include <immintrin.h>
 
-#include "render/vector.h"
+#include "render/packed.h"
 
 namespace drench {
 
@@ -12,7 +12,7 @@ namespace drench {
 class BoxTest {
  public:
   BoxTest(const V3f& origin, const V3f& direction)
-      : origin_(pack(origin)), inverse_(_mm_div_ps(_mm_set1_ps(1), pack(direction))) {}
+      : origin_(load(origin)), inverse_(_mm_div_ps(_mm_set1_ps(1), load(direction))) {}
 
   bool meets(const Imath::Box3f& box, float reach) const {
     const __m128 a = along(box.min), b = along(box.max), whole = _mm_set1_ps(reach);
@@ -29,6 +29,11 @@ class BoxTest {
 
  private:
   static __m128 pack(const V3f& v) { return _mm_setr_ps(v.x, v.y, v.z, v.z); }
+  /// Of a ray, which was written just now (Packed::store).
+  static __m128 load(const V3f& v) {
+    const __m128 lanes = Packed::load(v).lanes;
+    return _mm_shuffle_ps(lanes, lanes, _MM_SHUFFLE(2, 2, 1, 0));
+  }
   __m128 along(const V3f& corner) const {
     return _mm_mul_ps(_mm_sub_ps(pack(corner), origin_), inverse_);
   }

@@ -3,6 +3,7 @@
 // is the diffuse ground.
 
 #include "render/bsdf.h"
+#include "render/packed.h"
 #include "render/sampling.h"
 
 namespace drench {
@@ -30,8 +31,8 @@ class ClothBsdf {
     // normal, or flat triangles would show as a chequer where light grazes them.
     const V3f& real = is_black(transmittance) ? geometric : shading;
     const float side = dot(outgoing, real) < 0 ? -1.f : 1.f;
-    geometric_ = (sides == Sides::smooth ? shading : real) * side;
-    shading_ = shading * side;
+    geometric_ = (Packed::load(sides == Sides::smooth ? shading : real) * side).unpacked();
+    shading_ = (Packed::load(shading) * side).unpacked();
     const float r = largest(reflectance), t = largest(transmittance);
     reflect_probability_ = r + t > 0 ? r / (r + t) : 1;
   }

@@ -52,6 +52,7 @@ class PathTracer {
   /// Traces the next ray, and then asks for what it met: others have their turn meanwhile.
   void find() {
     const Coherence coherence = state_.vertices == 0 ? Coherence::coherent : Coherence::incoherent;
+    // In its place: a copy of what is just being written would wait for it.
     new (&hit_) Hit(scene_.intersect(state_.ray, coherence, film_.world()));
     ++rays_;
     scene_.prefetch_triangle(hit_);
@@ -297,8 +298,7 @@ class PathTracer {
   /// Continues the path along `direction` from the surface.
   void depart(PathState& state, const Surface& surface, const V3f& direction) {
     state.vertex = surface.position;
-    state.ray.origin = surface.leave(direction);
-    state.ray.direction = direction;
+    surface.send(state.ray, direction);
     state.before = 0;
     state.dry_gap = false;
   }
@@ -546,13 +546,14 @@ class PathTracer {
     };
     (add(lobe), ...);
     if (is_black(found)) return;
-    const Ray shadow{surface.leave(light.direction), light.direction, state.ray.time};
-    const Scene::Target target{light.distance, light.lamp};
+    Ray shadow;
+    surface.send(shadow, light.direction);
+    shadow.time = state.ray.time;
     ++rays_;
     if constexpr (kFacets) {
-      found *= scene_.transmitted(shadow, target, film_.world());
+      found *= scene_.transmitted(shadow, {light.distance, light.lamp}, film_.world());
       if (is_black(found)) return;
-    } else if (scene_.occluded(shadow, target, film_.world())) {
+    } else if (scene_.occluded(shadow, {light.distance, light.lamp}, film_.world())) {
       return;
     }
     if constexpr (kWater)

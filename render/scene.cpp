@@ -25,9 +25,15 @@ constexpr float kNearEdge = 0.01f;  // of a barycentric coordinate
 /// Indices whose ratio is so near 1 have no facets that bend light.
 constexpr float kSameIndex = 1e-3f;
 
-RTCRay embree_ray(const Ray& ray, float reach) {
-  const V3f &o = ray.origin, &d = ray.direction;
-  return {o.x, o.y, o.z, 0, d.x, d.y, d.z, ray.time, reach, 0xffffffffu, 0, 0};
+/// Written by fours, as Embree reads it at once: a read of what narrower writes left waits for
+/// them.
+void set_ray(RTCRay& to, const Ray& ray, float reach) {
+  const __m128 d = Packed::load(ray.direction).lanes;
+  _mm_store_ps(&to.org_x, Packed::load(ray.origin).lanes);  // and 0 for the nearest distance
+  _mm_store_ps(&to.dir_x, _mm_insert_ps(d, _mm_load_ss(&ray.time), 0x30));
+  to.tfar = reach;
+  to.mask = 0xffffffffu;
+  to.id = to.flags = 0;
 }
 
 /// Moves a point of a body's triangle at its edge inwards, in the triangle, by its rounding error:
@@ -237,13 +243,25 @@ float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
 }
 
-Hit Scene::meet(uint32_t object, const Ray& ray, float reach, Coherence coherence) const {
+void Scene::meet(uint32_t object, const Ray& ray, Coherence coherence, Hit& nearest) const {
   RTCRayHit query;
-  query.ray = embree_ray(ray, reach);
+  set_ray(query.ray, ray, nearest.distance);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   embree_intersect(objects_[object].scene.get(), query, coherence);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return {Hit::Kind::object, query.ray.tfar, object, query.hit.primID, query.hit.u, query.hit.v};
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+  nearest.kind = Hit::Kind::object;
+  nearest.distance = query.ray.tfar;
+  nearest.index = object;
+  nearest.triangle = query.hit.primID;
+  nearest.u = query.hit.u;
+  nearest.v = query.hit.v;
+}
+
+Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
+  Hit hit;
+  hit.distance = reach;
+  meet(object, ray, Coherence::incoherent, hit);
+  return hit;
 }
 
 Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
@@ -260,8 +278,7 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   for (size_t k = 0; k < objects_.size(); ++k) {
     if (!box.meets(objects_[k].bounds, hit.distance)) continue;
     if (world == World::plate && objects_[k].matte == Matte::none) continue;
-    const Hit nearer = meet(uint32_t(k), ray, hit.distance, coherence);
-    if (nearer.kind != Hit::Kind::nothing) hit = nearer;
+    meet(uint32_t(k), ray, coherence, hit);
   }
   return hit;
 }
@@ -277,7 +294,8 @@ bool Scene::occluded(const Ray& ray, const Target& target, World world, Gaps gap
     if (!box.meets(object.bounds, reach)) continue;
     if (world == World::plate && object.matte == Matte::none) continue;
     if (gaps == Gaps::open && materials_[object.material].gap > 0) continue;
-    RTCRay query = embree_ray(ray, reach);
+    RTCRay query;
+    set_ray(query, ray, reach);
     embree_occluded(object.scene.get(), query);
     if (query.tfar < 0) return true;
   }

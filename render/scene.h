@@ -146,6 +146,12 @@ struct Surface {
     return position + off(direction);
   }
 
+  /// Starts a ray there in that direction. It is read soon, as Packed::load does.
+  void send(Ray& ray, const V3f& direction) const {
+    Packed(leave(direction)).store(ray.origin);
+    Packed(direction).store(ray.direction);
+  }
+
  private:
   V3f off(const V3f& towards) const {
     return geometric_normal * (dot(towards, geometric_normal) > 0 ? reach : -reach);
@@ -265,8 +271,9 @@ class Scene {
     return &objects_[hit.index];
   }
   /// The nearest point of one object.
-  Hit meet(uint32_t object, const Ray& ray, float reach,
-           Coherence coherence = Coherence::incoherent) const;
+  Hit meet(uint32_t object, const Ray& ray, float reach) const;
+  /// The same, written where it is nearer than what was there.
+  void meet(uint32_t object, const Ray& ray, Coherence coherence, Hit& nearest) const;
   float ground_distance(const V3f& origin, const V3f& direction) const;
 
   double open_ = 0, close_ = 0;  // shutter of all rows relative to the frame, frames
