@@ -161,11 +161,33 @@ class Tile {
       for (int k = 0; k < count_[r]; ++k) to[k] = begin_[r] + k;
     }
   }
+  /// Up to eight particles that follow each other.
+  struct Places {
+    int particle, count;
+  };
+  /// Looks for those of the tile for which any has less than the limit in a column of particles.
+  void find_packs(const float* column, float limit) {
+    packs_.clear();
+    for (int r = 0; r < rows_; ++r) {
+      for (int k = 0; k < count_[r]; k += Pack::size) {
+        const Places places{begin_[r] + k, std::min(count_[r] - k, Pack::size)};
+        const Mask below = Pack::load(column + places.particle) < Pack(limit);
+        if ((below & first_lanes(places.count)).bits()) packs_.push_back(places);
+      }
+    }
+  }
+  const std::vector<Places>& packs() const { return packs_; }
+  /// Is any of it seen across the seam of a periodic axis?
+  bool seam() const {
+    const auto across = [](const float* s) { return s[0] != 0.f || s[1] != 0.f || s[2] != 0.f; };
+    return std::any_of(shift_, shift_ + rows_, across);
+  }
   int place_of(int particle) const { return particle + centre_; }  // of the centre row's particles
   const float* column(int c) const { return data_.data() + size_t(c) * stride_; }
 
  private:
   std::vector<float> data_;
+  std::vector<Places> packs_;
   static constexpr int most_rows = 18;       // nine, and each in two at the seam of a periodic x
   int begin_[most_rows], count_[most_rows];  // the runs of particles that a tile is made of
   float shift_[most_rows][3];                // m, from beyond the seam of a periodic axis
@@ -179,6 +201,24 @@ Inputs<N + M> join(const Inputs<N>& a, const float* const (&b)[M]) {
   std::copy_n(a.column, N, all.column);
   std::copy_n(b, M, all.column + N);
   return all;
+}
+
+/// Is a sheet to be looked for between any of the particles of a cell and their neighbours?
+template <class Filter>
+bool any_tested(int begin, int end, const Filter& filter) {
+  bool tested = false;
+  for (int i = begin; i < end; ++i) tested |= filter.tests(i);
+  return tested;
+}
+/// The same when those have been left out from which nothing is hidden, and this has been noted.
+template <class Filter>
+bool any_hidden(Tile& tile, int begin, int end, const Filter& filter) {
+  if (tile.seam()) return true;
+  filter.find_near(tile);
+  for (int i = begin; i < end; ++i) {
+    if (filter.tests(i) && filter.sees_all(tile, i)) filter.finish(i, false);
+  }
+  return any_tested(begin, end, filter);
 }
 
 /// All neighbours of particle i, eight at a time.
@@ -242,18 +282,21 @@ void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[ma
         const int cell = g.index(cx, cy, cz);
         const int begin = grid.cell_start[cell], end = grid.cell_start[cell + 1];
         if (begin == end) continue;
-        bool filtered = false;
+        bool filtered = false, filled = false;
         if constexpr (Filter::columns > 0) {
-          for (int i = begin; i < end; ++i) filtered |= filter.tests(i);
-        }
-        if (filtered) {
-          if constexpr (Filter::columns > 0) {
+          filtered = any_tested(begin, end, filter);
+          if (filtered && filter.nothing_known) {
+            tile.fill(grid, cx, cy, cz, physics.inputs(), Physics::columns);
+            filtered = any_hidden(tile, begin, end, filter);
+            filled = !filtered;
+          }
+          if (filtered) {
             tile.fill(grid, cx, cy, cz, join(physics.inputs(), filter.inputs().column),
                       Physics::columns + Filter::columns);
+            filled = true;
           }
-        } else {
-          tile.fill(grid, cx, cy, cz, physics.inputs(), Physics::columns);
         }
+        if (!filled) tile.fill(grid, cx, cy, cz, physics.inputs(), Physics::columns);
         for (int i = begin; i < end; ++i) {
           if constexpr (Filter::columns > 0) {
             if (filtered && filter.tests(i)) {

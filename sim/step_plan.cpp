@@ -55,7 +55,7 @@ void sum_density(State& state) {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state, state.fluid.position.view()));
+                  sheet_filter(state, state.fluid.position.view(), Shaded::near));
   }
 }
 
@@ -76,7 +76,7 @@ void pressure_viscosity(State& state) {
                                walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
-                  sheet_filter(state, state.fluid.position.view()));
+                  sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
   } else {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
   }

@@ -68,7 +68,7 @@ inline void find_neighbours(State& state) {
   };
   if (sheets) {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up,
-                                      sheet_filter(state, f.start.view()));
+                                      sheet_filter(state, f.start.view(), Shaded::near));
   } else {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
   }

@@ -4,6 +4,7 @@
 // planes both put it behind, with opposed normals, does not; the rest (curved sheets, free edges)
 // is decided by testing the segment against the triangles themselves. The density pass tests all
 // near particles and notes those from which anything is hidden; the pressure pass tests only these.
+// Both ends of a hidden way are near a sheet: nearer to where it is crossed than to each other.
 
 #include "sim/geometry.h"
 #include "sim/pairs.h"
@@ -18,6 +19,7 @@ struct SheetFilter {
   const float* plane;
   PolygonView polygons;
   float support_radius;
+  bool nothing_known;  // but who is near: all of them are tested
 
   DRENCH_HD bool tests(int i) const { return shaded[i] != 0; }
   DRENCH_HD void finish(int i, bool any) const { shaded[i] = any; }
@@ -56,6 +58,26 @@ struct SheetFilter {
     return segment_hidden(position[i], to);
   }
 #else
+  /// The packs of a tile that hold near particles.
+  void find_near(Tile& tile) const { tile.find_packs(plane, 1e30f); }
+  /// Are all near ones within the support in front of the particle's plane, and it in front of
+  /// theirs? Then nothing is hidden.
+  DRENCH_HD bool sees_all(const Tile& tile, int i) const {
+    const Vec3<float> x = position[i], n = normal[i];
+    const Vec3<Pack> from{x.x, x.y, x.z}, normal_i{n.x, n.y, n.z};
+    const Pack plane_i(plane[i]), reach2(support_radius * support_radius);
+    for (const Tile::Places& of : tile.packs()) {
+      const Lanes j{of.particle};
+      const Vec3<Pack> to = position.at(j);
+      const Mask back = (dot(normal_i, to) + plane_i <= Pack(0.f)) |
+                        (dot(normal.at(j), from) + load(plane, j) <= Pack(0.f));
+      if (back.bits() == 0) [[likely]]
+        continue;
+      if ((back & (length2(to - from) < reach2) & first_lanes(of.count)).bits()) return false;
+    }
+    return true;
+  }
+
   /// What the test of a particle's neighbours reads of the particle itself.
   struct Self {
     Vec3<Pack> position, normal;
@@ -104,11 +126,15 @@ struct SheetFilter {
 #endif
 };
 
+/// What the column says: who is near, or of these those from whom something is hidden.
+enum class Shaded { near, hidden };
+
 /// @param position  m, those that the planes of the sheets were taken from
-inline SheetFilter sheet_filter(const State& state, const VecView& position) {
+inline SheetFilter sheet_filter(const State& state, const VecView& position, Shaded known) {
   const FluidState& f = state.fluid;
-  return {f.shaded.data(), position,           f.normal.view(),
-          f.plane.data(),  polygons_of(state), state.parameters.support_radius};
+  return {f.shaded.data(),      position,           f.normal.view(),
+          f.plane.data(),       polygons_of(state), state.parameters.support_radius,
+          known == Shaded::near};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

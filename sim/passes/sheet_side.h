@@ -167,7 +167,8 @@ inline void find_sheet_sides(State& state, const VecView& position) {
       "sheet side", f.count, DRENCH_LAMBDA(int i) {
         const int t = triangle[i];
         normal.set(i, {0.f, 0.f, 0.f});
-        distance[i] = plane[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
+        distance[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
+        plane[i] = t >= 0 ? 1e29f : 1e30f;
         if (t < 0) {
           memory_triangle[i] = -1;
           return;
