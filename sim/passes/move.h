@@ -197,7 +197,7 @@ inline void hold_cloth(State& state, const PathTest& test, const Tested& tested,
 /// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice
 /// as far as the contact solve predicts. All others make their whole step now: nothing to test. No
 /// step of the solvers' own choice takes a particle that is not near as far as a sheet; should one,
-/// all paths are tested.
+/// all paths are tested. They count as a support away, not as far_by says: no checkpoint has that.
 inline void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
@@ -230,8 +230,7 @@ inline void move_unguarded_particles(State& state) {
         Vec3<float> velocity = v[i];
         start.set(i, x[i]);
         const bool near = triangle[i] >= 0;
-        const float d = distance[i] < 0.f ? -distance[i] : distance[i],
-                    least = near ? d : support + max0(far_by[i]),
+        const float d = distance[i] < 0.f ? -distance[i] : distance[i], least = near ? d : support,
                     path = dt * length(velocity) + length(drift[i]);
         // Beyond a free edge the distance is not kept.
         const bool guard =
