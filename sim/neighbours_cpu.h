@@ -80,8 +80,10 @@ class Found {
         return 0;
       }
     }();
-    count = 0;
-    for (int k = 0; k < tile.size(); k += Pack::size) {
+    const int size = tile.size(), *const particle = particle_.data();
+    int *const index_out = index.data(), hit = 0;
+    float* const distance2_out = distance2.data();
+    for (int k = 0; k < size; k += Pack::size) {
       const Pack r2 =
           length2(Vec3<Pack>{Pack::load(x + k), Pack::load(y + k), Pack::load(z + k)} - p);
       int hits = (r2 < h2).bits();
@@ -92,14 +94,14 @@ class Found {
       }
       const __m256i order =
           _mm256_load_si256(reinterpret_cast<const __m256i*>(lane_orders.lane[hits]));
-      const __m256i particles =
-          _mm256_loadu_si256(reinterpret_cast<const __m256i*>(particle_.data() + k));
-      _mm256_storeu_ps(distance2.data() + count, _mm256_permutevar8x32_ps(r2.v, order));
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(index.data() + count),
+      const __m256i particles = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(particle + k));
+      _mm256_storeu_ps(distance2_out + hit, _mm256_permutevar8x32_ps(r2.v, order));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(index_out + hit),
                           _mm256_permutevar8x32_epi32(particles, order));
-      count += __builtin_popcount(unsigned(hits));
+      hit += __builtin_popcount(unsigned(hits));
     }
-    for (int k = count; k < count + Pack::size; ++k) index[k] = i, distance2[k] = h * h;
+    for (int k = hit; k < hit + Pack::size; ++k) index_out[k] = i, distance2_out[k] = h * h;
+    count = hit;
   }
   /// Closeness in the place of distances, and the sum of Kernel::value over it.
   template <class Kernel>
@@ -173,8 +175,8 @@ void build_neighbour_lists(const GridView& grid, int n, const VecView& position,
   ListStore store(lists);
   const GridShape& g = grid.shape;
   const auto build_rows = [&](const auto& range) {
-    static thread_local Tile tile;
-    static thread_local Found found;
+    Tile& tile = of_this_thread<Tile>();
+    Found& found = of_this_thread<Found>();
     ListStore::Piece piece;
     for (int row = range.begin(); row < range.end(); ++row) {
       for (int cx = 0; cx < g.nx; ++cx) {

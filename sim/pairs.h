@@ -17,6 +17,7 @@
 // Filter:   hides neighbours behind a sheet (passes/sheet_filter.h); NoFilter hides none.
 
 #include <bit>
+#include <numeric>
 
 #include "sim/grid.h"
 #include "sim/parallel.h"
@@ -157,9 +158,7 @@ class Tile {
   void particles(std::vector<int>& particle) const {
     if (particle.size() < size_t(stride_)) particle.resize(stride_);
     int* to = particle.data();
-    for (int r = 0; r < rows_; to += count_[r++]) {
-      for (int k = 0; k < count_[r]; ++k) to[k] = begin_[r] + k;
-    }
+    for (int r = 0; r < rows_; to += count_[r++]) std::iota(to, to + count_[r], begin_[r]);
   }
   /// Up to eight particles that follow each other.
   struct Places {
@@ -194,6 +193,13 @@ class Tile {
   int rows_ = 0;
   int size_ = 0, stride_ = 0, centre_ = 0;
 };
+
+/// One T a thread. Not inlined: where a thread's storage is would be asked anew in inner loops.
+template <class T>
+[[gnu::noinline]] T& of_this_thread() {
+  static thread_local T t;
+  return t;
+}
 
 template <int N, int M>
 Inputs<N + M> join(const Inputs<N>& a, const float* const (&b)[M]) {
@@ -275,7 +281,7 @@ void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[ma
                    const Physics& physics, const Filter& filter = {}) {
   const GridShape& g = grid.shape;
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
-    static thread_local Tile tile;
+    Tile& tile = of_this_thread<Tile>();
     for (int row = range.begin(); row < range.end(); ++row) {
       const int cy = row % g.ny, cz = row / g.ny;
       for (int cx = 0; cx < g.nx; ++cx) {

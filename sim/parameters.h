@@ -54,6 +54,17 @@ struct Parameters {
 inline float viscous_strength(const Parameters& p, double dt) {
   return float(dt) * p.dynamic_viscosity / (p.rest_density * p.support_radius * p.support_radius);
 }
+/// The share of the neighbours' mean velocity (XSPH) that does to smooth flows what viscosity does:
+/// the kernel (WendlandC2) has a second moment of h^2 / 15 along an axis.
+inline float smoothing_of_viscosity(const Parameters& p, double dt) {
+  return 30.f * viscous_strength(p, dt);
+}
+/// A viscosity that is less than a hundredth of the smoothing of a step is added to that. Not where
+/// anything holds the fluid: smoothing lets slip.
+inline bool smoothing_takes_viscosity(const Parameters& p, double dt) {
+  return !(p.no_slip || p.no_slip_obstacles || p.no_slip_sheets) &&
+         smoothing_of_viscosity(p, dt) <= 0.01f * p.xsph;
+}
 /// Sheets may be far lighter than the fluid that they hold: beside them it always is.
 inline bool viscosity_is_implicit(const Parameters& p, double dt) {
   return p.incompressible && (viscous_strength(p, dt) > 0.01f || p.no_slip_sheets);

@@ -210,11 +210,8 @@ struct SquaredDensity {
   DRENCH_HD float operator()(int i) const { return density[i] * density[i]; }
 };
 struct EvenEnergy {
-  const Float4* push;
-  DRENCH_HD float operator()(int i) const {
-    const Float4 p = push[i];
-    return p.x * p.x + p.y * p.y + p.z * p.z;
-  }
+  const float* even;
+  DRENCH_HD float operator()(int i) const { return even[i]; }
 };
 /// The gradient of particles that are off the bound, and that their own step leaves off it.
 struct FreeGradient {
@@ -232,18 +229,6 @@ struct FreeGradient {
     return inverse_diagonal[i] > 0.f && free(i, gradient) ? gradient : 0.f;
   }
 };
-
-/// D^T 1 in PressureState::vector. The first guess stays, by way of PressureState::next.
-inline void push_evenly(State& state) {
-  Float4* place = state.pressure.place.data();
-  float* guess = state.pressure.next.data();
-  parallel_for(
-      "levels: even pressure", state.fluid.count,
-      DRENCH_LAMBDA(int i) { guess[i] = place[i].w, place[i].w = 1.f; });
-  accelerate_by_pressure(state);
-  parallel_for(
-      "levels: first guess", state.fluid.count, DRENCH_LAMBDA(int i) { place[i].w = guess[i]; });
-}
 
 /// Levels are for errors that are small and smooth. In fluid that an impact has crushed they are
 /// neither, and what is free of the bound changes with every iteration: by levels particles were
@@ -271,16 +256,15 @@ inline bool no_levels(const State& state) {
 #endif
 }
 
-/// Shapes and stiffnesses of all levels.
+/// Shapes and stiffnesses of all levels, these with what invert_diagonal left.
 inline void prepare_levels(State& state) {
   shape_levels(state);
   choose_levels(state);
   if (no_levels(state)) return;
-  push_evenly(state);
   Hierarchy& h = state.pressure.hierarchy;
   float *inverse = h.inverse.data(), *uneven = h.answer.data();
   restrict_particles(state, inverse, SquaredDensity{state.fluid.density.data()});
-  restrict_particles(state, uneven, EvenEnergy{state.pressure.vector.data()});
+  restrict_particles(state, uneven, EvenEnergy{state.pressure.next.data()});
   for (int l = 1; l < h.levels; ++l) {
     restrict_nodes(state, l, inverse), restrict_nodes(state, l, uneven);
   }

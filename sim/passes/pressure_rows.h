@@ -10,6 +10,22 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// The sum of L_j r over neighbours.
+template <class Q>
+struct CorrectedSum {
+  Q diagonal, ahead, back;  // of d r; c times the next of r; c r, one place on
+
+  DRENCH_HD void add(Q d, Q c, Q r) {
+    diagonal = multiply_add(d, r, diagonal);
+    ahead = multiply_add(c, rotate(r), ahead);
+    back = multiply_add(c, r, back);
+  }
+};
+DRENCH_HD Vec3<float> total(const CorrectedSum<Float4>& sum) {
+  const Float4 d = sum.diagonal, a = sum.ahead, b = sum.back;
+  return {d.x + a.x + b.z, d.y + a.y + b.x, d.z + a.z + b.y};
+}
+
 /// vector = -D^T q.
 template <class Separation>
 struct PressureAcceleration {
@@ -28,25 +44,21 @@ struct PressureAcceleration {
     Q place, diagonal, cross;
   };
   template <class Q>
-  struct Sum {
-    Q diagonal, ahead, back;  // of L_j r w q_j: d r; c times the next of r; c r, one place on
-  };
+  using Sum = CorrectedSum<Q>;
   template <class T>
   DRENCH_HD T weight(T u) const {
     return WendlandC2::slope(u);
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q r = weight * splat_w(j.place) * separation(i.place, j.place);
-    sum.diagonal = multiply_add(j.diagonal, r, sum.diagonal);
-    sum.ahead = multiply_add(j.cross, rotate(r), sum.ahead);
-    sum.back = multiply_add(j.cross, r, sum.back);
+    sum.add(j.diagonal, j.cross, weight * splat_w(j.place) * separation(i.place, j.place));
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const float q = place[i].w;
-    const Float4 own = push[i], d = sum.diagonal, a = sum.ahead, b = sum.back;
-    vector[i] = {scale * (d.x + a.x + b.z) + q * own.x, scale * (d.y + a.y + b.x) + q * own.y,
-                 scale * (d.z + a.z + b.y) + q * own.z, 0.f};
+    const Float4 own = push[i];
+    const Vec3<float> all = total(sum);
+    vector[i] = {scale * all.x + q * own.x, scale * all.y + q * own.y, scale * all.z + q * own.z,
+                 0.f};
   }
 };
 
@@ -139,6 +151,39 @@ struct InverseDiagonal {
   }
 };
 
+/// The same, and the energy of one pressure all over, |(D^T 1)_i|^2, for the coarse levels.
+template <class Separation>
+struct EvenInverseDiagonal : InverseDiagonal<Separation> {
+  using Base = InverseDiagonal<Separation>;
+  static constexpr int columns = 3;
+  float* even;  // m^8/(kg^2 s^4)
+
+  DRENCH_HD Columns<3> inputs() const {
+    return {{this->place, this->correction, this->correction_cross}};
+  }
+  template <class Q>
+  struct Particle {
+    Q place, diagonal, cross;
+  };
+  template <class Q>
+  struct Sum {
+    typename Base::template Sum<Q> own;
+    CorrectedSum<Q> others;
+  };
+  template <class Q>
+  DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
+    Base::pair({i.place}, {j.place}, weight, sum.own);
+    sum.others.add(j.diagonal, j.cross, weight * this->separation(i.place, j.place));
+  }
+  DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
+    Base::finish(i, sum.own);
+    const Float4 own = this->push[i];
+    const Vec3<float> all = total(sum.others);
+    even[i] = length2(Vec3<float>{this->scale * all.x + own.x, this->scale * all.y + own.y,
+                                  this->scale * all.z + own.z});
+  }
+};
+
 /// The factor of the kernel's gradient, kg/m^5: a lattice at rest has rest density.
 inline float gradient_scale(const Parameters& p) {
   const float h = p.support_radius;
@@ -169,15 +214,20 @@ inline void density_rate(State& state) {
   });
 }
 
-/// Of D D^T, and PressureState::push.
+/// Of D D^T, and PressureState::push; where there may be levels EvenInverseDiagonal::even as well,
+/// in PressureState::next until an iteration.
 inline void invert_diagonal(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
-    for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
-                       InverseDiagonal<decltype(separation)>{
-                           s.place.data(), s.correction.data(), s.correction_cross.data(),
-                           s.wall.data(), s.push.data(), s.inverse_diagonal.data(),
-                           gradient_scale(state.parameters), separation});
+    using Separation = decltype(separation);
+    const InverseDiagonal<Separation> pass{
+        s.place.data(), s.correction.data(),       s.correction_cross.data(),        s.wall.data(),
+        s.push.data(),  s.inverse_diagonal.data(), gradient_scale(state.parameters), separation};
+    if (state.contact.near > 0)
+      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count, pass);
+    else
+      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
+                         EvenInverseDiagonal<Separation>{pass, s.next.data()});
   });
 }
 

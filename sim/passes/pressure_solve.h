@@ -22,6 +22,12 @@ struct SolveSums {
   }
 };
 
+/// Mean residual up to which the pressures of the last step are taken as they are; up to the
+/// tolerance they get one iteration at least. A mean does not see what is crushed in one place, and
+/// the same pressures again and again throw it out: a collapsing cube at 0.3 % took 27,000 steps in
+/// place of 600.
+constexpr float nothing_to_do = 1e-5f;
+
 /// What an iteration reads and writes; copied into every launch.
 struct PressureIteration {
   Float4* place;  // w: the pressures that A is applied to, extrapolated
@@ -55,7 +61,8 @@ struct PressureIteration {
     SolveControl& c = *control;
     if (c.done) return;
     c.residual = float(sums.residual * scale);
-    c.done = c.residual <= tolerance || c.iterations >= most_iterations;
+    const float enough = c.iterations > 0 ? tolerance : minimum(tolerance, nothing_to_do);
+    c.done = c.residual <= enough || c.iterations >= most_iterations;
     if (c.done) {
       c.levels = 0;
       return;

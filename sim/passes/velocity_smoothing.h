@@ -1,7 +1,9 @@
 #pragma once
 // XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
 //   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
-// antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h.
+// antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h;
+// water's, at spacings of a centimetre a thousandth of what this does, is added to c and costs
+// nothing.
 
 #include "sim/passes/pressure_rows.h"
 
@@ -46,9 +48,11 @@ inline void smooth_velocities(State& state) {
       "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
+  const float share =
+      p.xsph + (smoothing_takes_viscosity(p, state.dt) ? smoothing_of_viscosity(p, state.dt) : 0.f);
   const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
   for_each_neighbour("smoothing", s.lists, state.fluid.count,
-                     VelocitySmoothing{vector, v, p.xsph * volume * h * h});
+                     VelocitySmoothing{vector, v, share * volume * h * h});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

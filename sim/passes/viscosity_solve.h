@@ -1,7 +1,8 @@
 #pragma once
-// Viscosity at the end of a step, after the pressures. A step so short that dt nu / h^2 <= 0.01
-// (water) takes it explicitly; any other solves (1 + K) u = v + f + walls by conjugate gradients
-// with 3 x 3 blocks on the diagonal as preconditioner (Weiler et al. 2018), matrix-free.
+// Viscosity at the end of a step, after the pressures. Where it is next to nothing beside the
+// smoothing of velocities, that has taken it on (velocity_smoothing.h). A step so short that
+// dt nu / h^2 <= 0.01 takes it explicitly; any other solves (1 + K) u = v + f + walls by conjugate
+// gradients with 3 x 3 blocks on the diagonal as preconditioner (Weiler et al. 2018), matrix-free.
 //
 // f = dt (g + a), a of the pressures just found, is what the next step is about to add, so that u
 // is the velocity it ends with: a fluid held up by viscosity rests, and a film runs down a wall as
@@ -223,7 +224,7 @@ void step_viscosity(State& state, const Separation& separation) {
 
 /// Viscosity over the step's dt, for the velocities that the pressures left.
 inline void apply_viscosity(State& state) {
-  if (state.fluid.count == 0) return;
+  if (state.fluid.count == 0 || smoothing_takes_viscosity(state.parameters, state.dt)) return;
   with_separation(state.parameters, [&](const auto& separation) {
     if (viscosity_is_implicit(state.parameters, state.dt))
       solve_viscosity(state, separation);

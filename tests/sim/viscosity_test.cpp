@@ -123,6 +123,38 @@ TEST(Viscosity, ExplicitAndImplicitStepsAgreeWhereTheyMeet) {
   EXPECT_NEAR(below / above, 1, 5e-3);
 }
 
+// Viscosity too weak to count beside the smoothing of velocities is added to it, a stronger one is
+// a pass of its own. Both make a shear wave in a periodic box, 20 spacings long, decay as nu k^2 t
+// says, up to what kernels as wide as a tenth of it miss.
+TEST(Viscosity, SmoothingTakesOnWhatIsWeak) {
+  constexpr int steps = 20, wave = 20;
+  const auto amplitude = [](double strength) {
+    Shot shot = water();
+    const double a = shot.fluid.spacing;
+    shot.domain.axis = {Axis::periodic, Axis::periodic, Axis::periodic};
+    shot.domain.min = V3d(0), shot.domain.max = V3d(6, wave, 6) * a;
+    shot.domain.slip = Slip::free, shot.fluid.xsph = 1;
+    shot.fluid.kinematic_viscosity = viscosity_for(shot, strength, cube_dt);
+    add_box(shot, V3d(0), {6, wave, 6});
+    sim::Scene scene = sim::build_scene(shot);
+    EXPECT_EQ(sim::smoothing_takes_viscosity(scene.parameters, cube_dt), strength < 0.01 / 30);
+    const auto mode = [&](float y) { return std::cos(2 * M_PI * y / (wave * a)); };
+    for (size_t i = 0; i < scene.start.id.size(); ++i)
+      scene.start.velocity.x[i] = float(1e-3 * mode(scene.start.position.y[i]));
+    Stepper run(scene);
+    for (int k = 0; k < steps; ++k) run.step(cube_dt);
+    const sim::HostState end = run.solver->save();
+    double sum = 0;
+    for (size_t i = 0; i < end.id.size(); ++i) sum += end.velocity.x[i] * mode(end.position.y[i]);
+    return sum;
+  };
+  const double inviscid = amplitude(0), kh = 2 * M_PI * 2.15 / wave;
+  for (const double strength : {0.99 * 0.01 / 30, 1.01 * 0.01 / 30}) {
+    const double decay = std::log(inviscid / amplitude(strength));
+    EXPECT_NEAR(decay / (steps * strength * kh * kh), 1, 0.05) << strength;
+  }
+}
+
 // Random particles between no-slip walls: the matrix is symmetric, takes no energy in, and its
 // inverse blocks are inverse.
 class ViscousMatrix : public testing::Test {

@@ -128,7 +128,7 @@ TEST_P(Stack, OfSheetsHoldsWhatIsPouredOnIt) {
   watch.until(long_form() ? 1 : 0.3);
   Gates gates = squeezed();
   gates.energy = layers == 2 ? 0.1 : 5;
-  if (layers > 2) gates.speed = 20;
+  if (layers > 2) gates.speed = 30;
   report("folds", fmt::format("{} layers a thickness apart", layers), watch, gates);
 }
 
