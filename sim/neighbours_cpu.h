@@ -80,9 +80,10 @@ class Found {
         return 0;
       }
     }();
+    // in locals: members would be stored and read again for every pack
     const int size = tile.size(), *const particle = particle_.data();
-    int *const index_out = index.data(), hit = 0;
-    float* const distance2_out = distance2.data();
+    int *const to_index = index.data(), found = 0;
+    float* const to_distance2 = distance2.data();
     for (int k = 0; k < size; k += Pack::size) {
       const Pack r2 =
           length2(Vec3<Pack>{Pack::load(x + k), Pack::load(y + k), Pack::load(z + k)} - p);
@@ -95,13 +96,13 @@ class Found {
       const __m256i order =
           _mm256_load_si256(reinterpret_cast<const __m256i*>(lane_orders.lane[hits]));
       const __m256i particles = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(particle + k));
-      _mm256_storeu_ps(distance2_out + hit, _mm256_permutevar8x32_ps(r2.v, order));
-      _mm256_storeu_si256(reinterpret_cast<__m256i*>(index_out + hit),
+      _mm256_storeu_ps(to_distance2 + found, _mm256_permutevar8x32_ps(r2.v, order));
+      _mm256_storeu_si256(reinterpret_cast<__m256i*>(to_index + found),
                           _mm256_permutevar8x32_epi32(particles, order));
-      hit += __builtin_popcount(unsigned(hits));
+      found += __builtin_popcount(unsigned(hits));
     }
-    for (int k = hit; k < hit + Pack::size; ++k) index_out[k] = i, distance2_out[k] = h * h;
-    count = hit;
+    for (int k = found; k < found + Pack::size; ++k) to_index[k] = i, to_distance2[k] = h * h;
+    count = found;
   }
   /// Closeness in the place of distances, and the sum of Kernel::value over it.
   template <class Kernel>
