@@ -105,7 +105,7 @@ enum class Form { egg, bar, swelling };
 Shot splash(const std::filesystem::path& folder, Form form, const V3d& shift) {
   Shot shot = slab({15, 40, 12});
   shot.timeline = {1001, 1005, 60};
-  shot.fluid.tolerance = 2e-7;
+  shot.fluid.tolerance = 1e-7;
   TriangleMesh mesh = form == Form::bar ? cylinder(0.03, 0.15) : test::unit_sphere(24, 32);
   for (V3f& p : mesh.position) p = form == Form::bar ? p : p * V3f(0.04f, 0.03f, 0.05f);
   Obstacle o = mesh_obstacle(folder / "body.ply", mesh);
