@@ -14,7 +14,7 @@ INSTANTIATE_TEST_SUITE_P(Percent, Tolerance, testing::Values(0.01, 0.1, 1., 10.)
 
 // A cube of water collapses and hits the walls. A tolerance is a mean, which hardly knows of the
 // few particles that an impact crushes: they may not throw the rest. Taken with the pressures of
-// the last step wherever the mean was met, 1 % took 8,000 steps and 28 % at the 99.9th percentile.
+// the last step wherever the mean was met, 1 % gained 41 % energy and 10 % ended in a blow-up.
 TEST_P(Tolerance, ThatIsLooseLeavesTheFluidBounded) {
   Shot shot = water(0.05);
   shot.fluid.tolerance = GetParam() / 100;
