@@ -14,13 +14,12 @@ struct NearestOutput {
   float *weight_b, *weight_c;
   float* far_by;        // m
   float reach, search;  // m: triangles within reach count, those within search are looked at
-  float cloth_moved;    // m, since far_by was set
 };
 
 inline NearestOutput nearest_output(State& state, float reach) {
   FluidState& f = state.fluid;
-  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(), reach,
-          1.5f * reach,      state.cloth.moved};
+  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(),
+          reach,             1.5f * reach};
 }
 
 #if defined(__CUDACC__)
@@ -33,7 +32,6 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
   parallel_for(
       "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
         out.triangle[i] = -1;
-        out.far_by[i] -= out.cloth_moved;
         if (out.far_by[i] > 0.f) return;
         Vec3<float> p = position[i];
         float best = out.search * out.search;
@@ -58,7 +56,6 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
         if (found) out.triangle[i] = nearest;
         out.far_by[i] = found ? 0.f : sqrtf(best) - out.reach;
       });
-  state.cloth.moved = 0.f;
 }
 
 #else
@@ -191,7 +188,6 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
           unknown(polygons, position, before, out);
       for (int i = cell_start[row * g.nx]; i < cell_start[(row + 1) * g.nx]; ++i) {
         out.triangle[i] = -1;
-        out.far_by[i] -= out.cloth_moved;
         if (before[i] >= 0)
           near.add(i, 2.f * reach);
         else if (out.far_by[i] <= 0.f)
@@ -199,7 +195,6 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
       }
     }
   });
-  state.cloth.moved = 0.f;
 }
 
 #endif

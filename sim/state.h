@@ -100,7 +100,6 @@ struct ClothState {
   VecColumn sorted_shift;  // m, of the image that stands there; only where an axis is periodic
   GridShape grid{};
   float largest_radius = 0;   // m
-  float moved = 0;            // m, what any vertex has moved at most since far_by was set
   Vec3<float> low{}, high{};  // m, bounds of all vertices
   VecColumn predicted;        // m/s, mean over the step
   Column<float> share;        // sum of contact weights

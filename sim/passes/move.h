@@ -218,7 +218,6 @@ inline void move_unguarded_particles(State& state) {
   const float* distance = f.sheet_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
-  float* far_by = f.far_by.data();
   const Mover mover = path_mover_of(state.parameters, dt);
   const Drift drift = drift_of(state);
   const float room = reach + 2.f * path_clearance * spacing,
@@ -236,13 +235,9 @@ inline void move_unguarded_particles(State& state) {
         const bool guard =
             every_path || (near && length2(normal[i]) == 0.f) || least <= path + room;
         moved[i] = !guard;
-        if (guard) {
-          if (!near) far_by[i] -= path;
-          return near ? 0 : 1;
-        }
+        if (guard) return near ? 0 : 1;
         x.set(i, drift.any ? end[i] : mover(x[i], velocity));  // to the bit, as without sheets
         v.set(i, velocity);
-        far_by[i] -= length(x[i] - start[i]);
         return 0;
       },
       Larger{});
@@ -294,6 +289,31 @@ inline float guard_substep(State& state, float dt, float moved) {
   return moved;
 }
 
+/// Far particles come nearer to the sheets by what they moved beside them: no more than beside any
+/// motion in the box that holds those of all vertices, and so of all triangles.
+inline void bring_far_particles_nearer(State& state) {
+  const FluidState& f = state.fluid;
+  const ClothState& c = state.cloth;
+  const VecView to = c.position.view(), from = c.start.view();
+  const Bounds of_cloth = parallel_reduce(
+      "cloth: motions", c.vertices, Bounds{},
+      DRENCH_LAMBDA(int v) { return bounds_of(to[v] - from[v]); }, JoinBounds{});
+  const VecView x = f.position.view(), start = f.start.view();
+  float* far_by = f.far_by.data();
+  for_each_lane(
+      "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {
+        const auto moved = x.at(i) - start.at(i);
+        using T = decltype(moved.x);
+        const auto most = [](T m, float low, float high) {
+          return maximum(m - T(low), T(high) - m);
+        };
+        const Vec3<T> beside{most(moved.x, of_cloth.low.x, of_cloth.high.x),
+                             most(moved.y, of_cloth.low.y, of_cloth.high.y),
+                             most(moved.z, of_cloth.low.z, of_cloth.high.z)};
+        store(far_by, i, load(far_by, i) - square_root(length2(beside)));
+      });
+}
+
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.
 inline void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
@@ -307,7 +327,7 @@ inline void move_coupled(State& state) {
     finish_substep(state.cloth);
     if (state.after_substep) state.after_substep();
   }
-  state.cloth.moved += moved;
+  bring_far_particles_nearer(state);
   if (any_periodic(state.parameters)) wrap_positions(state);
 }
 
