@@ -14,9 +14,10 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
   int chunks = n / (key_count + 1) + 1;
   if (chunks > threads) chunks = threads;
   if (n > 16384 && chunks < 2 && threads > 1 && key_count < 8 * n) chunks = 2;
-  const size_t stride = size_t(key_count) + 1;
+  // Chunks count on cache lines of their own: two on one line wait for each other at every key.
+  const size_t keys_and_out = size_t(key_count) + 1, stride = (keys_and_out + 31) / 32 * 32;
   order.resize(n);
-  start.resize(stride);
+  start.resize(keys_and_out);
   scratch.histogram.resize(stride * chunks);
   scratch.histogram.clear_bytes(0);
   int* histogram = scratch.histogram.data();
@@ -24,12 +25,18 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
   const auto begin = [=](int c) { return int(int64_t(n) * c / chunks); };
 
   ::tbb::parallel_for(0, chunks, [&](int c) {
-    int* own = histogram + c * stride;
-    for (int i = begin(c); i < begin(c + 1); ++i) ++own[key[i]];
+    int *own = histogram + c * stride, out = 0;
+    for (int i = begin(c); i < begin(c + 1); ++i) {
+      if (key[i] == key_count)
+        ++out;  // apart: often most of them, and each count would wait for the one before
+      else
+        ++own[key[i]];
+    }
+    own[key_count] = out;
   });
   int running = 0;
   int* first = start.data();
-  for (size_t k = 0; k < stride; ++k) {
+  for (size_t k = 0; k < keys_and_out; ++k) {
     first[k] = running;
     for (int c = 0; c < chunks; ++c) {
       int& slot = histogram[c * stride + k];
@@ -40,8 +47,11 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
   }
   int* sorted = order.data();
   ::tbb::parallel_for(0, chunks, [&](int c) {
-    int* own = histogram + c * stride;
-    for (int i = begin(c); i < begin(c + 1); ++i) sorted[own[key[i]]++] = i;
+    int *own = histogram + c * stride, out = own[key_count];
+    for (int i = begin(c); i < begin(c + 1); ++i) {
+      const int to = key[i] == key_count ? out++ : own[key[i]]++;
+      sorted[to] = i;
+    }
   });
 }
 
