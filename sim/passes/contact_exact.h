@@ -248,13 +248,15 @@ inline ContactSetup contact_setup(State& state) {
 enum class Rows { close, all };
 
 /// Adds up what the contacts of each triangle give to its corners, in their order.
-inline void sum_by_triangle(State& state, Rows which) {
+/// @param again  the same rows were the last to be added: where there are none zeros stand already
+inline void sum_by_triangle(State& state, Rows which, bool again = false) {
   const ContactView c = contact_rows(state);
   const int triangles = state.cloth.triangles, *start = state.contact.start.data();
   const VecView impulse = state.contact.impulse.view();
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
   parallel_for(
       "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
+        if (again && start[t] == start[t + 1] && last == 0) return;
         Vec3<float> sum[3] = {};
         for (int soft = 0; soft <= last; ++soft) {
           const int k = t + soft * triangles;
@@ -330,7 +332,7 @@ inline void solve_contacts(State& state) {
         "contact: particles", c.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
-    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close);
+    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
         "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
