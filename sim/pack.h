@@ -21,6 +21,9 @@ DRENCH_HD float square_root(float a) { return sqrtf(a); }
 DRENCH_HD float load(const float* p, int i) { return p[i]; }
 DRENCH_HD int load(const int* p, int i) { return p[i]; }
 DRENCH_HD void store(float* p, int i, float a) { p[i] = a; }
+DRENCH_HD void store(int* p, int i, bool a) { p[i] = a; }
+DRENCH_HD float round_down(float a) { return floorf(a); }
+DRENCH_HD bool below(int i, int n) { return i < n; }
 DRENCH_HD bool is_index(int i) { return i >= 0; }
 DRENCH_HD int same_index(int i, int) { return i; }  // the second says of which kind
 
@@ -62,6 +65,7 @@ struct Pack {
 DRENCH_HD Pack max0(Pack a) { return Pack(_mm256_max_ps(a.v, _mm256_setzero_ps())); }
 DRENCH_HD Pack minimum(Pack a, Pack b) { return Pack(_mm256_min_ps(a.v, b.v)); }
 DRENCH_HD Pack maximum(Pack a, Pack b) { return Pack(_mm256_max_ps(a.v, b.v)); }
+DRENCH_HD Pack round_down(Pack a) { return Pack(_mm256_floor_ps(a.v)); }
 DRENCH_HD Pack square_root(Pack a) { return Pack(_mm256_sqrt_ps(a.v)); }
 DRENCH_HD Pack select(Mask m, Pack a, Pack b) { return Pack(m.v ? a.v : b.v); }
 
@@ -99,6 +103,10 @@ DRENCH_HD Mask is_index(LaneIndex i) {  // not negative
 DRENCH_HD Mask first_lanes(int count) {
   const Mask::Native index{0, 1, 2, 3, 4, 5, 6, 7};
   return {index < count};
+}
+DRENCH_HD Mask below(Lanes i, int n) { return first_lanes(n - i.base); }
+DRENCH_HD void store(int* p, Lanes i, Mask a) {  // 1 where it is set
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(p + i.base), reinterpret_cast<__m256i>(-a.v));
 }
 /// Stores the lanes of the mask alone.
 DRENCH_HD void store_lanes(float* p, Mask m, Pack a) {

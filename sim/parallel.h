@@ -138,6 +138,25 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 #endif
 
+struct Either {
+  DRENCH_HD int operator()(int a, int b) const { return a | b; }
+};
+
+/// Is f true in any lane? f is called for all of them.
+template <class F>
+bool any_lane(const char* name, int n, const F& f) {
+#if defined(__CUDACC__)
+  return parallel_reduce(
+             name, n, 0, [=] __device__(int i) { return int(f(i)); }, Either{}) != 0;
+#else
+  std::atomic<int> any{0};
+  for_each_lane(name, n, [&](Lanes i) {
+    if ((f(i) & below(i, n)).bits()) any.store(1, std::memory_order_relaxed);
+  });
+  return any != 0;
+#endif
+}
+
 struct AddDoubles {
   DRENCH_HD double operator()(double a, double b) const { return a + b; }
 };

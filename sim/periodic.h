@@ -10,10 +10,11 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 /// The image of x in [low, high); NaN stays what it is.
-DRENCH_HD float wrap(float x, float low, float high) {
-  if (x >= low && x < high) return x;
-  const float period = high - low, w = x - period * floorf((x - low) / period);
-  return w < low || w >= high ? low : w;  // rounding may end on the upper border
+template <class T>
+DRENCH_HD T wrap(T x, float low, float high) {
+  const T from(low), to(high), period(high - low), w = x - period * round_down((x - from) / period);
+  const T wrapped = select((w < from) | (w >= to), from, w);  // rounding may end on the upper border
+  return select((x >= from) & (x < to), x, wrapped);
 }
 
 /// Lengths of the periodic axes, m; 0 for others.

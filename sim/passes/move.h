@@ -10,11 +10,11 @@ inline void move_particles(State& state) {
   FluidState& f = state.fluid;
   const VecView x = f.position.view(), v = f.velocity.view();
   const Mover mover = mover_of(state.parameters, float(state.dt));
-  parallel_for(
-      "move particles", f.count, DRENCH_LAMBDA(int i) {
-        Vec3<float> velocity = v[i];
-        x.set(i, mover(x[i], velocity));
-        v.set(i, velocity);
+  for_each_lane(
+      "move particles", f.count, DRENCH_LAMBDA(auto i) {
+        auto velocity = v.at(i);
+        x.put(i, mover(x.at(i), velocity));
+        v.put(i, velocity);
       });
 }
 
@@ -40,8 +40,10 @@ inline void copy_vectors(const char* name, VecView to, VecView from, int n) {
 struct Drift {
   VecView drift;
   bool any;
-  DRENCH_HD Vec3<float> operator[](int i) const {
-    return any ? drift[i] : Vec3<float>{0.f, 0.f, 0.f};
+  template <class Index>
+  DRENCH_HD auto at(Index i) const {
+    decltype(drift.at(i)) none{{}, {}, {}};
+    return any ? drift.at(i) : none;
   }
 };
 inline Drift drift_of(const State& state) {
@@ -128,7 +130,7 @@ inline GuardCount test_paths(State& state, const PathTest& test, const Tested& t
         const int i = tested[k];
         const bool still = held[i] || moved[i];
         Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-        Vec3<float> to = still ? x[i] : found ? end[i] : mover(x[i] + drift[i], velocity);
+        Vec3<float> to = still ? x[i] : found ? end[i] : mover(x[i] + drift.at(i), velocity);
         if (!still) v.set(i, velocity);
         GuardCount result;
         if (triangle[i] < 0 || test.in_reach(i, to)) {
@@ -222,26 +224,27 @@ inline void move_unguarded_particles(State& state) {
   const Drift drift = drift_of(state);
   const float room = reach + 2.f * path_clearance * spacing,
               support = state.parameters.support_radius;
-  const bool every_path = state.parameters.every_path;
-  const int far_ones = parallel_reduce(
-      "guard: move", f.count, 0,
-      DRENCH_LAMBDA(int i) {
-        Vec3<float> velocity = v[i];
-        start.set(i, x[i]);
-        const bool near = triangle[i] >= 0;
-        const float d = distance[i] < 0.f ? -distance[i] : distance[i], least = near ? d : support,
-                    path = dt * length(velocity) + length(drift[i]);
+  const float every_path = state.parameters.every_path ? 1.f : 0.f;
+  const bool far_ones = any_lane(
+      "guard: move", f.count, DRENCH_LAMBDA(auto i) {
+        const auto from = x.at(i);
+        auto velocity = v.at(i);
+        using T = decltype(from.x);
+        start.put(i, from);
+        const auto near = is_index(load(triangle, i));
+        const T d = load(distance, i), least = select(near, maximum(d, -d), T(support)),
+                path = T(dt) * square_root(length2(velocity)) +
+                       square_root(length2(drift.at(i)));
         // Beyond a free edge the distance is not kept.
-        const bool guard =
-            every_path || (near && length2(normal[i]) == 0.f) || least <= path + room;
-        moved[i] = !guard;
-        if (guard) return near ? 0 : 1;
-        x.set(i, drift.any ? end[i] : mover(x[i], velocity));  // to the bit, as without sheets
-        v.set(i, velocity);
-        return 0;
-      },
-      Larger{});
-  if (far_ones > 0) state.contact.cloth_reach = -1.f;  // see Tested
+        const auto edge = near & (length2(normal.at(i)) <= T(0.f)),
+                   free = !(edge | (least <= path + T(room))) & (T(every_path) <= T(0.f));
+        const Vec3<T> old = velocity, to = drift.any ? end.at(i) : mover(from, velocity);
+        x.put(i, select(free, to, from));  // to the bit, as without sheets
+        v.put(i, select(free, velocity, old));
+        store(moved, i, free);
+        return !free & !near;
+      });
+  if (far_ones) state.contact.cloth_reach = -1.f;  // see Tested
   parallel_for(
       "guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
   stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded,

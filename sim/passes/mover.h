@@ -15,16 +15,18 @@ struct Mover {
   bool wall[3], periodic[3];
   float dt;
 
-  DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float>& v) const {
-    float p[3] = {x.x + dt * v.x, x.y + dt * v.y, x.z + dt * v.z}, u[3] = {v.x, v.y, v.z};
-    for (int k = 0; k < 3; ++k) {
-      if (periodic[k]) p[k] = wrap(p[k], low[k], high[k]);
-      if (!wall[k]) continue;
-      if (p[k] < low[k]) p[k] = low[k], u[k] = max0(u[k]);
-      if (p[k] > high[k]) p[k] = high[k], u[k] = -max0(-u[k]);
-    }
-    v = {u[0], u[1], u[2]};
-    return {p[0], p[1], p[2]};
+  template <class T>
+  DRENCH_HD Vec3<T> operator()(Vec3<T> x, Vec3<T>& v) const {
+    return {along(0, x.x, v.x), along(1, x.y, v.y), along(2, x.z, v.z)};
+  }
+  template <class T>
+  DRENCH_HD T along(int k, T x, T& v) const {
+    T p = x + T(dt) * v;
+    if (periodic[k]) p = wrap(p, low[k], high[k]);
+    if (!wall[k]) return p;
+    const auto under = p < T(low[k]), over = p > T(high[k]);
+    v = select(under, max0(v), select(over, -max0(-v), v));
+    return select(under, T(low[k]), select(over, T(high[k]), p));
   }
   DRENCH_HD Vec3<float> wrapped(Vec3<float> x) const {
     float p[3] = {x.x, x.y, x.z};
