@@ -66,8 +66,8 @@ struct NearestOfPack {
   Pack best, wb{0.f}, wc{0.f};
   LaneIndex which = same_index(-1);
 
-  /// Triangle k of the sorted ones for those of the eight that it may be nearer to.
-  DRENCH_HD void test(const PolygonView& polygons, int k, Mask may) {
+  /// Triangle k of the sorted ones for all eight.
+  DRENCH_HD void test(const PolygonView& polygons, int k) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
     const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
@@ -75,7 +75,7 @@ struct NearestOfPack {
                                    one.inverse_bc, one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
-    may = may & (distance2_bound(plane, t) < best);
+    Mask may = distance2_bound(plane, t) < best;
     if (!polygons.periodic) may = may & !same(which, triangle);  // else it may be an image of it
     if (may.bits()) take(closest_point(plane, t), triangle, may);
   }
@@ -102,14 +102,6 @@ struct NearestOfPack {
     const Mask closer = (foot.distance2 < best) & valid;
     best = select(closer, foot.distance2, best), which = select(closer, triangle, which);
     wb = select(closer, foot.wb, wb), wc = select(closer, foot.wc, wc);
-  }
-  /// Which of the eight could the triangle in box k be nearer to than what they have?
-  DRENCH_HD Mask may_improve(const PolygonView& polygons, int k) const {
-    const Vec3<float> l = polygons.sorted_low[k], h = polygons.sorted_high[k];
-    const Vec3<Pack> gap{max0(maximum(Pack(l.x) - p.x, p.x - Pack(h.x))),
-                         max0(maximum(Pack(l.y) - p.y, p.y - Pack(h.y))),
-                         max0(maximum(Pack(l.z) - p.z, p.z - Pack(h.z)))};
-    return length2(gap) < best;
   }
 };
 
@@ -144,11 +136,7 @@ class PackOfNeighbours {
       for (int k = from; k < to; k += 8) {
         int bits = polygons_.box_near(Lanes{k}, low, high, extra).bits();
         if (k + 8 > to) bits &= (1 << (to - k)) - 1;
-        for (; bits; bits &= bits - 1) {
-          const int place = k + __builtin_ctz(bits);
-          const Mask may = pack.may_improve(polygons_, place);
-          if (may.bits()) pack.test(polygons_, place, may);
-        }
+        for (; bits; bits &= bits - 1) pack.test(polygons_, k + __builtin_ctz(bits));
       }
     });
     put(pack);
