@@ -11,6 +11,7 @@
 #include "sim/cuda_check.h"
 #else
 #include <cstring>
+
 #include <tbb/cache_aligned_allocator.h>
 #endif
 
@@ -100,7 +101,8 @@ class Column {
   void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
 
  private:
-  std::vector<T, ::tbb::cache_aligned_allocator<T>> data_;
+  using Allocator = ::tbb::cache_aligned_allocator<T>;
+  std::vector<T, Allocator> data_;
   size_t size_ = 0;
 };
 

@@ -18,8 +18,8 @@ struct NearestOutput {
 
 inline NearestOutput nearest_output(State& state, float reach) {
   FluidState& f = state.fluid;
-  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(),
-          reach,             1.5f * reach};
+  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(), reach,
+          1.5f * reach};
 }
 
 #if defined(__CUDACC__)
@@ -54,7 +54,7 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
                                    [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
         const bool found = best < out.reach * out.reach;
         if (found) out.triangle[i] = nearest;
-        out.far_by[i] = found ? 0.f : sqrtf(best) - out.reach;
+        out.far_by[i] = sqrtf(best) - out.reach;
       });
 }
 
@@ -147,7 +147,7 @@ class PackOfNeighbours {
     const Mask found = pack.best < Pack(out_.reach * out_.reach);
     alignas(32) float left[8], wb[8], wc[8];
     alignas(32) int which[8];
-    select(found, Pack(0.f), square_root(pack.best) - Pack(out_.reach)).store(left);
+    (square_root(pack.best) - Pack(out_.reach)).store(left);
     pack.wb.store(wb), pack.wc.store(wc);
     store_lanes(which, first_lanes(8), select(found, pack.which, same_index(-1)));
     for (int k = 0; k < count_; ++k) {
@@ -172,12 +172,12 @@ inline void find_nearest_triangles(State& state, const VecView& position, float 
   const GridShape g = f.grid;
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
     for (int row = range.begin(); row < range.end(); ++row) {
-      PackOfNeighbours near(polygons, position, before, out),
-          unknown(polygons, position, before, out);
+      PackOfNeighbours close(polygons, position, before, out),
+          near(polygons, position, before, out), unknown(polygons, position, before, out);
       for (int i = cell_start[row * g.nx]; i < cell_start[(row + 1) * g.nx]; ++i) {
         out.triangle[i] = -1;
-        if (before[i] >= 0)
-          near.add(i, 2.f * reach);
+        if (before[i] >= 0)  // the farthest of eight says how far to look for all of them
+          (out.far_by[i] < -0.5f * reach ? close : near).add(i, 2.f * reach);
         else if (out.far_by[i] <= 0.f)
           unknown.add(i, 2.f * reach);
       }

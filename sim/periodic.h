@@ -13,7 +13,7 @@ namespace drench::sim::DRENCH_BACKEND {
 template <class T>
 DRENCH_HD T wrap(T x, float low, float high) {
   const T from(low), to(high), period(high - low), w = x - period * round_down((x - from) / period);
-  const T wrapped = select((w < from) | (w >= to), from, w);  // rounding may end on the upper border
+  const T wrapped = select((w < from) | (w >= to), from, w);  // rounding may end at the border
   return select((x >= from) & (x < to), x, wrapped);
 }
 

@@ -40,14 +40,14 @@ struct FluidState {
   GridShape grid{};
   // coupling
   Column<int> triangle;  // nearest triangle within the support radius, -1 none
-  Column<float>
-      far_by;  // m, how much nearer a sheet must come to be within the support; a lower bound
+  Column<float> far_by;  // m, how much nearer a sheet must come to be within the support; a lower
+                         // bound. Negative where it is within
   Column<float> weight_b, weight_c;  // barycentric weights of its foot point
   VecColumn normal;                  // unit, from the sheet to the particle's side; 0 where none
   Column<float> sheet_distance;      // m along normal; 1e30 where there is no sheet
   Column<float> plane;  // m, sheet_distance - normal . position: > -normal . x in front. 1e29
                         // beyond a free edge, where all is in front; 1e30 without a sheet in reach
-  Column<float> edge;  // 0 beyond a free edge .. 1 half a spacing inside it
+  Column<float> edge;   // 0 beyond a free edge .. 1 half a spacing inside it
   Column<int>
       shaded;  // 1 where a sheet may hide neighbours; after the density pass: where one does
   Column<float> cloth_share;  // share of density that the sheet replaces

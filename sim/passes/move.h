@@ -233,16 +233,15 @@ inline void move_unguarded_particles(State& state) {
         start.put(i, from);
         const auto near = is_index(load(triangle, i));
         const T d = load(distance, i), least = select(near, maximum(d, -d), T(support)),
-                path = T(dt) * square_root(length2(velocity)) +
-                       square_root(length2(drift.at(i)));
+                path = T(dt) * square_root(length2(velocity)) + square_root(length2(drift.at(i)));
         // Beyond a free edge the distance is not kept.
-        const auto edge = near & (length2(normal.at(i)) <= T(0.f)),
-                   free = !(edge | (least <= path + T(room))) & (T(every_path) <= T(0.f));
+        const auto on_edge = near & (length2(normal.at(i)) <= T(0.f)),
+                   guard = on_edge | (least <= path + T(room)) | (T(every_path) > T(0.f));
         const Vec3<T> old = velocity, to = drift.any ? end.at(i) : mover(from, velocity);
-        x.put(i, select(free, to, from));  // to the bit, as without sheets
-        v.put(i, select(free, velocity, old));
-        store(moved, i, free);
-        return !free & !near;
+        x.put(i, select(guard, from, to));  // to the bit, as without sheets
+        v.put(i, select(guard, old, velocity));
+        store(moved, i, !guard);
+        return guard & (!near);
       });
   if (far_ones) state.contact.cloth_reach = -1.f;  // see Tested
   parallel_for(

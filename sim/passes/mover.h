@@ -24,7 +24,8 @@ struct Mover {
     T p = x + T(dt) * v;
     if (periodic[k]) p = wrap(p, low[k], high[k]);
     if (!wall[k]) return p;
-    const auto under = p < T(low[k]), over = p > T(high[k]);
+    const auto under = p < T(low[k]);
+    const auto over = p > T(high[k]);
     v = select(under, max0(v), select(over, -max0(-v), v));
     return select(under, T(low[k]), select(over, T(high[k]), p));
   }
