@@ -131,6 +131,34 @@ TEST(Skip, PathsThatNeedNoTestEndWhereTheyWould) {
   }
 }
 
+// How far off a particle was is known from step to step and in no checkpoint: a run that forgets it
+// in every step looks for all triangles anew.
+TEST(Skip, WhatIsKnownOfFarParticlesChangesNoBit) {
+  for (const FluidSolver solver : {FluidSolver::incompressible, FluidSolver::weakly_compressible}) {
+    const auto meet = [&](bool forgets) {
+      Shot shot = empty_shot();
+      shot.fluid.solver = solver;
+      shot.gravity = V3d(0, -9.81, 0);
+      add_box(shot, V3d(-0.05, 0.08, -0.05), {10, 12, 10}, V3d(0.5, -1, 0));
+      add_sheet(shot, 0.2, 0, 16).velocity = V3d(-1, 3, 0);
+      Stepper run(shot);
+      const auto near = [&] {
+        const std::vector<int> triangle = run.solver->near_triangles();
+        return std::count_if(triangle.begin(), triangle.end(), [](int t) { return t >= 0; });
+      };
+      run.step(1e-4);
+      EXPECT_EQ(near(), 0);
+      while (run.time < 0.04) {
+        if (forgets) run.solver->load(run.solver->save());
+        run.step(1e-4);
+      }
+      EXPECT_GT(near(), 200);
+      return run.solver->save();
+    };
+    expect_same_state(meet(true), meet(false));
+  }
+}
+
 /// A block that falls onto a sheet and a floor, measured by one probe of every kind or by none.
 sim::HostState probed_splash(FluidSolver solver, bool probed, std::vector<std::string>& plan,
                              unsigned& allocated) {
