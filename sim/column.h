@@ -11,8 +11,6 @@
 #include "sim/cuda_check.h"
 #else
 #include <cstring>
-
-#include <tbb/cache_aligned_allocator.h>
 #endif
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -101,8 +99,7 @@ class Column {
   void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
 
  private:
-  using Allocator = ::tbb::cache_aligned_allocator<T>;
-  std::vector<T, Allocator> data_;
+  std::vector<T> data_;
   size_t size_ = 0;
 };
 

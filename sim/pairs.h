@@ -185,7 +185,7 @@ class Tile {
   const float* column(int c) const { return data_.data() + size_t(c) * stride_; }
 
  private:
-  std::vector<float, ::tbb::cache_aligned_allocator<float>> data_;
+  std::vector<float> data_;
   std::vector<Places> packs_;
   static constexpr int most_rows = 18;       // nine, and each in two at the seam of a periodic x
   int begin_[most_rows], count_[most_rows];  // the runs of particles that a tile is made of
