@@ -12,6 +12,7 @@
 #include "sim/births.h"
 #include "sim/mesh_emitter.h"
 #include "sim/obstacles.h"
+#include "sim/scene_report.h"
 #include "sim/solver.h"
 #include "sim/wind.h"
 
@@ -114,8 +115,9 @@ std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const 
 /// from it, so that nothing is filled twice.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
-  std::vector<int> source;  // as in Birth
-  size_t overlapping = 0;   // particles that later sources lost
+  std::vector<int> source;           // as in Birth
+  size_t overlapping = 0;            // particles that later sources lost
+  std::vector<SourceReport> report;  // of each source; what obstacles take is not known yet
 };
 /// @param make_level_set  needed for volumes. @throws Error as fill_volume, or if a source loses
 /// all.
@@ -134,18 +136,24 @@ struct Scene {
   HostState start;
   Births births;                                 // of the start
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
+  SceneReport report;
 
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
   float place(int axis, double world) const;
 };
 
-/// Whether fluid may start at a point: not within an obstacle or nearer to one than half a spacing,
-/// which is what a lattice has to a wall.
-bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
+/// The obstacle because of which no fluid may start at a point: within it or nearer to it than half
+/// a spacing, which is what a lattice has to a wall; -1: none.
+int obstacle_in_the_way(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
+inline bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time,
+                               double spacing) {
+  return obstacle_in_the_way(obstacles, point, time, spacing) < 0;
+}
 
 /// @param make_level_set  see ObstacleSet.
-/// @throws Error as build_sheet, ObstacleSet and MeshEmitter, if nothing is to be simulated, or if
-/// fluid starts inside cloth.
+/// @throws Error as build_sheet, ObstacleSet and MeshEmitter, if nothing is to be simulated, if
+/// fluid starts inside cloth, if all of a source is lost, or if an emitter can never send a
+/// particle.
 Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set = {});
 
 }  // namespace drench::sim

@@ -93,6 +93,7 @@ struct Simulator::Implementation {
                                   "half a spacing of them and were left out",
                                   scene.inside_obstacles));
     }
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
     probes.start(time, *solver);
   }
 

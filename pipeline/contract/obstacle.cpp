@@ -12,6 +12,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/shells.h"
 #include "pipeline/contract/weld.h"
 
 namespace drench {
@@ -113,14 +114,6 @@ void turn_normals(TriangleMesh& mesh) {
     if (face[v].dot(V3d(mesh.normal[v])) < 0) mesh.normal[v] = -mesh.normal[v];
 }
 
-void orient_outward(TriangleMesh& mesh) {
-  double volume = 0;
-  for (const Triangle& t : mesh.triangle)
-    volume += V3d(mesh.position[t.x]).dot(V3d(mesh.position[t.y]).cross(V3d(mesh.position[t.z])));
-  if (volume < 0)
-    for (Triangle& t : mesh.triangle) std::swap(t.y, t.z);
-}
-
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
   const auto first = uint32_t(mesh.position.size());
   const V3d normal = u.cross(v).normalized();
@@ -205,6 +198,40 @@ Pose obstacle_pose(const Obstacle& obstacle, double frame) {
   return pose;
 }
 
+LevelSetBounds bounds_in_own_space(const Shot& shot, const Obstacle& obstacle, double begin,
+                                   double end) {
+  LevelSetBounds bounds;
+  for (const Axis axis : shot.domain.axis)
+    if (axis == Axis::periodic) return bounds;
+  const V3d size = shot.domain.max - shot.domain.min;
+  const double margin =
+      shot.cloth.empty() ? 2 * support_ratio(shot) * shot.fluid.spacing : size.length();
+  for (int k = 0; k < 3; ++k) bounds.low[k] = 1e30, bounds.high[k] = -1e30;
+  const bool moves = obstacle.position.keys.size() > 1 || obstacle.rotation_deg.keys.size() > 1;
+  constexpr double part = 0.25;  // frames
+  V3d before[8];
+  double travel = 0;  // m, farthest of a corner from one look to the next
+  const int looks = moves ? int(std::min(std::ceil((end - begin) / part), 1e5)) : 0;
+  for (int look = 0; look <= looks; ++look) {
+    const Pose pose =
+        obstacle_pose(obstacle, begin + (looks > 0 ? (end - begin) * look / looks : 0));
+    for (int c = 0; c < 8; ++c) {
+      V3d corner;
+      for (int k = 0; k < 3; ++k)
+        corner[k] = c >> k & 1 ? shot.domain.max[k] + margin : shot.domain.min[k] - margin;
+      const V3d own = pose.to_own(corner);
+      for (int k = 0; k < 3; ++k) {
+        bounds.low[k] = std::min(bounds.low[k], own[k]);
+        bounds.high[k] = std::max(bounds.high[k], own[k]);
+      }
+      if (look > 0) travel = std::max(travel, (own - before[c]).length());
+      before[c] = own;
+    }
+  }
+  for (int k = 0; k < 3; ++k) bounds.low[k] -= travel, bounds.high[k] += travel;
+  return bounds;
+}
+
 bool is_sequence(const std::filesystem::path& mesh_file) {
   std::error_code code;
   return frame_field(mesh_file.filename().string()).at != std::string::npos &&
@@ -222,7 +249,7 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
   TriangleMesh mesh = read_mesh(file, corners);
   close_gaps(mesh, file);
-  orient_outward(mesh);
+  orient_shells(mesh);
   turn_normals(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
   return mesh;

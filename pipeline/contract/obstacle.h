@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/shot.h"
 
@@ -25,13 +26,19 @@ struct Pose {
 /// @param frame  film frame, may be fractional. A plane's own y axis is its normal.
 Pose obstacle_pose(const Obstacle& obstacle, double frame);
 
+/// The part of an obstacle's own space that the domain, and what of the shot may reach beyond it,
+/// takes up from film frame `begin` to `end`: two supports around it, or as far again as it is wide
+/// where there is cloth. Everything where an axis is periodic.
+LevelSetBounds bounds_in_own_space(const Shot& shot, const Obstacle& obstacle, double begin,
+                                   double end);
+
 /// Whether the name holds %d or %04d, one file for every frame, and is not that of a file itself.
 bool is_sequence(const std::filesystem::path& mesh_file);
 /// The file of a film frame. @throws std::logic_error if the name is no sequence.
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame);
 
-/// A closed mesh in its own coordinates times `scale`, m, turned outward. Gaps of less than
-/// weld_share of its diagonal are closed with a warning.
+/// A closed mesh in its own coordinates times `scale`, m, turned away from what is solid: see
+/// shells.h. Gaps of less than weld_share of its diagonal are closed with a warning.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
                               CornerData corners = CornerData::none);
