@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/device.h"
@@ -16,7 +17,10 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/plan.h"
 #include "pipeline/driver/process.h"
+#include "pipeline/driver/scene_text.h"
 #include "pipeline/driver/stats_file.h"
+#include "sim/probe_series.h"
+#include "sim/scene.h"
 
 namespace drench {
 
@@ -215,7 +219,17 @@ void plan_command(const ShotArguments& arguments) {
   const Manifest manifest(job.folder / layout::manifest);
   const Plan plan =
       make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-  print(arguments.format == OutputFormat::json ? plan_json(plan) + "\n" : plan_text(plan));
+  std::string text = plan_text(plan);
+  json object = json::parse(arguments.format == OutputFormat::json ? plan_json(plan) : "{}");
+  if (plan.simulation.needed) {
+    const sim::Scene scene = sim::build_scene(job.shot, make_level_set);
+    const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
+    text += scene_text(scene.report);
+    object["scene"] = scene_json(scene.report);
+  }
+  for (const std::string& warning : warning_texts()) object["warnings"].push_back(warning);
+  print(arguments.format == OutputFormat::json ? object.dump(2) + "\n" : text);
 }
 
 void clean_command(const ShotArguments& arguments) {
