@@ -7,6 +7,7 @@
 #include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/light_check.h"
 #include "pipeline/contract/picture_check.h"
+#include "pipeline/contract/printable.h"
 #include "pipeline/contract/probe_check.h"
 #include "pipeline/contract/seam_check.h"
 #include "pipeline/contract/source_check.h"
@@ -408,6 +409,8 @@ class Checker : CheckBase {
   void check_obstacle_files(const Obstacle& obstacle, const std::string& key) const {
     if (obstacle.mesh_file.empty())
       fail(key, fmt::format("{} is missing; add mesh = \"file.ply\"", key));
+    if (!is_utf8(obstacle.mesh_file.string()))
+      fail(key, fmt::format("{}: its folder's name is not UTF-8; rename the folder", key));
     if (!is_sequence(obstacle.mesh_file)) return;
     for (int frame = shot_.timeline.first; frame <= shot_.timeline.last; ++frame) {
       const std::filesystem::path file = sequence_file(obstacle.mesh_file, frame);

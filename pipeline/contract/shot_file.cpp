@@ -451,6 +451,20 @@ void resolve_pins(Draft& draft) {
   }
 }
 
+/// What a shot makes goes to out/NAME/QUALITY and is named after it.
+void check_file_names(const Shot& shot, const std::string& label, const std::string& quality) {
+  if (const char* const why = shot_table::file_name_problem(shot.name)) {
+    throw Error(
+        fmt::format("{}: the shot is named '{}' after its file: {}. Rename the file or set "
+                    "shot.name",
+                    label, shot.name, why));
+  }
+  if (const char* const why = shot_table::file_name_problem(quality)) {
+    throw Error(fmt::format("{}: the quality '{}' cannot be made: {}. Rename [quality.{}]", label,
+                            quality, why, quality));
+  }
+}
+
 }  // namespace
 
 Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions& options) {
@@ -466,6 +480,7 @@ Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions
   apply_quality(draft, top, label, folder, options.quality);
   for (const std::string& change : options.set) apply_override(draft, change, fs::current_path());
   resolve_pins(draft);
+  check_file_names(draft.shot, label, options.quality);
   check_shot(draft.shot, draft.sources);
   return draft.shot;
 }
