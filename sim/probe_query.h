@@ -7,7 +7,7 @@ namespace drench::sim {
 enum class ProbeKind {
   height,          // m local
   wall_pressure,   // Pa
-  inner_pressure,  // Pa
+  inner_pressure,  // Pa, of an obstacle or sheet where the disc lies on one
   wall_force,      // N, x y z
   cloth_force,     // N, x y z
   obstacle_force,  // N, x y z
@@ -24,6 +24,7 @@ struct ProbeQuery {
   float extent = 1;             // m^2 on a wall, m^3 inside: the weights' integral over the domain
   int axis = 0, side = 0;       // of the wall; 0 the low one, 1 the high one
   int begin = 0, end = 0;       // vertices; begin: the obstacle
+  int on = -1;                  // the one obstacle whose surface the disc may lie on; -1: any
 };
 
 }  // namespace drench::sim

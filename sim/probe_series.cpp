@@ -304,7 +304,8 @@ std::string ProbeSeries::definition(const Series& series) const {
           "within a spacing of {:.9g} m about the rim{}",
           q.kind == ProbeKind::wall_pressure
               ? "force of the fluid on the wall over area, for"
-              : "stress along the normal, fluid-free parts counting as 0, in",
+              : "force on the obstacle or sheet that it lies on over area, or else stress along the "
+                "normal, fluid-free parts counting as 0, in",
           std::max(p.radius, spacing_), vector(p.position), vector(p.normal.normalized()), spacing_,
           window());
     case ProbeKind::wall_force:

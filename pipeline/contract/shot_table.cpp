@@ -290,8 +290,9 @@ std::vector<Parameter> probe_rows() {
                             "tip: the vertex nearest to it at rest")
           .only(height | pressure | tip),
       row<&Probe::normal>("probe", "normal", "", place, simulate,
-                          "of the disc; any length but 0. A disc within half a spacing of a "
-                          "domain wall measures the wall")
+                          "of the disc; any length but 0. A disc within half a spacing of a wall "
+                          "of the domain, an obstacle or a sheet, and along it, measures what is "
+                          "pushed there; of a sheet the side that it points to")
           .only(pressure),
       row<&Probe::radius>("probe", "radius", "m", {1e-6, 1e4}, simulate,
                           "of the disc; below a spacing it counts as one")

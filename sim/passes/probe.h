@@ -7,7 +7,7 @@
 #include "sim/passes/cloth_springs.h"
 #include "sim/passes/measure_density.h"
 #include "sim/passes/probe_height.h"
-#include "sim/passes/probe_pressure.h"
+#include "sim/passes/probe_sensor.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -24,9 +24,8 @@ inline double held_pressure(const Parameters& p, const float (&place)[3]) {
 /// tenth of a spacing does (move.h) is not in it.
 inline std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
-  Totals<3> sum =
-      parallel_reduce("probe: wall force", state.fluid.count, Totals<3>{},
-                      WallForce{step_pressure_of(state), {query.axis, query.side}}, AddTotals<3>{});
+  Totals<3> sum = sum_by_particle<3>("probe: wall force", state,
+                                     WallForce{body_parts_of(state), {query.axis, query.side}});
   float centre[3];
   double area = query.side == 0 ? -1 : 1;  // along the axis
   for (int k = 0; k < 3; ++k) {
@@ -38,25 +37,10 @@ inline std::vector<double> wall_force(const State& state, const ProbeQuery& quer
   return to_vector(sum);
 }
 
-/// The same with the weights of a sensor, over their area, along the wall's normal, Pa.
-inline double wall_pressure(const State& state, const ProbeQuery& query) {
-  const Totals<1> sum =
-      parallel_reduce("probe: wall pressure", state.fluid.count, Totals<1>{},
-                      WallSensor{{step_pressure_of(state), {query.axis, query.side}},
-                                 soft_disc_of(query, state.parameters)},
-                      AddTotals<1>{});
-  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
-}
-
-/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
-inline double inner_pressure(const State& state, const ProbeQuery& query) {
-  const FluidState& f = state.fluid;
-  const Totals<1> sum = parallel_reduce("probe: pressure", f.count, Totals<1>{},
-                                        InnerSensor{step_pressure_of(state),
-                                                    soft_disc_of(query, state.parameters),
-                                                    {f.grid, f.cell_start.data()}},
-                                        AddTotals<1>{});
-  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
+inline double pressure(State& state, const ProbeQuery& query) {
+  // What evens out a full box has had rows of its own since.
+  if (state.parameters.full && query.kind == ProbeKind::inner_pressure) correct_gradients(state);
+  return disc_pressure(state, query) + held_pressure(state.parameters, query.place);
 }
 
 struct VertexForce {
@@ -166,11 +150,8 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
     case ProbeKind::height:
       return {surface_height(state, query)};
     case ProbeKind::wall_pressure:
-      return {wall_pressure(state, query)};
     case ProbeKind::inner_pressure:
-      // What evens out a full box has had rows of its own since.
-      if (state.parameters.full) correct_gradients(state);
-      return {inner_pressure(state, query)};
+      return {pressure(state, query)};
     case ProbeKind::wall_force:
       return wall_force(state, query);
     case ProbeKind::cloth_force:
