@@ -142,7 +142,7 @@ void ProbeSeries::aim(Series& series, const Shot& shot, const Scene& scene) cons
   V3d place = probe.position;
   if (q.kind == ProbeKind::energy) {
     for (int k = 0; k < 3; ++k)
-      place[k] = shot.gravity[k] > 0 ? shot.domain.max[k] : shot.domain.min[k];
+      place[k] = shot.gravity.keys.front().second[k] > 0 ? shot.domain.max[k] : shot.domain.min[k];
   }
   for (int k = 0; k < 3; ++k) q.place[k] = float(place[k] - frame_.origin[k]);
   if (q.kind == ProbeKind::wall_pressure || q.kind == ProbeKind::wall_force) {

@@ -387,7 +387,10 @@ struct Shot {
   Timeline timeline;
   double preroll = 0;  // s simulated before the first frame
   uint32_t seed = 1;
-  V3d gravity{0, -9.81, 0};  // m/s^2
+  Animated<V3d> gravity{V3d(0, -9.81, 0)};  // m/s^2
+  // The domain turns about an axis; what moves is seen from it. Of keys, linear between them.
+  Animated<double> frame_rotation_deg{0};
+  V3d frame_axis{0, 1, 0}, frame_center{0, 0, 0};  // any length but 0; m, a point of the axis
   double time_step = 0;      // s; 0: adaptive. Fixed steps above the stable one are refused
   Domain domain;
   Fluid fluid;

@@ -57,8 +57,21 @@ std::vector<Parameter> shot_rows() {
                           "time simulated before the first frame"),
       row<&Shot::seed>("shot", "seed", "", seeds, simulate,
                        "of everything drawn by chance in the simulation"),
-      row<&Shot::gravity>("shot", "gravity", "m/s^2", speed, simulate,
-                          "acceleration of everything"),
+      row<&Shot::gravity>(
+          "shot", "gravity", "m/s^2", speed, simulate,
+          "acceleration of everything; may be animated, as in a tank that is shaken: less the "
+          "tank's own acceleration"),
+      row<&Shot::frame_rotation_deg>(
+          "shot", "frame_rotation_deg", "deg", turns, simulate,
+          "angle by which the domain with all in it is turned about frame_axis: fluid and sheets "
+          "feel the centrifugal, Coriolis and Euler forces, and gravity, which stays the world's, "
+          "turns in it. Positions, velocities and wind are relative to the domain. It turns evenly "
+          "between keys, not at all before and after them; at the start all moves with it; may be "
+          "animated"),
+      row<&Shot::frame_axis>("shot", "frame_axis", "", place, simulate,
+                             "about which the domain turns, right-handed; any length but 0"),
+      row<&Shot::frame_center>("shot", "frame_center", "m", place, simulate,
+                               "a point of that axis"),
       row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
                             "fixed step; 0 chooses the largest stable one, step by step"),
 
