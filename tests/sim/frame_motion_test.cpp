@@ -32,7 +32,7 @@ min = [0, 0, 0]
 max = [0.3, 0.3, 0.06]
 [fluid]
 spacing = 0.01
-kinematic_viscosity = 1e-4
+kinematic_viscosity = 1e-3
 [[fluid.box]]
 min = [0, 0, 0]
 max = [0.3, 0.12, 0.06]
