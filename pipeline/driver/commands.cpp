@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/device.h"
@@ -16,6 +17,10 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/plan.h"
 #include "pipeline/driver/process.h"
+#include "pipeline/driver/scene_text.h"
+#include "pipeline/driver/stats_file.h"
+#include "sim/probe_series.h"
+#include "sim/scene.h"
 
 namespace drench {
 
@@ -86,6 +91,28 @@ Counts count_of(const Plan& plan) {
   return counts;
 }
 
+std::vector<std::string> warning_texts() {
+  std::vector<std::string> texts;
+  for (const LoggedWarning& warning : logged_warnings()) texts.push_back(warning.text);
+  return texts;
+}
+
+/// Says all warnings once more, as the last lines of a run, and keeps them with its times.
+void repeat_warnings(const fs::path& folder) {
+  const std::vector<LoggedWarning> warnings = logged_warnings();
+  if (warnings.empty()) return;
+  StatsFile stats(folder / layout::stats);
+  log_info("driver", fmt::format("{} warning{}:", warnings.size(), warnings.size() > 1 ? "s" : ""));
+  for (const LoggedWarning& warning : warnings) {
+    const std::string times =
+        warning.times > 1 ? fmt::format(" ({} times)", warning.times) : std::string();
+    log_info(warning.part, fmt::format("warning: {}{}", warning.text, times));
+    stats.add(
+        "warning",
+        json{{"part", warning.part}, {"text", warning.text}, {"times", warning.times}}.dump());
+  }
+}
+
 void report_done(const Job& job, const ShotArguments& arguments, const Plan& first) {
   const bool nothing = first.nothing_to_do();
   const Counts counts = count_of(first);
@@ -95,7 +122,9 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
                {"frames", job.wanted.frames},
                {"nothing_to_do", nothing},
                {"planned", nothing ? 0 : counts.ran},
-               {"skipped", counts.skipped}}
+               {"skipped", counts.skipped},
+               {"warnings", logged_warnings().size()},
+               {"warning", warning_texts()}}
               .dump() +
           "\n");
   }
@@ -175,8 +204,14 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
                             (job.folder / layout::manifest).string(), manifest.damaged_lines()));
   }
   manifest.open_for_append();
-  const Plan plan = make_all(job, arguments, manifest);
-  report_done(job, arguments, plan);
+  try {
+    const Plan plan = make_all(job, arguments, manifest);
+    report_done(job, arguments, plan);
+  } catch (...) {
+    repeat_warnings(job.folder);
+    throw;
+  }
+  repeat_warnings(job.folder);
 }
 
 void plan_command(const ShotArguments& arguments) {
@@ -184,7 +219,17 @@ void plan_command(const ShotArguments& arguments) {
   const Manifest manifest(job.folder / layout::manifest);
   const Plan plan =
       make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-  print(arguments.format == OutputFormat::json ? plan_json(plan) + "\n" : plan_text(plan));
+  std::string text = plan_text(plan);
+  json object = json::parse(arguments.format == OutputFormat::json ? plan_json(plan) : "{}");
+  if (plan.simulation.needed) {
+    const sim::Scene scene = sim::build_scene(job.shot, make_level_set);
+    const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
+    text += scene_text(scene.report);
+    object["scene"] = scene_json(scene.report);
+  }
+  for (const std::string& warning : warning_texts()) object["warnings"].push_back(warning);
+  print(arguments.format == OutputFormat::json ? object.dump(2) + "\n" : text);
 }
 
 void clean_command(const ShotArguments& arguments) {
