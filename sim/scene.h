@@ -10,6 +10,7 @@
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
 #include "sim/births.h"
+#include "sim/frame_motion.h"
 #include "sim/mesh_emitter.h"
 #include "sim/obstacles.h"
 #include "sim/scene_report.h"
@@ -133,11 +134,14 @@ struct Scene {
   ObstacleSet obstacles, sinks;
   std::vector<MeshEmitter> mesh_emitter;
   Wind wind;
+  FrameMotion motion;
   HostState start;
   Births births;                                 // of the start
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
   SceneReport report;
 
+  /// Gravity and what is carried at a time, s, for stable_step.
+  void set_drive(double time);
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
   float place(int axis, double world) const;
 };

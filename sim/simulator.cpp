@@ -173,7 +173,7 @@ struct Simulator::Implementation {
     while (time < end) {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
       emit(time);
-      sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+      sim::StepLimit limit = driven_step();
       const double moves = scene.obstacles.limit(time, limit.dt);
       if (moves < limit.dt) limit = {moves, "obstacle speed"};
       if (shot.time_step > 0) limit = fixed_step(limit);
@@ -189,6 +189,7 @@ struct Simulator::Implementation {
       scene.obstacles.place(*solver, time, then);
       scene.sinks.place(*solver, time, then);
       if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(then));
+      if (scene.motion.moves()) solver->drive(scene.motion.over(time, then));
       limits = solver->step(dt, substeps);
       time = then;
       ++steps;
@@ -209,6 +210,16 @@ struct Simulator::Implementation {
       ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
       if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
     }
+  }
+
+  /// The stable step, of gravity and the frame's motion as they are now.
+  sim::StepLimit driven_step() {
+    if (scene.motion.moves()) scene.set_drive(time);
+    const sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+    if (!scene.motion.turns()) return limit;
+    sim::Limits more = limits;
+    more.max_speed += float(scene.motion.kick(time, limit.dt));
+    return sim::stable_step(scene.parameters, more);
   }
 
   sim::StepLimit fixed_step(const sim::StepLimit& stable) const {

@@ -8,6 +8,8 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/period_fit.h"
 #include "pipeline/contract/shot_check.h"
 #include "pipeline/contract/shot_table.h"
 #include "pipeline/contract/shot_value.h"
@@ -477,8 +479,13 @@ Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions
   draft.shot.name = file.stem().string();
   draft.shot.material = shot_table::built_in_materials();
   Reader(draft, Mode::write, label, folder).read_top(top);
+  const double spacing = draft.shot.fluid.spacing;
   apply_quality(draft, top, label, folder, options.quality);
   for (const std::string& change : options.set) apply_override(draft, change, fs::current_path());
+  if (draft.shot.fluid.spacing != spacing && draft.shot.fluid.spacing > 0) {
+    for (const std::string& text : fit_periods(draft.shot))
+      log_warning("shot", label + ": " + text);
+  }
   resolve_pins(draft);
   check_file_names(draft.shot, label, options.quality);
   check_shot(draft.shot, draft.sources);

@@ -140,6 +140,55 @@ inline std::vector<double> volume(State& state) {
   return all;
 }
 
+struct VelocityInBall {
+  VecView position, velocity;
+  Vec3<float> centre, period;
+  float radius2;
+  DRENCH_HD Totals<4> operator()(int i) const {
+    if (!(length2(nearest(position[i] - centre, period)) <= radius2)) return {};
+    const Vec3<float> v = velocity[i];
+    return {{v.x, v.y, v.z, 1}};
+  }
+};
+
+/// Mean of the particles whose centres are in a ball, m/s.
+inline std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
+  const Totals<4> sum = parallel_reduce("probe: velocity", state.fluid.count, Totals<4>{},
+                                        VelocityInBall{state.fluid.position.view(),
+                                                       state.fluid.velocity.view(),
+                                                       {q.place[0], q.place[1], q.place[2]},
+                                                       periods_of(state.parameters),
+                                                       q.radius * q.radius},
+                                        AddTotals<4>{});
+  if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
+  return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
+}
+
+struct Farthest {
+  double value = -1e30;
+  DRENCH_HD Farthest operator()(const Farthest& a, const Farthest& b) const {
+    return b.value > a.value ? b : a;
+  }
+};
+struct PlaceAlong {
+  VecView position;
+  Vec3<float> normal;
+  DRENCH_HD Farthest operator()(int i) const {
+    return {dot(to_double(position[i]), to_double(normal))};
+  }
+};
+
+/// Half a spacing beyond the farthest particle, m local.
+inline double front(const State& state, const ProbeQuery& q) {
+  if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return 0.5 * state.parameters.spacing +
+         parallel_reduce(
+             "probe: front", state.fluid.count, Farthest{},
+             PlaceAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
+             Farthest{})
+             .value;
+}
+
 inline std::vector<double> vertex(const State& state, int v) {
   const VecColumn& x = state.cloth.position;
   return {value_at(x.x, v), value_at(x.y, v), value_at(x.z, v)};
@@ -162,6 +211,10 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
       return vertex(state, query.begin);
     case ProbeKind::energy:
       return energy(state, query);
+    case ProbeKind::velocity:
+      return mean_velocity(state, query);
+    case ProbeKind::front:
+      return {front(state, query)};
     case ProbeKind::volume:
       return volume(state);
   }
