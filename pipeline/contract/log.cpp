@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cstdio>
 
+#include "pipeline/contract/printable.h"
+
 namespace drench {
 
 namespace {
@@ -16,7 +18,8 @@ const auto start = std::chrono::steady_clock::now();
 // One fwrite a line: stderr is unbuffered, so lines of two threads do not mix.
 void write_line(std::string_view part, std::string_view mark, std::string_view text) {
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
-  const std::string line = fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, text);
+  const std::string line =
+      fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, printable(text, Lines::one));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
