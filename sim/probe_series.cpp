@@ -65,21 +65,53 @@ size_t sheet_named(const Scene& scene, const std::string& name) {
   return s;
 }
 
-int tip_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
-  const int count = int(sheet.rest.size());
+/// m, of the triangles around a vertex at rest.
+double longest_edge_at(const Sheet& sheet, int vertex) {
+  double longest = 0;
+  for (const auto& t : sheet.triangle) {
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t a = t[c], b = t[(c + 1) % 3];
+      if (int(a) == vertex || int(b) == vertex)
+        longest = std::max(longest, (sheet.rest[a] - sheet.rest[b]).length());
+    }
+  }
+  return longest;
+}
+
+/// Number `vertex` of the sheet's file or grid.
+int named_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
+  const bool from_file = !sheet.of_file.empty();
+  const int count = int(from_file ? sheet.of_file.size() : sheet.rest.size());
   if (probe.vertex >= count) {
     throw Error(fmt::format(
         "{}: probe \"{}\" names vertex {}, but sheet \"{}\" has vertices 0 to {}. Use one of "
         "these, or position",
         shot.file.string(), probe.name, probe.vertex, sheet.name, count - 1));
   }
-  if (probe.vertex >= 0) return probe.vertex;
+  const int vertex = from_file ? sheet.of_file[size_t(probe.vertex)] : probe.vertex;
+  if (vertex >= 0) return vertex;
+  throw Error(fmt::format(
+      "{}: probe \"{}\" names vertex {} of sheet \"{}\", which belongs to no triangle. Use "
+      "another, or position",
+      shot.file.string(), probe.name, probe.vertex, sheet.name));
+}
+
+int tip_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
+  if (probe.vertex >= 0) return named_vertex(probe, shot, sheet);
   int best = 0;
   const auto far = [&](int v) { return (sheet.rest[size_t(v)] - probe.position).length2(); };
-  for (int v = 1; v < count; ++v) {
+  for (int v = 1; v < int(sheet.rest.size()); ++v) {
     if (far(v) < far(best)) best = v;
   }
-  return best;
+  const double off = std::sqrt(far(best)), reach = longest_edge_at(sheet, best);
+  if (off <= reach) return best;
+  const V3d& p = sheet.rest[size_t(best)];
+  throw Error(fmt::format(
+      "{}: probe \"{}\" at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m off sheet \"{}\": the nearest "
+      "vertex, at ({:.6g}, {:.6g}, {:.6g}) m, has no edge longer than {:.3g} m. Move it onto the "
+      "sheet, or name the vertex",
+      shot.file.string(), probe.name, probe.position.x, probe.position.y, probe.position.z, off,
+      sheet.name, p.x, p.y, p.z, reach));
 }
 
 /// The integral of a sensor's weight (SoftDisc) over what of it lies between the walls: m^2 on a

@@ -468,10 +468,53 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
   }
 }
 
+bool is_outside(const Domain& domain, const V3d& p) {
+  for (int k = 0; k < 3; ++k) {
+    const bool open = domain.axis[size_t(k)] == Axis::open;
+    if (open && (p[k] < domain.min[k] || p[k] > domain.max[k])) return true;
+  }
+  return false;
+}
+
+/// The first state of the fluid: what its sources have, less what starts in obstacles.
+void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
+  HostState& start = scene.start;
+  scene.report.source = fluid.report;
+  std::vector<std::vector<size_t>> lost(fluid.report.size(),
+                                        std::vector<size_t>(shot.obstacle.size(), 0));
+  for (size_t i = 0; i < fluid.position.size(); ++i) {
+    const V3d p = fluid.position[i], u = fluid.velocity[i];
+    const auto source = size_t(fluid.source[i]);
+    const int obstacle = obstacle_in_the_way(scene.obstacles, p, -shot.preroll, shot.fluid.spacing);
+    if (obstacle >= 0) {
+      ++scene.inside_obstacles, ++lost[source][size_t(obstacle)];
+      continue;
+    }
+    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
+    start.velocity.push(float(u.x), float(u.y), float(u.z));
+    scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
+    start.id.push_back(int(start.id.size()));
+    ++(is_outside(shot.domain, p) ? scene.report.source[source].outside
+                                  : scene.report.source[source].kept);
+  }
+  for (size_t s = 0; s < lost.size(); ++s) {
+    for (size_t k = 0; k < lost[s].size(); ++k) {
+      if (lost[s][k] > 0)
+        scene.report.source[s].lost.push_back({shot.obstacle[k].name, lost[s][k]});
+    }
+  }
+  check_sources_start(shot, scene.report);
+  start.memory_triangle.assign(start.id.size(), -1);
+  start.memory_side.assign(start.id.size(), 1);
+  start.owed.resize(start.id.size());
+}
+
 }  // namespace
 
-bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
-  return obstacles.count() == 0 || obstacles.distance(point, time) > 0.499 * spacing;
+int obstacle_in_the_way(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
+  if (obstacles.count() == 0) return -1;
+  const ObstacleSet::Nearest nearest = obstacles.nearest(point, time);
+  return nearest.distance > 0.499 * spacing ? -1 : nearest.obstacle;
 }
 
 Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
@@ -491,21 +534,8 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   scene.parameters =
       build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles);
   scene.obstacles.set_images(ObstacleImages(scene.parameters));
-  HostState& start = scene.start;
-  for (size_t i = 0; i < fluid.position.size(); ++i) {
-    const V3d p = fluid.position[i], u = fluid.velocity[i];
-    if (!clear_of_obstacles(scene.obstacles, p, -shot.preroll, shot.fluid.spacing)) {
-      ++scene.inside_obstacles;
-      continue;
-    }
-    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
-    start.velocity.push(float(u.x), float(u.y), float(u.z));
-    scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
-    start.id.push_back(int(start.id.size()));
-  }
-  start.memory_triangle.assign(start.id.size(), -1);
-  start.memory_side.assign(start.id.size(), 1);
-  start.owed.resize(start.id.size());
+  note_meshes(shot, scene);
+  place_fluid(shot, fluid, scene);
   double dt_limit = 1e30;
   for (size_t s = 0; s < shot.cloth.size(); ++s) {
     scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
@@ -526,6 +556,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
   check_overlap(shot, scene);
   check_cloth_outside(shot, scene);
+  complete_report(shot, scene);
   return scene;
 }
 

@@ -93,6 +93,7 @@ struct Simulator::Implementation {
                                   "half a spacing of them and were left out",
                                   scene.inside_obstacles));
     }
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
     probes.start(time, *solver);
   }
 
@@ -262,7 +263,8 @@ struct Simulator::Implementation {
                       "did not reach fluid.tolerance = {:.2g}; mean density error {:.2g} "
                       "at worst",
                       frame, report.unconverged, report.steps, scene.parameters.most_iterations,
-                      scene.parameters.tolerance, report.worst_residual));
+                      scene.parameters.tolerance, report.worst_residual),
+          "pressure solve unconverged");
     }
     if (report.viscous_unconverged > 0) {
       log_warning("sim",
@@ -271,13 +273,15 @@ struct Simulator::Implementation {
                               "(shot.time_step) ask for fewer",
                               frame, report.viscous_unconverged, report.steps,
                               scene.parameters.most_viscous_iterations,
-                              scene.parameters.viscous_tolerance, report.worst_viscous_residual));
+                              scene.parameters.viscous_tolerance, report.worst_viscous_residual),
+                  "viscous solve unconverged");
     }
     if (report.sheets_cut_short > 0) {
       log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
                                      "they lack some of what pushed them. Shorter steps "
                                      "(shot.time_step) or softer cloth ask for less",
-                                     frame, report.sheets_cut_short, report.steps));
+                                     frame, report.sheets_cut_short, report.steps),
+                  "sheets' solve cut short");
     }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();
@@ -342,6 +346,7 @@ struct Simulator::Implementation {
         out.mesh.rest_position.push_back(V3f(sheet.rest[point]));
       }
       out.mesh.uv = sheet.uv;
+      if (sheet.is_sewn()) out.mesh.point = sheet.welded;
       out.mesh.triangle = sheet.triangle;
       frames.push_back(std::move(out));
     }

@@ -156,6 +156,7 @@ struct Cloth {
   V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
   V2i cells{64, 64};
   std::filesystem::path mesh_file;  // PLY or OBJ triangles, absolute after reading
+  double weld = -1;                 // m: vertices on free edges closer than this are one; < 0: a share
   std::vector<ClothPin> pin;
   V3d velocity{0, 0, 0};            // m/s at the start
   double areal_density = 0.2;       // kg/m^2

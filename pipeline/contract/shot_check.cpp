@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/check_base.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/light_check.h"
 #include "pipeline/contract/picture_check.h"
 #include "pipeline/contract/printable.h"
 #include "pipeline/contract/probe_check.h"
@@ -44,6 +45,7 @@ class Checker : CheckBase {
     }
     check_particles();
     check_picture(shot_, sources_);
+    warn_of_useless_lights(shot_, sources_);
   }
 
  private:

@@ -181,6 +181,10 @@ std::vector<Parameter> cloth_rows() {
           "grid: [along u, along v]; vertex j (cells_u + 1) + i stands at i along u"),
       row<&Cloth::mesh_file>("cloth", "mesh", "", none, simulate,
                              "PLY or OBJ file of triangles instead of a grid"),
+      row<&Cloth::weld>("cloth", "weld", "m", {-1, 1}, simulate,
+                        "mesh: vertices on free edges within this distance of one another are "
+                        "sewn, as exporters split them at seams of the texture; 0 keeps them "
+                        "apart, -1 is 1e-5 of the mesh's diagonal"),
       grid_pins_row(),
       row<&Cloth::velocity>("cloth", "velocity", "m/s", speed, simulate, "at the start"),
       row<&Cloth::areal_density>("cloth", "areal_density", "kg/m^2", {1e-4, 1e4}, simulate,

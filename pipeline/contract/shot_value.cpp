@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/colour.h"
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/named_file.h"
 #include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/printable.h"
 
@@ -187,12 +188,12 @@ class ValueReader {
   fs::path path(const toml::node& node) const {
     const std::string word = text(node);
     if (word.empty() || word.find('\0') != std::string::npos) fail("a path to a file is expected");
-    const fs::path file = fs::absolute(site_.folder / fs::path(word)).lexically_normal();
+    const fs::path file = named_file(site_.folder, word);
     if (!is_utf8(file.string())) fail(not_utf8);
     std::error_code code;
     if (!fs::exists(file, code)) {
-      fail(fmt::format("the file {} does not exist; paths are relative to the shot's folder",
-                       file.string()));
+      fail(fmt::format("the file {} does not exist; paths are relative to the shot's folder{}",
+                       file.string(), hint_on_name(word)));
     }
     if (!fs::is_regular_file(file, code)) fail(file.string() + " is not a regular file");
     return file;
@@ -200,9 +201,8 @@ class ValueReader {
 
   /// A path, or the pattern of a sequence, whose files are looked for once the frames are known.
   fs::path mesh_files(const toml::node& node) const {
-    const fs::path word = text(node);
-    if (!is_sequence(word)) return path(node);
-    return fs::absolute(site_.folder / word).lexically_normal();
+    const fs::path file = named_file(site_.folder, text(node));
+    return is_sequence(file) ? file : path(node);
   }
 
   V3f colour(const toml::node& node) const {

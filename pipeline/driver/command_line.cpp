@@ -29,7 +29,7 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   std::filesystem::path folder, name;
-  bool verbose = false, json = false, reference = false;
+  bool verbose = false, json = false, reference = false, strict = false;
 };
 
 void add_common(CLI::App& command, Arguments& arguments) {
@@ -59,6 +59,7 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--set", shot.set, "section.key=value; may be given again")
       ->allow_extra_args(false);
   command.add_option("--quality", shot.quality, "a [quality.NAME] of the shot; default final");
+  command.add_flag("--strict", arguments.strict, "take warnings for errors");
   add_common(command, arguments);
 }
 
@@ -135,6 +136,7 @@ int parse_and_run(int argc, char** argv) {
   app.footer("Example: drench run shots/pour.toml --quality preview");
   app.parse_complete_callback([&arguments] {
     if (arguments.verbose) set_log_level(LogLevel::verbose);
+    if (arguments.strict) set_on_warning(OnWarning::fail);
     if (arguments.json) arguments.shot.format = OutputFormat::json;
     if (arguments.shot.quiet) set_log_level(LogLevel::quiet);
   });

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/printable.h"
 #include "pipeline/contract/shot_file.h"
@@ -18,7 +19,11 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/plan.h"
 #include "pipeline/driver/process.h"
+#include "pipeline/driver/scene_text.h"
 #include "pipeline/driver/standard_output.h"
+#include "pipeline/driver/stats_file.h"
+#include "sim/probe_series.h"
+#include "sim/scene.h"
 
 namespace drench {
 
@@ -83,6 +88,28 @@ Counts count_of(const Plan& plan) {
   return counts;
 }
 
+std::vector<std::string> warning_texts() {
+  std::vector<std::string> texts;
+  for (const LoggedWarning& warning : logged_warnings()) texts.push_back(warning.text);
+  return texts;
+}
+
+/// Says all warnings once more, as the last lines of a run, and keeps them with its times.
+void repeat_warnings(const fs::path& folder) {
+  const std::vector<LoggedWarning> warnings = logged_warnings();
+  if (warnings.empty()) return;
+  StatsFile stats(folder / layout::stats);
+  log_info("driver", fmt::format("{} warning{}:", warnings.size(), warnings.size() > 1 ? "s" : ""));
+  for (const LoggedWarning& warning : warnings) {
+    const std::string times =
+        warning.times > 1 ? fmt::format(" ({} times)", warning.times) : std::string();
+    log_info(warning.part, fmt::format("warning: {}{}", warning.text, times));
+    stats.add(
+        "warning",
+        json{{"part", warning.part}, {"text", warning.text}, {"times", warning.times}}.dump());
+  }
+}
+
 void report_done(const Job& job, const ShotArguments& arguments, const Plan& first) {
   const bool nothing = first.nothing_to_do();
   const Counts counts = count_of(first);
@@ -92,7 +119,9 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
                      {"frames", job.wanted.frames},
                      {"nothing_to_do", nothing},
                      {"planned", nothing ? 0 : counts.ran},
-                     {"skipped", counts.skipped}}));
+                     {"skipped", counts.skipped},
+                     {"warnings", logged_warnings().size()},
+                     {"warning", warning_texts()}}));
   }
   if (nothing) {
     log_info("driver", fmt::format("nothing to do: all {} steps of {} are up to date",
@@ -169,18 +198,35 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
                             (job.folder / layout::manifest).string(), manifest.damaged_lines()));
   }
   manifest.open_for_append();
-  if (arguments.verify) drop_all_damaged(job.folder, manifest);
-  const Plan plan = make_all(job, arguments, manifest);
-  report_done(job, arguments, plan);
+  try {
+    if (arguments.verify) drop_all_damaged(job.folder, manifest);
+    const Plan plan = make_all(job, arguments, manifest);
+    report_done(job, arguments, plan);
+  } catch (...) {
+    try {
+      repeat_warnings(job.folder);
+    } catch (const Error&) {  // a full disk again: what came first is what is wrong
+    }
+    throw;
+  }
+  repeat_warnings(job.folder);
 }
 
 void plan_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   const Manifest manifest(job.folder / layout::manifest);
-  const Plan plan =
-      make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-  if (arguments.format == OutputFormat::json) return write_plan_json(plan, print);
-  print(printable(plan_text(plan), Lines::many));
+  Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  std::string text = plan_text(plan), scene_object;
+  if (plan.simulation.needed) {
+    const sim::Scene scene = sim::build_scene(job.shot, make_level_set);
+    const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
+    text += scene_text(scene.report);
+    scene_object = json_line(scene_json(scene.report));
+  }
+  for (const std::string& warning : warning_texts()) plan.warnings.push_back(warning);
+  if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
+  print(printable(text, Lines::many));
 }
 
 void clean_command(const ShotArguments& arguments) {

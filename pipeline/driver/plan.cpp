@@ -510,7 +510,8 @@ std::string plan_text(const Plan& plan) {
   return text;
 }
 
-void write_plan_json(const Plan& plan, const std::function<void(std::string_view)>& write) {
+void write_plan_json(const Plan& plan, const std::string& scene,
+                     const std::function<void(std::string_view)>& write) {
   const auto text_of = [](const nlohmann::json& value) {
     return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   };
@@ -523,6 +524,7 @@ void write_plan_json(const Plan& plan, const std::function<void(std::string_view
       "{{\n\"beyond\": {},\n\"problems\": {},\n\"simulation\": {},\n\"warnings\": "
       "{},\n\"tasks\": [",
       text_of(plan.beyond), text_of(plan.problems), text_of(simulation), text_of(plan.warnings));
+  if (!scene.empty()) text.insert(2, fmt::format("\"scene\": {},\n", scene));
   constexpr size_t piece = 1 << 16;
   std::string_view before = "\n";
   for (const Task& task : plan.tasks) {

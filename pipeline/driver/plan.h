@@ -91,6 +91,8 @@ Plan make_plan(const Wanted& wanted, const Snapshot& snapshot, int timeline_last
 std::string plan_text(const Plan& plan);
 /// {"tasks": [{"step", "frame", "action", "reason"}], "simulation": {...}, ...}, a task a line,
 /// handed on piece by piece: a million frames are half a gigabyte.
-void write_plan_json(const Plan& plan, const std::function<void(std::string_view)>& write);
+/// @param scene  a JSON object for "scene"; empty: none
+void write_plan_json(const Plan& plan, const std::string& scene,
+                     const std::function<void(std::string_view)>& write);
 
 }  // namespace drench

@@ -16,9 +16,14 @@ namespace drench {
 
 void StatsFile::add(std::string_view step, int frame, double wall_s, const std::string& json) {
   nlohmann::json object = nlohmann::json::parse(json);
-  object["step"] = step;
   object["frame"] = frame;
   object["wall_s"] = wall_s;
+  add(step, object.dump());
+}
+
+void StatsFile::add(std::string_view step, const std::string& json) {
+  nlohmann::json object = nlohmann::json::parse(json);
+  object["step"] = step;
   const std::string line = json_line(object);
   const std::scoped_lock lock(mutex_);
   // O_NONBLOCK: opening a FIFO must not wait for a reader.
