@@ -10,6 +10,8 @@
 
 #include "pipeline/contract/error.h"
 
+#include "pipeline/contract/printable.h"
+
 namespace drench {
 
 namespace {
@@ -37,7 +39,8 @@ bool remember(std::string_view part, std::string_view text, std::string_view cau
 // One fwrite a line: stderr is unbuffered, so lines of two threads do not mix.
 void write_line(std::string_view part, std::string_view mark, std::string_view text) {
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
-  const std::string line = fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, text);
+  const std::string line =
+      fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, printable(text, Lines::one));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

@@ -125,7 +125,8 @@ auto read_points(const std::filesystem::path& path, const char* what, const char
     const auto grid = vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     // Columns of one value take no room in a file, but positions do.
     constexpr int64_t most_a_byte = 64;
-    if (meta_value<int64_t>(*grid, "count") / most_a_byte > int64_t(bytes.size()))
+    const auto count = grid->getMetadata<openvdb::Int64Metadata>("count");
+    if (count && count->value() / most_a_byte > int64_t(bytes.size()))
       throw std::runtime_error("it says to hold more particles than fit into it");
     return frame_of(grid);
   } catch (const std::bad_alloc&) {

@@ -13,6 +13,7 @@
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "pipeline/driver/readable.h"
 #include "render/kept_parts.h"
 #include "render/noisy_frame.h"
 #include "render/renderer.h"
@@ -274,6 +275,10 @@ class ShotStages final : public Stages {
     report.files.push_back(write_movie(folder / layout::movie(shot_.name), images(folder, frames),
                                        shot_.timeline.fps, keep_going, ViewTransform(shot_.view)));
     return report;
+  }
+
+  std::string why_unreadable(const fs::path& file) const override {
+    return drench::why_unreadable(file);
   }
 
  private:
