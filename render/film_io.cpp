@@ -136,7 +136,7 @@ Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header
   return window;
 }
 
-Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
+Film read_pixels(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
@@ -159,7 +159,7 @@ Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
 
   const Imf::Chromaticities from =
       Imf::hasChromaticities(header) ? Imf::chromaticities(header) : rec709_chromaticities();
-  if (primaries == Primaries::as_they_are || from == acescg_chromaticities()) return film;
+  if (from == acescg_chromaticities()) return film;
   const ColorMatrix matrix = color_conversion(from, acescg_chromaticities());
   for (size_t p = 0; p < film.rgba.size(); p += 4) {
     const V3f rgb = matrix({film.rgba[p], film.rgba[p + 1], film.rgba[p + 2]});
@@ -255,8 +255,8 @@ Film read_layers(const std::filesystem::path& path) {
   return read_or_fail(path, [&] { return read_all(path); });
 }
 
-Film read_exr(const std::filesystem::path& path, Primaries primaries) {
-  return read_or_fail(path, [&] { return read_pixels(path, primaries); });
+Film read_exr(const std::filesystem::path& path) {
+  return read_or_fail(path, [&] { return read_pixels(path); });
 }
 
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,

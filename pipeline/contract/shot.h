@@ -294,7 +294,7 @@ struct Light {
   double radius = 0.1;             // sphere, disk, m
   V3d direction{0, -1, 0};         // sun, disk: the way its light travels
   double angle_deg = 0.53;         // sun: apparent diameter
-  std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
+  std::filesystem::path map;       // environment: latitude-longitude picture; empty: constant
   double rotation_deg = 0;         // environment, about Y
   bool split_suns = true;          // environment: small bright regions of its map become suns
   V3f horizon{1, 1, 1};  // environment without a map: radiance at the horizon / at the zenith
@@ -320,8 +320,8 @@ struct Material {
   double ior = 1.333;                 // dielectric, coat, what wets cloth
   int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
-  std::filesystem::path texture;      // PNG, JPEG or EXR, multiplies reflectance
-  std::filesystem::path normal_map;   // PNG, JPEG or EXR, tangent space, x along u, y along v
+  std::filesystem::path texture;      // a picture, multiplies reflectance
+  std::filesystem::path normal_map;   // a picture, tangent space, x along u, y along v
   double texture_size = 1;            // edge that both pictures cover, in uv; on the ground m
   bool checker = false;               // diffuse, coated: built-in checker of checker_size
   double checker_size = 0.1;          // m
