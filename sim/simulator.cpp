@@ -232,7 +232,7 @@ struct Simulator::Implementation {
     while (time < end) {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
       emit(time);
-      sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+      sim::StepLimit limit = driven_step();
       const double moves = scene.obstacles.limit(time, limit.dt);
       if (moves < limit.dt) limit = {moves, "obstacle speed"};
       if (shot.time_step > 0) limit = fixed_step(limit);
@@ -248,6 +248,7 @@ struct Simulator::Implementation {
       scene.obstacles.place(*solver, time, then);
       scene.sinks.place(*solver, time, then);
       if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(then));
+      if (scene.motion.moves()) solver->drive(scene.motion.over(time, then));
       limits = solver->step(dt, substeps);
       time = then;
       ++steps;
@@ -268,6 +269,16 @@ struct Simulator::Implementation {
       ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
       if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
     }
+  }
+
+  /// The stable step, of gravity and the frame's motion as they are now.
+  sim::StepLimit driven_step() {
+    if (scene.motion.moves()) scene.set_drive(time);
+    const sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+    if (!scene.motion.turns()) return limit;
+    sim::Limits more = limits;
+    more.max_speed += float(scene.motion.kick(time, limit.dt));
+    return sim::stable_step(scene.parameters, more);
   }
 
   sim::StepLimit fixed_step(const sim::StepLimit& stable) const {
@@ -320,7 +331,8 @@ struct Simulator::Implementation {
                       "did not reach fluid.tolerance = {:.2g}; mean density error {:.2g} "
                       "at worst",
                       frame, report.unconverged, report.steps, scene.parameters.most_iterations,
-                      scene.parameters.tolerance, report.worst_residual));
+                      scene.parameters.tolerance, report.worst_residual),
+          "pressure solve unconverged");
     }
     if (report.viscous_unconverged > 0) {
       log_warning("sim",
@@ -329,13 +341,15 @@ struct Simulator::Implementation {
                               "(shot.time_step) ask for fewer",
                               frame, report.viscous_unconverged, report.steps,
                               scene.parameters.most_viscous_iterations,
-                              scene.parameters.viscous_tolerance, report.worst_viscous_residual));
+                              scene.parameters.viscous_tolerance, report.worst_viscous_residual),
+                  "viscous solve unconverged");
     }
     if (report.sheets_cut_short > 0) {
       log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
                                      "they lack some of what pushed them. Shorter steps "
                                      "(shot.time_step) or softer cloth ask for less",
-                                     frame, report.sheets_cut_short, report.steps));
+                                     frame, report.sheets_cut_short, report.steps),
+                  "sheets' solve cut short");
     }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();
@@ -400,6 +414,7 @@ struct Simulator::Implementation {
         out.mesh.rest_position.push_back(V3f(sheet.rest[point]));
       }
       out.mesh.uv = sheet.uv;
+      if (sheet.is_sewn()) out.mesh.point = sheet.welded;
       out.mesh.triangle = sheet.triangle;
       frames.push_back(std::move(out));
     }

@@ -4,14 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <numbers>
 #include <regex>
+#include <set>
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/log.h"
 #include "pipeline/contract/shells.h"
+#include "pipeline/contract/weld.h"
 
 namespace drench {
 
@@ -45,35 +47,71 @@ Field frame_field(const std::string& name) {
           match[1].matched ? std::stoi(match[1]) : 0};
 }
 
-/// Every edge belongs to as many triangles one way as the other; vertices at one place are one.
-void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
-  std::map<std::array<float, 3>, uint32_t> place;
-  std::vector<uint32_t> welded;
-  for (const V3f& p : mesh.position)
-    welded.push_back(place.try_emplace({p.x, p.y, p.z}, uint32_t(place.size())).first->second);
-  std::map<std::pair<uint32_t, uint32_t>, int> edges;
-  for (const Triangle& t : mesh.triangle) {
-    for (int c = 0; c < 3; ++c) {
-      const uint32_t a = welded[t[c]], b = welded[t[(c + 1) % 3]];
-      if (a != b) a < b ? ++edges[{a, b}] : --edges[{b, a}];
-    }
+/// Between two corners of open edges, of the first thousand.
+double narrowest_gap(const TriangleMesh& mesh,
+                     const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+  std::set<uint32_t> rim;
+  for (const auto& [a, b] : open) {
+    rim.insert({a, b});
+    if (rim.size() > 1000) break;
   }
-  const auto open =
-      std::find_if(edges.begin(), edges.end(), [](const auto& e) { return e.second != 0; });
-  if (open == edges.end() && !mesh.triangle.empty()) return;
+  double gap = std::numeric_limits<double>::infinity();
+  for (auto a = rim.begin(); a != rim.end(); ++a)
+    for (auto b = rim.begin(); b != a; ++b)
+      gap = std::min(gap, V3d(mesh.position[*a] - mesh.position[*b]).length());
+  return gap;
+}
+
+[[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
+                              const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+  // Nine digits tell any two floats apart.
+  const auto corner = [&](uint32_t v) {
+    const V3f& p = mesh.position[v];
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", p.x, p.y, p.z);
+  };
+  const auto [a, b] = open.front();
+  throw Error(fmt::format(
+      "{}: the mesh is not closed: the edge from {} to {} has not as many triangles one way as the "
+      "other, and so have {} edges in all. The nearest of their corners are {:.3g} apart, in the "
+      "file's unit; gaps up to {:.3g} are closed. It needs an inside: close its holes, merge its "
+      "vertices by distance, and orient it in one way",
+      file.string(), corner(a), corner(b), open.size(), narrowest_gap(mesh, open),
+      weld_share * diagonal_of(mesh)));
+}
+
+/// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
+void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
   if (mesh.triangle.empty())
     throw Error(file.string() + ": has no triangles; a solid or volume needs some");
-  const auto corner = [&](uint32_t of) {
-    const auto found =
-        std::find_if(place.begin(), place.end(), [&](const auto& p) { return p.second == of; });
-    return fmt::format("({:.4g}, {:.4g}, {:.4g})", found->first[0], found->first[1],
-                       found->first[2]);
-  };
-  throw Error(
-      fmt::format("{}: the mesh is not closed: the edge from {} to {} has not as many "
-                  "triangles one way as the other. It needs an inside: close its "
-                  "holes and orient it in one way",
-                  file.string(), corner(open->first.first), corner(open->first.second)));
+  const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
+  const auto open = free_edges(mesh, welded.first);
+  if (!open.empty()) refuse_open(mesh, file, open);
+  size_t moved = 0;
+  for (size_t v = 0; v < mesh.position.size(); ++v) {
+    const V3f& first = mesh.position[welded.first[v]];
+    if (mesh.position[v] == first) continue;
+    mesh.position[v] = first;
+    ++moved;
+  }
+  if (moved > 0) {
+    log_warning("mesh", fmt::format("{}: hairline gaps were closed: {} vertices moved by up to "
+                                    "{:.3g} of the file's unit onto their neighbours. Merge its "
+                                    "vertices by distance",
+                                    file.string(), moved, welded.widest));
+  }
+}
+
+/// Turns normals that point away from their faces.
+void turn_normals(TriangleMesh& mesh) {
+  if (mesh.normal.empty()) return;
+  std::vector<V3d> face(mesh.position.size(), V3d(0));
+  for (const Triangle& t : mesh.triangle) {
+    const V3d a(mesh.position[t.x]);
+    const V3d n = (V3d(mesh.position[t.y]) - a).cross(V3d(mesh.position[t.z]) - a);
+    for (const uint32_t v : {t.x, t.y, t.z}) face[v] += n;
+  }
+  for (size_t v = 0; v < face.size(); ++v)
+    if (face[v].dot(V3d(mesh.normal[v])) < 0) mesh.normal[v] = -mesh.normal[v];
 }
 
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
@@ -141,7 +179,7 @@ TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
     case ObstacleType::sphere:
       return sphere_mesh(obstacle.radius);
     case ObstacleType::mesh:
-      return read_obstacle_mesh(shot, obstacle, frame);
+      return read_obstacle_mesh(shot, obstacle, frame, CornerData::uv_and_normal);
   }
   throw std::logic_error("own_mesh: no such type");
 }
@@ -195,7 +233,9 @@ LevelSetBounds bounds_in_own_space(const Shot& shot, const Obstacle& obstacle, d
 }
 
 bool is_sequence(const std::filesystem::path& mesh_file) {
-  return frame_field(mesh_file.filename().string()).at != std::string::npos;
+  std::error_code code;
+  return frame_field(mesh_file.filename().string()).at != std::string::npos &&
+         !std::filesystem::exists(mesh_file, code);
 }
 
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame) {
@@ -206,20 +246,22 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
   return pattern.parent_path() / name;
 }
 
-TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale) {
-  TriangleMesh mesh = read_mesh(file);
-  check_closed(mesh, file);
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
+  TriangleMesh mesh = read_mesh(file, corners);
+  close_gaps(mesh, file);
   orient_shells(mesh);
+  turn_normals(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
   return mesh;
 }
 
-TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
+                                CornerData corners) {
   const bool sequence = is_sequence(obstacle.mesh_file);
   const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
-  return read_closed_mesh(file, obstacle.scale);
+  return read_closed_mesh(file, obstacle.scale, corners);
 }
 
 TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {
@@ -242,7 +284,8 @@ TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int fr
     const V3d own(mesh.position[k]);
     V3d velocity = (later.to_world(own) - earlier.to_world(own)) / (2 * step);  // m a frame
     if (deforms && between > 0) {
-      const V3d change = V3d(after.position[k] - before.position[k]) / between;
+      const size_t point = mesh.point.empty() ? k : mesh.point[k];
+      const V3d change = V3d(after.position[point] - before.position[point]) / between;
       velocity += pose.to_world(change) - pose.position;
     }
     moves |= velocity.length2() > 0;
@@ -257,7 +300,13 @@ TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int fr
 
 void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
                          const Obstacle& obstacle) {
-  if (mesh.triangle == other.triangle && mesh.position.size() == other.position.size()) return;
+  // Where vertices are split depends on a frame's normals; points do not.
+  const std::vector<uint32_t> point = points_of(mesh), other_point = points_of(other);
+  bool same = mesh.triangle.size() == other.triangle.size();
+  for (size_t k = 0; same && k < mesh.triangle.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      same &= point[mesh.triangle[k][c]] == other_point[other.triangle[k][c]];
+  if (same) return;
   throw Error(fmt::format(
       "obstacle \"{}\": the files of {} do not have the same triangles in every frame, so that "
       "there is nothing to interpolate. Export the sequence with constant topology",

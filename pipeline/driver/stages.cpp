@@ -13,6 +13,7 @@
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "pipeline/driver/readable.h"
 #include "render/kept_parts.h"
 #include "render/noisy_frame.h"
 #include "render/renderer.h"
@@ -114,7 +115,10 @@ class ShotSimulation final : public Simulation {
 class ShotStages final : public Stages {
  public:
   ShotStages(const Shot& shot, fs::path folder, const StageOptions& options)
-      : shot_(shot), folder_(std::move(folder)), options_(options) {
+      : shot_(shot),
+        folder_(std::move(folder)),
+        options_(options),
+        parts_(std::make_shared<KeptParts>(picture_memory(options))) {
     if (options.memory_gib > 0) {
       shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
     }
@@ -273,7 +277,16 @@ class ShotStages final : public Stages {
     return report;
   }
 
+  std::string why_unreadable(const fs::path& file) const override {
+    return drench::why_unreadable(file);
+  }
+
  private:
+  static PictureMemory picture_memory(const StageOptions& options) {
+    if (options.memory_gib <= 0) return {};
+    return PictureMemory(uint64_t(options.memory_gib * double(1 << 30)));
+  }
+
   std::vector<NumberedImage> images(const fs::path& folder, const std::vector<int>& frames) const {
     std::vector<NumberedImage> result;
     for (const int frame : frames) {
@@ -285,7 +298,7 @@ class ShotStages final : public Stages {
   Shot shot_;
   fs::path folder_;
   StageOptions options_;
-  const std::shared_ptr<KeptParts> parts_ = std::make_shared<KeptParts>();
+  const std::shared_ptr<KeptParts> parts_;
 };
 
 }  // namespace
