@@ -39,7 +39,7 @@ void check_size(const Shot& shot, const TriangleMesh& mesh, const V3d& size,
                   "particles of fluid.spacing = {} m; at most {:.3g} are allowed. Use a "
                   "smaller scale or a larger spacing{}",
                   shot.file.string(), name, size.x, size.y, size.z, count, a, most_particles,
-                  guess.empty() ? "" : ". " + guess));
+                  guess.empty() ? "" : ": " + guess));
 }
 
 }  // namespace

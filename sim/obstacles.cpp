@@ -117,7 +117,7 @@ LevelSet ObstacleSet::level_set(const Entry& entry, const TriangleMesh& mesh) co
     const std::string guess = guess_of_unit(shot_.domain, entry.low, entry.high);
     throw Error(fmt::format("{}: {} \"{}\": {}{}", shot_.file.string(),
                             role_ == Solids::sinks ? "sink" : "obstacle", entry.obstacle.name,
-                            error.what(), guess.empty() ? "" : ". " + guess));
+                            error.what(), guess.empty() ? "" : ": " + guess));
   }
 }
 

@@ -328,7 +328,7 @@ double bytes_of(const TriangleMesh& mesh, double voxel) {
     const V3d a(mesh.position[t.x]), b(mesh.position[t.y]), c(mesh.position[t.z]);
     area += 0.5 * (b - a).cross(c - a).length();
   }
-  constexpr double layers = 3, a_block = 9000, a_triangle = 300;
+  constexpr double layers = 3, a_block = 13000, a_triangle = 300;
   const double blocks = layers * area / (LevelSet::side * LevelSet::side * voxel * voxel);
   return blocks * a_block + double(mesh.triangle.size()) * a_triangle;
 }
