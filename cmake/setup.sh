@@ -17,6 +17,7 @@ drench_packages=(
   "libtbb-dev:/usr/include/tbb/task_arena.h"
   "libpng-dev:/usr/include/png.h"
   "libjpeg62-turbo-dev:/usr/include/jpeglib.h"
+  "libtiff-dev:/usr/include/x86_64-linux-gnu/tiffio.h /usr/include/tiffio.h"
   "libgtest-dev:/usr/include/gtest/gtest.h"
   "libcli11-dev:/usr/include/CLI/CLI.hpp"
   "libtomlplusplus-dev:/usr/include/toml++/toml.h /usr/include/toml++/toml.hpp"

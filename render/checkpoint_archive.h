@@ -26,12 +26,15 @@ class CheckpointArchive {
   template <class T>
   requires std::is_trivially_destructible_v<T>
   void column(std::vector<T>& column) { bytes(column.data(), column.size() * sizeof(T)); }
-  /// Ends the file with its digest, or compares it. @return whether all is well
+  /// Ends the file with its digest and closes it, or compares the digest. @return whether all is
+  /// well: nothing failed, and what was written lies on the disk in its whole length
   bool finish();
 
  private:
   Way way_;
+  std::filesystem::path file_;
   std::fstream stream_;
+  uint64_t size_ = 0;  // bytes so far
   Hasher hasher_;
 };
 

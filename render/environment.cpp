@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/contract/error.h"
 #include "render/color.h"
-#include "render/renderer.h"
+#include "render/texture.h"
 
 namespace drench {
 
@@ -57,13 +56,13 @@ uint32_t AliasTable::sample(float& u) const {
   return b.other;
 }
 
-Environment::Environment(const Light& light, Sampling sampling)
+Environment::Environment(const Light& light, Sampling sampling, PictureMemory& memory)
     : scale_(light.radiance),
       horizon_(light.radiance * light.horizon),
       ground_(light.radiance * light.below),
       rotation_(float(light.rotation_deg / 360 - std::floor(light.rotation_deg / 360))) {
   if (!light.map.empty()) {
-    read_map(light);
+    read_map(light, memory);
     if (light.split_suns) suns_ = split_suns(map_, rotation_);
     for (MapSun& sun : suns_) sun.irradiance *= scale_;
   }
@@ -82,22 +81,25 @@ Environment::Environment(const Light& light, Sampling sampling)
   if (sampling == Sampling::on) build_tables(columns, rows);
 }
 
-void Environment::read_map(const Light& light) {
-  const Film film = read_exr(light.map);
-  map_ = {film.width, film.height, {}};
-  map_.texel.resize(size_t(film.width) * film.height);
+void Environment::read_map(const Light& light, PictureMemory& memory) {
+  const uint64_t before = memory.taken();
+  const Texture picture = read_sky(light.map, memory);
+  const uint64_t of_picture = memory.taken() - before;
+  // The map and its tables of what is drawn.
+  memory.take(
+      light.map,
+      fmt::format("{} x {} texels of light '{}'", picture.width(), picture.height(), light.name),
+      picture.texels() * (sizeof(V3f) + AliasTable::kBytesAnEntry));
+  map_ = {picture.width(), picture.height(), {}};
+  map_.texel.resize(picture.texels());
   for (size_t p = 0; p < map_.texel.size(); ++p) {
     V3f& texel = map_.texel[p];
-    texel = {film.rgba[4 * p], film.rgba[4 * p + 1], film.rgba[4 * p + 2]};
-    if (!finite(texel))
-      throw Error(
-          fmt::format("{}: pixel {}, {} of the environment map of light '{}' is not finite; "
-                      "repair the map",
-                      light.map.string(), p % film.width, p / film.width, light.name));
+    texel = picture.texel(p);
     // Colours outside ACEScg's gamut come out of a conversion a little negative: no light, not a
     // fault.
     for (int c = 0; c < 3; ++c) texel[c] = std::max(texel[c], 0.f);
   }
+  memory.give_back(of_picture);
 }
 
 void Environment::build_tables(int columns, int rows) {

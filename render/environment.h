@@ -7,7 +7,8 @@
 
 #include "pipeline/contract/shot.h"
 #include "render/map_suns.h"
-#include "render/texture.h"
+#include "render/picture.h"
+#include "render/sky_map.h"
 
 namespace drench {
 
@@ -26,6 +27,11 @@ class AliasTable {
     float keep = 1;
     uint32_t other = 0;
   };
+
+ public:
+  static constexpr size_t kBytesAnEntry = sizeof(Bin) + sizeof(float);
+
+ private:
   std::vector<Bin> bins_;
   std::vector<float> probability_;
 };
@@ -41,8 +47,9 @@ class Environment {
   enum class Sampling { off, on };
 
   /// What the map's suns send is taken out of it, unless the light says otherwise.
-  /// @throws Error for a map that cannot be read or holds negative or infinite light.
-  Environment(const Light& light, Sampling sampling);
+  /// @throws Error for a map that cannot be read, holds infinite light or takes too much memory.
+  Environment(const Light& light, Sampling sampling,
+              PictureMemory& memory = PictureMemory::without_limit());
 
   V3f radiance(const V3f& direction) const;
   DirectionSample sample(const V2f& u) const;
@@ -54,14 +61,14 @@ class Environment {
   bool is_map() const { return map_.width > 0; }
 
  private:
-  void read_map(const Light& light);
+  void read_map(const Light& light, PictureMemory& memory);
   void build_tables(int width, int height);
   V2f to_map(const V3f& direction) const;
   V3f from_map(const V2f& uv) const;
 
   V3f scale_, horizon_, ground_, mean_;
   float rotation_ = 0;  // turns of the map, 0..1
-  Texture map_;
+  SkyMap map_;
   std::vector<MapSun> suns_;
   int columns_ = 0, rows_ = 0;
   AliasTable row_table_;

@@ -4,7 +4,6 @@
 #include <OpenEXR/ImfChromaticitiesAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfInputFile.h>
-#include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfStringAttribute.h>
 #include <fmt/format.h>
@@ -14,10 +13,12 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <new>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
 #include "render/color.h"
+#include "render/exr_memory.h"
 #include "render/renderer.h"
 
 namespace drench {
@@ -135,7 +136,7 @@ Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header
   return window;
 }
 
-Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
+Film read_pixels(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
@@ -158,7 +159,7 @@ Film read_pixels(const std::filesystem::path& path, Primaries primaries) {
 
   const Imf::Chromaticities from =
       Imf::hasChromaticities(header) ? Imf::chromaticities(header) : rec709_chromaticities();
-  if (primaries == Primaries::as_they_are || from == acescg_chromaticities()) return film;
+  if (from == acescg_chromaticities()) return film;
   const ColorMatrix matrix = color_conversion(from, acescg_chromaticities());
   for (size_t p = 0; p < film.rgba.size(); p += 4) {
     const V3f rgb = matrix({film.rgba[p], film.rgba[p + 1], film.rgba[p + 2]});
@@ -239,23 +240,23 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
   if (channels.clamped() > 0)
     log_warning("render", fmt::format("{} values beyond half clamped file={}", channels.clamped(),
                                       path.filename().string()));
-  return write_file_whole(path, [&](const std::filesystem::path& temporary) {
-    try {
-      Imf::OutputFile file(temporary.c_str(), header);
-      file.setFrameBuffer(channels.buffer());
-      file.writePixels(film.height);
-    } catch (const std::exception& e) {
-      throw Error(fmt::format("{}: cannot write the frame: {}", path.string(), e.what()));
-    }
-  });
+  std::string bytes;
+  try {
+    bytes = exr_bytes(header, channels.buffer());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& e) {
+    throw Error(fmt::format("{}: cannot write the frame: {}", path.string(), e.what()));
+  }
+  return write_file_whole(path, bytes);
 }
 
 Film read_layers(const std::filesystem::path& path) {
   return read_or_fail(path, [&] { return read_all(path); });
 }
 
-Film read_exr(const std::filesystem::path& path, Primaries primaries) {
-  return read_or_fail(path, [&] { return read_pixels(path, primaries); });
+Film read_exr(const std::filesystem::path& path) {
+  return read_or_fail(path, [&] { return read_pixels(path); });
 }
 
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,
@@ -263,16 +264,18 @@ WrittenFile write_png(const std::filesystem::path& path, int width, int height,
   if (width <= 0 || height <= 0 || rgb.size() != size_t(3) * width * height)
     throw Error(fmt::format("{}: a picture of {} x {} pixels with {} bytes cannot be written",
                             path.string(), width, height, rgb.size()));
-  return write_file_whole(path, [&](const std::filesystem::path& temporary) {
-    png_image image;
-    std::memset(&image, 0, sizeof image);
-    image.version = PNG_IMAGE_VERSION;
-    image.width = png_uint_32(width);
-    image.height = png_uint_32(height);
-    image.format = PNG_FORMAT_RGB;
-    if (!png_image_write_to_file(&image, temporary.c_str(), 0, rgb.data(), 0, nullptr))
-      throw Error(fmt::format("{}: cannot write the picture: {}", path.string(), image.message));
-  });
+  png_image image;
+  std::memset(&image, 0, sizeof image);
+  image.version = PNG_IMAGE_VERSION;
+  image.width = png_uint_32(width);
+  image.height = png_uint_32(height);
+  image.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string bytes(size, '\0');
+  if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr))
+    throw Error(fmt::format("{}: cannot write the picture: {}", path.string(), image.message));
+  bytes.resize(size);
+  return write_file_whole(path, bytes);
 }
 
 }  // namespace drench

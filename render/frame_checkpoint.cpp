@@ -32,6 +32,7 @@ void archive(CheckpointArchive& file, Sums& sums) {
 
 CheckpointArchive::CheckpointArchive(const std::filesystem::path& file, Way way)
     : way_(way),
+      file_(file),
       stream_(file, std::ios::binary |
                         (way == Way::write ? std::ios::out | std::ios::trunc : std::ios::in)) {
   if (!stream_) throw Error(fmt::format("{}: cannot be opened", file.string()));
@@ -43,14 +44,17 @@ void CheckpointArchive::bytes(void* data, size_t size) {
   else
     stream_.read(static_cast<char*>(data), std::streamsize(size));
   hasher_.bytes(data, size);
+  size_ += size;
 }
 
 bool CheckpointArchive::finish() {
   const Digest digest = hasher_.finish();
   Digest other = digest;
   value(other);
-  stream_.flush();
-  return stream_.good() && other == digest;
+  if (way_ == Way::read) return stream_.good() && other == digest;
+  stream_.close();  // flushes: a full disk may show only here
+  std::error_code code;
+  return stream_.good() && std::filesystem::file_size(file_, code) == size_ && !code;
 }
 
 void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {

@@ -16,20 +16,21 @@ EmbreeDevice make_device() {
 
 }  // namespace
 
-KeptParts::KeptParts() : device_(make_device()) {}
+KeptParts::KeptParts(PictureMemory picture_memory)
+    : device_(make_device()), picture_memory_(picture_memory) {}
 
 ShadingMaterial KeptParts::material(const Shot& shot, const std::string& name) {
   const std::lock_guard lock(mutex_);
   const auto known = materials_.find(name);
   if (known != materials_.end()) return known->second;
-  return materials_.emplace(name, find_material(shot, name)).first->second;
+  return materials_.emplace(name, find_material(shot, name, picture_memory_)).first->second;
 }
 
 std::shared_ptr<const Environment> KeptParts::environment(const Light& light,
                                                           Environment::Sampling sampling) {
   const std::lock_guard lock(mutex_);
   std::shared_ptr<const Environment>& known = environments_[{sampling, light.name}];
-  if (!known) known = std::make_shared<const Environment>(light, sampling);
+  if (!known) known = std::make_shared<const Environment>(light, sampling, picture_memory_);
   return known;
 }
 

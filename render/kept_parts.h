@@ -17,7 +17,8 @@ namespace drench {
 
 class KeptParts {
  public:
-  KeptParts();
+  /// @param picture_memory  what all pictures may take together
+  explicit KeptParts(PictureMemory picture_memory = {});
 
   const EmbreeDevice& device() const { return device_; }
   /// find_material of the shot, read once.
@@ -38,6 +39,7 @@ class KeptParts {
 
   EmbreeDevice device_;
   std::mutex mutex_;
+  PictureMemory picture_memory_;
   std::map<std::string, ShadingMaterial> materials_;
   std::map<std::pair<Environment::Sampling, std::string>, std::shared_ptr<const Environment>>
       environments_;

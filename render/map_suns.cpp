@@ -46,7 +46,7 @@ using Region = std::vector<uint32_t>;  // texels
 
 class SunFinder {
  public:
-  SunFinder(Texture& map, float rotation) : map_(map), rotation_(rotation) {
+  SunFinder(SkyMap& map, float rotation) : map_(map), rotation_(rotation) {
     for (int r = 0; r < map.height; ++r) rows_.push_back(moments_of_row(r, map.height));
     total_ = sum_below(std::numeric_limits<double>::infinity()).light;
   }
@@ -189,7 +189,7 @@ class SunFinder {
 
   enum State : uint8_t { out, waits, inside };
 
-  Texture& map_;
+  SkyMap& map_;
   double rotation_;
   std::vector<RowMoments> rows_;
   double total_ = 0;
@@ -198,7 +198,7 @@ class SunFinder {
 
 }  // namespace
 
-std::vector<MapSun> split_suns(Texture& map, float rotation) {
+std::vector<MapSun> split_suns(SkyMap& map, float rotation) {
   return SunFinder(map, rotation).split();
 }
 

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "render/texture.h"
+#include "render/sky_map.h"
 
 namespace drench {
 
@@ -21,6 +21,6 @@ struct MapSun {
 /// sun whole and whose texels all have one hue. A map without suns stays as it is, to the bit.
 /// @param map       latitude-longitude, as Environment reads it: bilinear, +Y at the top
 /// @param rotation  of the map, turns
-std::vector<MapSun> split_suns(Texture& map, float rotation);
+std::vector<MapSun> split_suns(SkyMap& map, float rotation);
 
 }  // namespace drench

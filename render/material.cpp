@@ -91,7 +91,7 @@ V3f ShadingMaterial::normal_at(const V2f& uv, const V3f& shading, const V3f& alo
   return dot(mapped, mapped) > 0 ? normalized(mapped) : shading;
 }
 
-ShadingMaterial find_material(const Shot& shot, const std::string& name) {
+ShadingMaterial find_material(const Shot& shot, const std::string& name, PictureMemory& memory) {
   const Material* found = named(shot.material, name);
   if (!found) found = named(shot_table::built_in_materials(), name);
   if (!found)
@@ -124,9 +124,9 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name) {
   out.priority = found->priority;
   out.absorption = found->absorption;
   if (!found->texture.empty())
-    out.texture = std::make_shared<const Texture>(read_texture(found->texture));
+    out.texture = std::make_shared<const Texture>(read_texture(found->texture, memory));
   if (!found->normal_map.empty())
-    out.normal_map = std::make_shared<const Texture>(read_normal_map(found->normal_map));
+    out.normal_map = std::make_shared<const Texture>(read_normal_map(found->normal_map, memory));
   out.checker = found->checker;
   out.inverse_checker_size = float(1 / found->checker_size);
   out.inverse_texture_size = float(1 / found->texture_size);

@@ -68,6 +68,7 @@ struct ShadingMaterial {
 
 /// The shot's material of that name, or the built-in "water", "cotton" or "ground".
 /// @throws Error for an unknown name, impossible values, or a texture that cannot be read.
-ShadingMaterial find_material(const Shot& shot, const std::string& name);
+ShadingMaterial find_material(const Shot& shot, const std::string& name,
+                              PictureMemory& memory = PictureMemory::without_limit());
 
 }  // namespace drench

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/hash.h"
 #include "render/color.h"
 
 namespace drench {
@@ -66,6 +67,8 @@ class ConfigView final : public OcioView {
 
  private:
   void make(const ViewSettings& settings, const std::string& path) {
+    // The library would wait for a FIFO's writer, and names no reason for what it cannot open.
+    if (!path.starts_with("ocio://")) (void)hash_file(path);
     const ocio::ConstConfigRcPtr config = ocio::Config::CreateFromFile(path.c_str());
     std::string from = "ACEScg";
     if (!config->getColorSpace(from.c_str())) {

@@ -69,12 +69,12 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
 /// equal files.
 WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
-enum class Primaries { converted, as_they_are };  // to ACEScg; as_they_are: what is no colour
 /// A file of write_exr with all its layers, and its attributes as the film's header.
 /// @throws Error if it cannot be read.
 Film read_layers(const std::filesystem::path& path);
-/// RGB(A) of a scanline or tiled EXR as Film (missing alpha is 1). @throws Error if unreadable.
-Film read_exr(const std::filesystem::path& path, Primaries primaries = Primaries::converted);
+/// RGB(A) of a frame as Film (missing alpha is 1), its data window alone; what comes from outside
+/// is read by picture.h. @throws Error if unreadable.
+Film read_exr(const std::filesystem::path& path);
 
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,
                       const std::vector<uint8_t>& rgb);

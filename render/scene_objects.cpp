@@ -38,6 +38,9 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
     fail(fmt::format("{} normals for {} vertices", mesh.normal.size(), n));
   if (!mesh.uv.empty() && mesh.uv.size() != n)
     fail(fmt::format("{} texture coordinates for {} vertices", mesh.uv.size(), n));
+  if (!mesh.point.empty() &&
+      (mesh.point.size() != n || *std::max_element(mesh.point.begin(), mesh.point.end()) >= n))
+    fail(fmt::format("{} points for {} vertices", mesh.point.size(), n));
   if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
     fail(fmt::format("{} contacts for {} triangles", mesh.contact.size(), mesh.triangle.size()));
   for (size_t k = 0; k < n; ++k)
@@ -60,15 +63,17 @@ void check_foam(const FoamFrame& foam) {
           fmt::format("foam: particle {} is not finite or has no radius; make the foam anew", k));
 }
 
-/// Vertex normals weighted by area.
+/// Vertex normals weighted by area; vertices at one point of the surface have one.
 std::vector<V3f> smooth_normals(const TriangleMesh& mesh) {
   std::vector<V3f> normal(mesh.position.size(), V3f(0));
+  const auto point = [&](uint32_t v) { return mesh.point.empty() ? v : mesh.point[v]; };
   for (const auto& t : mesh.triangle) {
     const V3f& a = mesh.position[t.x];
     const V3f n = cross(mesh.position[t.y] - a, mesh.position[t.z] - a);
-    for (uint32_t v : {t.x, t.y, t.z}) normal[v] += n;
+    for (uint32_t v : {t.x, t.y, t.z}) normal[point(v)] += n;
   }
   for (V3f& n : normal) n = dot(n, n) > 0 ? normalized(n) : V3f(0, 1, 0);
+  for (uint32_t v = 0; v < normal.size(); ++v) normal[v] = normal[point(v)];
   return normal;
 }
 
@@ -113,7 +118,8 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
     hasher.value(column.size()).bytes(column.data(), column.size() * sizeof(column[0]));
   };
   hasher.text(name).text(material_names_[material]);
-  add(mesh.triangle), add(mesh.position), add(mesh.normal), add(mesh.uv), add(mesh.contact);
+  add(mesh.triangle), add(mesh.position), add(mesh.normal), add(mesh.uv), add(mesh.point);
+  add(mesh.contact);
   if (keeps_velocities_) add(mesh.velocity);
   return hasher.finish();
 }

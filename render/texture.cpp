@@ -1,209 +1,140 @@
 #include "render/texture.h"
 
+#include <Imath/half.h>
 #include <fmt/format.h>
-#include <jpeglib.h>
-#include <png.h>
 
-#include <array>
-#include <csetjmp>
+#include <cmath>
 #include <cstring>
 
-#include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
-#include "render/color.h"
-#include "render/renderer.h"
+#include "pipeline/contract/log.h"
 
 namespace drench {
 
 namespace {
 
-constexpr uint64_t kLargestFile = uint64_t(1) << 32;
-constexpr uint64_t kLargestPixels = uint64_t(1) << 28;  // 16384 x 16384
-
-struct Bytes {
-  int width = 0, height = 0;
-  std::vector<uint8_t> rgb;
-};
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& why) {
-  throw Error(
-      fmt::format("{}: not a usable picture: {}; give a PNG, JPEG or EXR", path.string(), why));
+template <class Value>
+Value sample_at(const Raster& picture, size_t index) {
+  Value value;
+  std::memcpy(&value, picture.bytes.data() + index * sizeof(Value), sizeof value);
+  return value;
 }
 
-void check_size(const std::filesystem::path& path, uint64_t width, uint64_t height) {
-  if (width == 0 || height == 0 || width > kLargestPixels || width * height > kLargestPixels)
-    fail(path, fmt::format("{} x {} pixels (at most {})", width, height, kLargestPixels));
+size_t codes_of(Raster::Sample sample) { return sample == Raster::Sample::u8 ? 256 : 65536; }
+
+/// Of a code, as a number 0 to 1 or, for half, what it says.
+float number_of(Raster::Sample sample, size_t code) {
+  if (sample == Raster::Sample::u8) return float(code) / 255;
+  if (sample == Raster::Sample::u16) return float(code) / 65535;
+  Imath::half h;
+  h.setBits(uint16_t(code));
+  return h;
 }
 
-/// @param flags  of libpng: how 16-bit files are taken
-Bytes read_png(const std::filesystem::path& path, const std::vector<std::byte>& file,
-               uint32_t flags = 0) {
-  png_image image;
-  std::memset(&image, 0, sizeof image);
-  image.version = PNG_IMAGE_VERSION;
-  if (!png_image_begin_read_from_memory(&image, file.data(), file.size()))
-    fail(path, image.message);
-  if (image.width == 0 || uint64_t(image.width) * image.height > kLargestPixels) {
-    png_image_free(&image);
-    check_size(path, image.width, image.height);
-  }
-  image.flags |= flags;
-  image.format = PNG_FORMAT_RGBA;
-  Bytes out{int(image.width), int(image.height), {}};
-  std::vector<uint8_t> rgba(PNG_IMAGE_SIZE(image));
-  if (!png_image_finish_read(&image, nullptr, rgba.data(), 0, nullptr)) fail(path, image.message);
-  out.rgb.resize(rgba.size() / 4 * 3);
-  for (size_t p = 0; p < rgba.size() / 4; ++p)
-    for (size_t c = 0; c < 3; ++c) out.rgb[3 * p + c] = rgba[4 * p + c];
-  return out;
-}
-
-struct JpegErrors {
-  jpeg_error_mgr manager;
-  std::jmp_buf jump;
-  char message[JMSG_LENGTH_MAX];
-};
-
-/// libjpeg reports errors by a jump, so nothing with a destructor may live in this function.
-/// Called twice: for the size with `rgb` null, then for the pixels. False on error.
-bool decode_jpeg(const std::byte* data, size_t size, int* width, int* height, uint8_t* rgb,
-                 JpegErrors* errors) {
-  jpeg_decompress_struct jpeg;
-  jpeg.err = jpeg_std_error(&errors->manager);
-  errors->manager.error_exit = [](j_common_ptr info) {
-    auto* e = reinterpret_cast<JpegErrors*>(info->err);
-    e->manager.format_message(info, e->message);
-    std::longjmp(e->jump, 1);
-  };
-  // A warning means damaged data, which libjpeg would fill with grey.
-  errors->manager.emit_message = [](j_common_ptr info, int level) {
-    if (level < 0) info->err->error_exit(info);
-  };
-  if (setjmp(errors->jump)) {
-    jpeg_destroy_decompress(&jpeg);
-    return false;
-  }
-  jpeg_create_decompress(&jpeg);
-  jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(data), size);
-  jpeg_read_header(&jpeg, TRUE);
-  jpeg.out_color_space = JCS_RGB;
-  *width = int(jpeg.image_width);
-  *height = int(jpeg.image_height);
-  if (rgb) {
-    jpeg_start_decompress(&jpeg);
-    while (jpeg.output_scanline < jpeg.output_height) {
-      uint8_t* row = rgb + size_t(3) * jpeg.output_scanline * jpeg.output_width;
-      jpeg_read_scanlines(&jpeg, &row, 1);
-    }
-    jpeg_finish_decompress(&jpeg);  // sees a missing end
-  }
-  jpeg_destroy_decompress(&jpeg);
-  return true;
-}
-
-Bytes read_jpeg(const std::filesystem::path& path, const std::vector<std::byte>& file) {
-  JpegErrors errors{};
-  Bytes out;
-  if (!decode_jpeg(file.data(), file.size(), &out.width, &out.height, nullptr, &errors))
-    fail(path, errors.message);
-  check_size(path, uint64_t(out.width), uint64_t(out.height));
-  out.rgb.resize(size_t(3) * out.width * out.height);
-  if (!decode_jpeg(file.data(), file.size(), &out.width, &out.height, out.rgb.data(), &errors))
-    fail(path, errors.message);
-  return out;
-}
-
-Texture from_srgb(const Bytes& bytes) {
-  std::array<float, 256> linear;
-  for (int k = 0; k < 256; ++k) linear[k] = srgb_decode(float(k) / 255);
-  const ColorMatrix matrix = color_conversion(rec709_chromaticities(), acescg_chromaticities());
-  Texture out{bytes.width, bytes.height, {}};
-  out.texel.resize(bytes.rgb.size() / 3);
-  for (size_t p = 0; p < out.texel.size(); ++p)
-    out.texel[p] = matrix(
-        {linear[bytes.rgb[3 * p]], linear[bytes.rgb[3 * p + 1]], linear[bytes.rgb[3 * p + 2]]});
-  return out;
-}
-
-Texture from_exr(const std::filesystem::path& path, Primaries primaries) {
-  const Film film = read_exr(path, primaries);
-  Texture out{film.width, film.height, {}};
-  out.texel.resize(size_t(film.width) * film.height);
-  for (size_t p = 0; p < out.texel.size(); ++p) {
-    const V3f rgb(film.rgba[4 * p], film.rgba[4 * p + 1], film.rgba[4 * p + 2]);
-    if (!finite(rgb)) fail(path, fmt::format("pixel {} is not finite", p));
-    out.texel[p] = rgb;
-  }
-  return out;
+float direction_of(Raster::Sample sample, size_t code) {
+  if (sample == Raster::Sample::u8) return (float(code) - 128) / 127;
+  if (sample == Raster::Sample::u16) return (float(code) - 32768) / 32767;
+  return number_of(sample, code) * 2.f - 1.f;
 }
 
 }  // namespace
+
+Texture::Texture(Raster picture, Values values)
+    : picture_(std::move(picture)), direction_(values == Values::direction) {
+  if (!direction_) {
+    converts_ = !(picture_.code.primaries == acescg_chromaticities());
+    if (converts_) {
+      const ColorMatrix matrix = color_conversion(picture_.code.primaries, acescg_chromaticities());
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t r = 0; r < 3; ++r) column_[c][r] = matrix.m[int(r)][int(c)];
+    }
+  }
+  const Raster::Sample sample = picture_.sample;
+  if (sample == Raster::Sample::f32) return;
+  const bool integer = sample != Raster::Sample::f16;
+  for (size_t c = 0; c < 3; ++c) {
+    value_[c].resize(codes_of(sample));
+    for (size_t code = 0; code < value_[c].size(); ++code) {
+      const float number = number_of(sample, code);
+      value_[c][code] = direction_ ? direction_of(sample, code)
+                        : integer  ? picture_.code.to_linear[c](number)
+                                   : number;
+    }
+  }
+  if (sample != Raster::Sample::u8 || picture_.colours != 1) return;
+  for (size_t code = 0; code < 256; ++code) {
+    const auto grey = uint8_t(code);
+    const std::array<uint8_t, 3> rgb =
+        picture_.palette.empty() ? std::array{grey, grey, grey} : picture_.palette[code];
+    entry_.push_back(converted(value_[0][rgb[0]], value_[1][rgb[1]], value_[2][rgb[2]]));
+  }
+}
+
+/// ColorMatrix to the bit, all rows at once.
+V3f Texture::converted(float r, float g, float b) const {
+  if (!converts_) return {r, g, b};
+  Column sum;
+  for (size_t k = 0; k < 4; ++k)
+    sum[k] = column_[0][k] * double(r) + column_[1][k] * double(g) + column_[2][k] * double(b);
+  return {float(sum[0]), float(sum[1]), float(sum[2])};
+}
+
+V3f Texture::texel(size_t index) const {
+  const size_t first = index * size_t(picture_.stride);
+  const size_t step = picture_.colours == 1 ? 0 : 1;
+  switch (picture_.sample) {
+    case Raster::Sample::u8: {
+      const std::byte* at = picture_.bytes.data() + first;
+      if (!entry_.empty()) return entry_[size_t(at[0])];
+      return converted(value_[0][size_t(at[0])], value_[1][size_t(at[step])],
+                       value_[2][size_t(at[2 * step])]);
+    }
+    case Raster::Sample::u16:
+    case Raster::Sample::f16:
+      return converted(value_[0][sample_at<uint16_t>(picture_, first)],
+                       value_[1][sample_at<uint16_t>(picture_, first + step)],
+                       value_[2][sample_at<uint16_t>(picture_, first + 2 * step)]);
+    case Raster::Sample::f32:
+      break;
+  }
+  const V3f v(sample_at<float>(picture_, first), sample_at<float>(picture_, first + step),
+              sample_at<float>(picture_, first + 2 * step));
+  return direction_ ? v * 2.f - V3f(1) : converted(v.x, v.y, v.z);
+}
 
 V3f Texture::at(const V2f& uv) const {
   const auto wrap = [](float s) {
     const float w = s - std::floor(s);
     return w >= 0 ? w : 0.f;  // of what is not finite
   };
+  const int width = picture_.width, height = picture_.height;
   const float x = wrap(uv.x) * float(width) - 0.5f, y = (1 - wrap(uv.y)) * float(height) - 0.5f;
   const float x0 = std::floor(x), y0 = std::floor(y), s = x - x0, t = y - y0;
   const auto texel_at = [&](int column, int row) {
     column = (column + width) % width;
     row = (row + height) % height;
-    return texel[size_t(row) * width + column];
+    return texel(size_t(row) * size_t(width) + size_t(column));
   };
   const int c = int(x0), r = int(y0);
   return (texel_at(c, r) * (1 - s) + texel_at(c + 1, r) * s) * (1 - t) +
          (texel_at(c, r + 1) * (1 - s) + texel_at(c + 1, r + 1) * s) * t;
 }
 
-namespace {
-
-enum class Format { png, jpeg, exr };
-
-Format format_of(const std::filesystem::path& path, const std::vector<std::byte>& file) {
-  const auto starts_with = [&](std::initializer_list<int> magic) {
-    size_t k = 0;
-    for (int byte : magic)
-      if (k >= file.size() || file[k++] != std::byte(byte)) return false;
-    return true;
-  };
-  if (starts_with({0x89, 'P', 'N', 'G'})) return Format::png;
-  if (starts_with({0xff, 0xd8, 0xff})) return Format::jpeg;
-  if (starts_with({0x76, 0x2f, 0x31, 0x01})) return Format::exr;
-  fail(path, "it is none of the known formats");
+Texture read_texture(const std::filesystem::path& path, PictureMemory& memory) {
+  return {read_picture(path, PictureUse::colour, memory), Texture::Values::colour};
 }
 
-}  // namespace
-
-Texture read_texture(const std::filesystem::path& path) {
-  const std::vector<std::byte> file = read_file(path, kLargestFile);
-  switch (format_of(path, file)) {
-    case Format::png:
-      return from_srgb(read_png(path, file));
-    case Format::jpeg:
-      return from_srgb(read_jpeg(path, file));
-    case Format::exr:
-      return from_exr(path, Primaries::converted);
-  }
-  return {};
+Texture read_normal_map(const std::filesystem::path& path, PictureMemory& memory) {
+  return {read_picture(path, PictureUse::data, memory), Texture::Values::direction};
 }
 
-Texture read_normal_map(const std::filesystem::path& path) {
-  const std::vector<std::byte> file = read_file(path, kLargestFile);
-  const Format format = format_of(path, file);
-  if (format == Format::exr) {
-    Texture out = from_exr(path, Primaries::as_they_are);
-    for (V3f& n : out.texel) n = n * 2.f - V3f(1);
-    return out;
-  }
-  // Taken as sRGB, 16 bits keep their values.
-  const Bytes bytes = format == Format::png ? read_png(path, file, PNG_IMAGE_FLAG_16BIT_sRGB)
-                                            : read_jpeg(path, file);
-  Texture out{bytes.width, bytes.height, {}};
-  out.texel.resize(bytes.rgb.size() / 3);
-  for (size_t p = 0; p < out.texel.size(); ++p)
-    for (int c = 0; c < 3; ++c) out.texel[p][c] = (float(bytes.rgb[3 * p + size_t(c)]) - 128) / 127;
-  return out;
+Texture read_sky(const std::filesystem::path& path, PictureMemory& memory) {
+  Raster picture = read_picture(path, PictureUse::colour, memory);
+  if (picture.sample == Raster::Sample::u8 || picture.sample == Raster::Sample::u16)
+    log_warning("render",
+                fmt::format("{}: as a sky it has no light above 1, its {} bits end there: suns and "
+                            "lamps in it are as dim as white paper. Give an EXR or HDR",
+                            path.string(), 8 * bytes_of(picture.sample)));
+  return {std::move(picture), Texture::Values::colour};
 }
 
 }  // namespace drench

@@ -5,11 +5,14 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
 #include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/weld.h"
 #include "sim/scene.h"
 
 namespace drench::sim {
@@ -78,11 +81,61 @@ void fill_grid(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
   }
 }
 
+/// Whether two corners of a triangle are one: it encloses nothing.
+bool is_collapsed(const Imath::Vec3<uint32_t>& t, const std::vector<uint32_t>& welded) {
+  return welded[t.x] == welded[t.y] || welded[t.y] == welded[t.z] || welded[t.z] == welded[t.x];
+}
+
+/// Keeps the vertices that triangles use, in their order.
+void keep_used(const TriangleMesh& mesh, const std::vector<uint32_t>& welded, Sheet& sheet) {
+  const size_t n = mesh.position.size();
+  std::vector<char> used(n, 0);
+  for (const auto& t : mesh.triangle) {
+    if (is_collapsed(t, welded)) continue;
+    for (const uint32_t v : {t.x, t.y, t.z}) used[v] = used[welded[v]] = 1;
+    sheet.triangle.push_back(t);
+  }
+  sheet.of_file.assign(n, -1);
+  for (size_t v = 0; v < n; ++v) {
+    if (!used[v]) continue;
+    sheet.of_file[v] = int(sheet.position.size());
+    sheet.position.push_back(V3d(mesh.position[v]));
+    if (!mesh.uv.empty()) sheet.uv.push_back(mesh.uv[v]);
+  }
+  for (auto& t : sheet.triangle)
+    for (int c = 0; c < 3; ++c) t[c] = uint32_t(sheet.of_file[t[c]]);
+  for (size_t v = 0; v < n; ++v)
+    if (used[v]) sheet.welded.push_back(uint32_t(sheet.of_file[welded[v]]));
+}
+
+void say_what_was_mended(const TriangleMesh& mesh, const Welded& welded, const Sheet& sheet) {
+  const auto say = [&](const std::string& text) {
+    log_warning("sim", fmt::format("cloth \"{}\": {}", sheet.name, text));
+  };
+  if (welded.count > 0) {
+    say(fmt::format(
+        "{} vertices on free edges stand within {:.3g} m of another and are sewn to it, "
+        "as exporters split them at seams of the texture; cloth.weld = 0 keeps them "
+        "apart",
+        welded.count, welded.widest));
+  }
+  if (const size_t collapsed = mesh.triangle.size() - sheet.triangle.size(); collapsed > 0)
+    say(fmt::format("{} triangles with two corners at one point were left out", collapsed));
+  const auto stray = std::find(sheet.of_file.begin(), sheet.of_file.end(), -1);
+  if (stray == sheet.of_file.end()) return;
+  const auto first = size_t(stray - sheet.of_file.begin());
+  const V3f& p = mesh.position[first];
+  say(
+      fmt::format("{} vertices belong to no triangle and were left out; the first is vertex {} at "
+                  "({:.6g}, {:.6g}, {:.6g}) m",
+                  std::count(stray, sheet.of_file.end(), -1), first, p.x, p.y, p.z));
+}
+
 void build_from_file(const Cloth& cloth, Sheet& sheet) {
-  const TriangleMesh mesh = read_mesh(cloth.mesh_file);
-  for (const V3f& p : mesh.position) sheet.position.push_back(V3d(p));
-  sheet.uv = mesh.uv;
-  sheet.triangle = mesh.triangle;
+  const TriangleMesh mesh = read_mesh(cloth.mesh_file, CornerData::uv);
+  const Welded welded = weld(mesh, cloth.weld < 0 ? weld_share * diagonal_of(mesh) : cloth.weld);
+  keep_used(mesh, welded.first, sheet);
+  say_what_was_mended(mesh, welded, sheet);
 }
 
 /// Edges of triangles are adjacent springs, the two vertices opposite an edge a diagonal one.
@@ -117,7 +170,6 @@ std::string corner_text(const Sheet& sheet, const Imath::Vec3<uint32_t>& t) {
 
 void check_triangles(const Sheet& sheet) {
   std::map<std::pair<uint32_t, uint32_t>, size_t> directed;
-  std::vector<char> used(sheet.position.size(), 0);
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     const auto& t = sheet.triangle[k];
     const V3d e = sheet.position[t.y] - sheet.position[t.x],
@@ -130,22 +182,17 @@ void check_triangles(const Sheet& sheet) {
           sheet.name, k, corner_text(sheet, t)));
     }
     for (int c = 0; c < 3; ++c) {
-      used[t[c]] = 1;
-      const auto [place, fresh] = directed.emplace(std::pair(t[c], t[(c + 1) % 3]), k);
-      if (!fresh) {
-        throw Error(fmt::format(
-            "cloth \"{}\": triangle {} ({}) shares the edge {}-{} with triangle {} in the same "
-            "direction: the mesh is not manifold, or is wound both ways. Split the sheet "
-            "there or reverse the triangle",
-            sheet.name, k, corner_text(sheet, t), t[c], t[(c + 1) % 3], place->second));
-      }
-    }
-  }
-  for (size_t v = 0; v < used.size(); ++v) {
-    if (!used[v]) {
+      const uint32_t a = sheet.welded[t[c]], b = sheet.welded[t[(c + 1) % 3]];
+      const auto [place, fresh] = directed.emplace(std::pair(a, b), k);
+      if (fresh) continue;
+      const bool sewn = a != t[c] || b != t[(c + 1) % 3];
       throw Error(fmt::format(
-          "cloth \"{}\": vertex {} belongs to no triangle and would have no mass. Remove it",
-          sheet.name, v));
+          "cloth \"{}\": triangle {} ({}) shares the edge {}-{} with triangle {} in the same "
+          "direction: the mesh is not manifold, or is wound both ways. Split the sheet "
+          "there or reverse the triangle{}",
+          sheet.name, k, corner_text(sheet, t), a, b, place->second,
+          sewn ? "; its vertices were sewn to others at their place, which cloth.weld = 0 does not"
+               : ""));
     }
   }
 }
@@ -155,12 +202,15 @@ void apply_pins(const Cloth& cloth, Sheet& sheet) {
   for (size_t k = 0; k < cloth.pin.size(); ++k) {
     size_t held = 0;
     for (uint32_t v : cloth.pin[k].vertices) {
-      if (v >= sheet.position.size()) {
+      const size_t vertices = sheet.of_file.empty() ? sheet.position.size() : sheet.of_file.size();
+      if (v >= vertices) {
         throw Error(fmt::format(
             "cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
-            sheet.name, k + 1, v, sheet.position.size()));
+            sheet.name, k + 1, v, vertices));
       }
-      sheet.pinned[size_t(sheet.node[v])] = true;
+      const int here = sheet.of_file.empty() ? int(v) : sheet.of_file[v];
+      if (here < 0) continue;
+      sheet.pinned[size_t(sheet.node[size_t(here)])] = true;
       ++held;
     }
     if (cloth.pin[k].box) {
@@ -190,6 +240,10 @@ Sheet build_sheet(const Cloth& cloth, const Seams& seams) {
   grid ? build_grid(cloth, sheet) : build_from_file(cloth, sheet);
   if (sheet.triangle.empty())
     throw Error("cloth \"" + sheet.name + "\": the mesh has no triangles");
+  if (grid) {
+    sheet.welded.resize(sheet.position.size());
+    std::iota(sheet.welded.begin(), sheet.welded.end(), 0u);
+  }
   check_triangles(sheet);
   sheet.rest = sheet.position;
   join_at_seams(sheet, seams);

@@ -22,7 +22,7 @@ using Bin = std::array<int64_t, 3>;
 std::vector<uint32_t> vertices_on_free_edges(const Sheet& sheet) {
   std::set<Edge> edges;
   for (const auto& t : sheet.triangle) {
-    for (int c = 0; c < 3; ++c) edges.insert({t[c], t[(c + 1) % 3]});
+    for (int c = 0; c < 3; ++c) edges.insert({sheet.welded[t[c]], sheet.welded[t[(c + 1) % 3]]});
   }
   std::set<uint32_t> rim;
   for (const auto& [a, b] : edges) {
@@ -101,6 +101,29 @@ void check_around(const Sheet& sheet) {
   }
 }
 
+/// Joins vertices that are images of one another: `first` of an image is the one it is joined to.
+/// @return how many.
+size_t join_images(Sheet& sheet, const Seams& seams, std::vector<uint32_t>& first) {
+  Bins bins(seams.period, seams.least_gap);
+  size_t joined = 0;
+  for (const uint32_t v : vertices_on_free_edges(sheet)) {
+    const V3d& p = sheet.position[v];
+    bins.for_each_near(p, [&](uint32_t u) {
+      const Imath::V3i image = image_between(sheet.position[u], p, seams.period);
+      if (first[v] != v || image == Imath::V3i(0)) return;
+      const V3d off = p - sheet.position[u] - V3d(image) * seams.period;
+      if (off.length() < seams.tolerance) {
+        first[v] = u, sheet.image[v] = image;
+        ++joined;
+      } else if (off.length() < seams.least_gap) {
+        refuse_gap(sheet, p, off.length(), seams);
+      }
+    });
+    if (first[v] == v) bins.add(p, v);
+  }
+  return joined;
+}
+
 }  // namespace
 
 Seams seams_of(const Shot& shot) {
@@ -117,39 +140,23 @@ Seams seams_of(const Shot& shot) {
 void join_at_seams(Sheet& sheet, const Seams& seams) {
   const size_t n = sheet.position.size();
   sheet.period = seams.period;
-  sheet.node.resize(n), sheet.image.assign(n, Imath::V3i(0));
-  sheet.point.resize(n);
-  std::iota(sheet.node.begin(), sheet.node.end(), 0);
-  std::iota(sheet.point.begin(), sheet.point.end(), 0u);
-  if (seams.period.length() == 0) return;
-  Bins bins(seams.period, seams.least_gap);
-  std::vector<int> first(n, -1);  // of a vertex that is an image: the one it is joined to
-  size_t joined = 0;
-  for (const uint32_t v : vertices_on_free_edges(sheet)) {
-    const V3d& p = sheet.position[v];
-    bins.for_each_near(p, [&](uint32_t u) {
-      const Imath::V3i image = image_between(sheet.position[u], p, seams.period);
-      if (first[v] >= 0 || image == Imath::V3i(0)) return;
-      const V3d off = p - sheet.position[u] - V3d(image) * seams.period;
-      if (off.length() < seams.tolerance) {
-        first[v] = int(u), sheet.image[v] = image;
-        ++joined;
-      } else if (off.length() < seams.least_gap) {
-        refuse_gap(sheet, p, off.length(), seams);
-      }
-    });
-    if (first[v] < 0) bins.add(p, v);
+  sheet.image.assign(n, Imath::V3i(0));
+  std::vector<uint32_t> first(n);
+  std::iota(first.begin(), first.end(), 0u);
+  const size_t joined = seams.period.length() > 0 ? join_images(sheet, seams, first) : 0;
+  for (size_t v = 0; v < n; ++v) {
+    const uint32_t one = sheet.welded[v];
+    if (one != v) first[v] = first[one], sheet.image[v] = sheet.image[one];
   }
-  if (joined == 0) return;
+  sheet.node.assign(n, 0);
   sheet.point.clear();
   for (size_t v = 0; v < n; ++v) {
-    if (first[v] >= 0) continue;
+    if (first[v] != v) continue;
     sheet.node[v] = int(sheet.point.size());
     sheet.point.push_back(uint32_t(v));
   }
-  for (size_t v = 0; v < n; ++v)
-    if (first[v] >= 0) sheet.node[v] = sheet.node[size_t(first[v])];
-  check_around(sheet);
+  for (size_t v = 0; v < n; ++v) sheet.node[v] = sheet.node[first[v]];
+  if (joined > 0) check_around(sheet);
 }
 
 }  // namespace drench::sim

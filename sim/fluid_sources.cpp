@@ -262,7 +262,7 @@ InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set
   Occupancy occupied(shot.fluid.spacing, shot.domain);
   for (size_t k = 0; k < sources.size(); ++k) {
     const Source& source = sources[k];
-    const size_t before = fluid.position.size();
+    const size_t before = fluid.position.size(), overlapping = fluid.overlapping;
     for (const V3d& place : source.position) {
       const V3d p = inside(shot.domain, place);
       if (before > 0 && occupied.taken(p, fluid.position)) {
@@ -279,6 +279,10 @@ InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set
           "drops and volumes, each in the order of the shot. Move it, remove it, or make room",
           shot.file.string(), source.name));
     }
+    fluid.report.push_back({.name = source.name,
+                            .asked = source.position.size(),
+                            .overlapping = fluid.overlapping - overlapping,
+                            .lost = {}});
     if (sources.size() > 1) {
       for (size_t i = before; i < fluid.position.size(); ++i) occupied.add(fluid.position[i], i);
     }

@@ -171,6 +171,12 @@ std::vector<NewParticle> MeshEmitter::missing(const Scene& scene, const HostVec&
   return found;
 }
 
+std::vector<V3d> MeshEmitter::places(double time) {
+  std::vector<V3d> all;
+  for (const Cell& cell : cells_at(film_frame(time))) all.push_back(place_of(shot_, cell));
+  return all;
+}
+
 void MeshEmitter::add_corners(double frame, std::vector<V3d>& all) const {
   const Pose pose = obstacle_pose(frame_, frame);
   for (int c = 0; c < 8; ++c) all.push_back(pose.to_world(interior_.corner(c)));

@@ -34,10 +34,12 @@ class MeshEmitter {
   /// By its keys: the largest speed of new fluid, m/s, and the corners of the mesh's bounds, m.
   double fastest() const;
   std::vector<V3d> corners() const;
+  /// Places within the mesh and the domain at a time, m world, whatever is there.
+  std::vector<V3d> places(double time);
+  bool moves() const;
 
  private:
   double film_frame(double time) const { return shot_.timeline.first + time * shot_.timeline.fps; }
-  bool moves() const;
   void add_corners(double frame, std::vector<V3d>& all) const;
   const std::vector<Cell>& cells_at(double frame);
   V3d carried(const V3d& place, double frame) const;

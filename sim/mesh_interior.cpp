@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "sim/obstacle_view.h"
+#include "sim/scene_report.h"
 
 namespace drench::sim {
 
@@ -32,11 +33,13 @@ void check_size(const Shot& shot, const TriangleMesh& mesh, const V3d& size,
   const double a = shot.fluid.spacing, count = volume_of(mesh) / (a * a * a);
   const double most = 8.0 * (1 << 16) * voxel * a;  // 65536 blocks of the level set
   if (count <= most_particles && std::max({size.x, size.y, size.z}) <= most) return;
+  const std::string guess = guess_of_unit(shot.domain, V3d(0), size);
   throw Error(
       fmt::format("{}: {} is [{:.4g}, {:.4g}, {:.4g}] m large and would hold about {:.3g} "
                   "particles of fluid.spacing = {} m; at most {:.3g} are allowed. Use a "
-                  "smaller scale or a larger spacing",
-                  shot.file.string(), name, size.x, size.y, size.z, count, a, most_particles));
+                  "smaller scale or a larger spacing{}",
+                  shot.file.string(), name, size.x, size.y, size.z, count, a, most_particles,
+                  guess.empty() ? "" : ": " + guess));
 }
 
 }  // namespace
@@ -58,7 +61,11 @@ MeshInterior::MeshInterior(const Shot& shot, const TriangleMesh& mesh, double in
     }
   }
   check_size(shot, mesh, high_ - low_, name);
-  set_ = make_level_set(mesh, voxel * shot.fluid.spacing, band * shot.fluid.spacing);
+  try {
+    set_ = make_level_set(mesh, voxel * shot.fluid.spacing, band * shot.fluid.spacing, {});
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}: {}", shot.file.string(), name, error.what()));
+  }
 }
 
 V3d MeshInterior::corner(int which) const {

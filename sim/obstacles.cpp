@@ -9,6 +9,7 @@
 #include "pipeline/contract/error.h"
 #include "sim/obstacle_view.h"
 #include "sim/scene.h"
+#include "sim/scene_report.h"
 
 namespace drench::sim {
 
@@ -53,7 +54,7 @@ cpu::FieldView host_view(const LevelSet& set) {
   return view;
 }
 
-bool moves(const Obstacle& obstacle) {
+bool has_keys(const Obstacle& obstacle) {
   return obstacle.position.keys.size() > 1 || obstacle.rotation_deg.keys.size() > 1;
 }
 
@@ -107,15 +108,17 @@ void ObstacleSet::read_meshes(Entry& entry, int frame) {
 
 LevelSet ObstacleSet::level_set(const Entry& entry, const TriangleMesh& mesh) const {
   const double a = shot_.fluid.spacing;
-  const V3d size = entry.high - entry.low;
-  const double most = 8.0 * (1 << 16) * voxel * a;  // 65536 blocks
-  if (std::max({size.x, size.y, size.z}) > most) {
-    throw Error(
-        fmt::format("obstacle \"{}\": the mesh is {:.3g} m long, more than fluid.spacing "
-                    "= {} m allows ({:.3g} m). Use a smaller scale or a larger spacing",
-                    entry.obstacle.name, std::max({size.x, size.y, size.z}), a, most));
+  const Timeline& t = shot_.timeline;
+  const LevelSetBounds bounds =
+      bounds_in_own_space(shot_, entry.obstacle, t.first - shot_.preroll * t.fps, t.last);
+  try {
+    return make_level_set_(mesh, voxel * a, band * a, bounds);
+  } catch (const Error& error) {
+    const std::string guess = guess_of_unit(shot_.domain, entry.low, entry.high);
+    throw Error(fmt::format("{}: {} \"{}\": {}{}", shot_.file.string(),
+                            role_ == Solids::sinks ? "sink" : "obstacle", entry.obstacle.name,
+                            error.what(), guess.empty() ? "" : ": " + guess));
   }
-  return make_level_set_(mesh, voxel * a, band * a);
 }
 
 const ObstacleSet::Bracket& ObstacleSet::bracket_at(Entry& entry, double frame) {
@@ -157,7 +160,7 @@ double ObstacleSet::travel(Entry& entry, double begin, double end) {
     const Bracket& bracket = bracket_at(entry, begin);
     farthest = bracket.travel * (end - begin) / (bracket.end - bracket.begin);
   }
-  if (!moves(entry.obstacle)) return farthest;
+  if (!has_keys(entry.obstacle)) return farthest;
   return farthest + corner_travel(entry.obstacle, entry.low, entry.high, begin, end);
 }
 
@@ -173,7 +176,7 @@ double ObstacleSet::stop(double time, double end) {
 double ObstacleSet::limit(double time, double dt) {
   const double most = 0.4 * shot_.fluid.spacing;
   for (Entry& entry : obstacle_) {
-    if (!entry.deforms && !moves(entry.obstacle)) continue;
+    if (!entry.deforms && !has_keys(entry.obstacle)) continue;
     const double begin = film_frame(time);
     for (int tries = 0; tries < 40; ++tries) {  // a shorter step may have another mean speed
       const double moved = travel(entry, begin, film_frame(time + dt));
@@ -187,7 +190,7 @@ double ObstacleSet::limit(double time, double dt) {
 double ObstacleSet::fastest() const {
   double speed = 0;
   for (const Entry& entry : obstacle_) {
-    if (!moves(entry.obstacle)) continue;
+    if (!has_keys(entry.obstacle)) continue;
     constexpr double part = 0.25;  // frames
     for (double f = shot_.timeline.first; f < shot_.timeline.last; f += part) {
       const double moved = corner_travel(entry.obstacle, entry.low, entry.high, f, f + part);
@@ -270,25 +273,60 @@ V3d ObstacleSet::extent(const Entry& entry, const ObstaclePlacement& placement) 
   return size;
 }
 
-double ObstacleSet::distance(const V3d& point, double time) {
+double ObstacleSet::distance_to(int obstacle, const V3d& point, double time) {
   const double frame = film_frame(time);
   const V3d place = images_.wrapped(point - origin_) + origin_;
+  Entry& entry = obstacle_[size_t(obstacle)];
+  if (entry.obstacle.type == ObstacleType::mesh) bracket_at(entry, frame);
+  const ObstaclePlacement given = placement(entry, frame, frame);
   double least = far_off;
-  for (Entry& entry : obstacle_) {
-    if (entry.obstacle.type == ObstacleType::mesh) bracket_at(entry, frame);
-    const ObstaclePlacement given = placement(entry, frame, frame);
-    for (const auto& [placement, shift] : images_.of(given, extent(entry, given))) {
-      cpu::ObstacleView view{placement, {}};
-      if (entry.bracket) {
-        view.field[0] = host_view(entry.bracket->set[0]);
-        view.field[1] = host_view(entry.bracket->set[entry.deforms ? 1 : 0]);
-      }
-      const V3d own = obstacle_pose(entry.obstacle, frame).to_own(place - shift);
-      least = std::min(
-          least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
+  for (const auto& [placement, shift] : images_.of(given, extent(entry, given))) {
+    cpu::ObstacleView view{placement, {}};
+    if (entry.bracket) {
+      view.field[0] = host_view(entry.bracket->set[0]);
+      view.field[1] = host_view(entry.bracket->set[entry.deforms ? 1 : 0]);
     }
+    const V3d own = obstacle_pose(entry.obstacle, frame).to_own(place - shift);
+    least = std::min(
+        least, double(view.distance({float(own.x), float(own.y), float(own.z)}, view.blend[1])));
   }
   return least;
+}
+
+ObstacleSet::Nearest ObstacleSet::nearest(const V3d& point, double time) {
+  Nearest nearest;
+  for (int k = 0; k < count(); ++k) {
+    const double distance = distance_to(k, point, time);
+    if (distance < nearest.distance) nearest = {distance, k};
+  }
+  return nearest;
+}
+
+bool ObstacleSet::moves(int obstacle) const {
+  const Entry& entry = obstacle_[size_t(obstacle)];
+  return entry.deforms || has_keys(entry.obstacle);
+}
+
+bool ObstacleSet::any_moves() const {
+  for (int k = 0; k < count(); ++k)
+    if (moves(k)) return true;
+  return false;
+}
+
+size_t ObstacleSet::triangles() const {
+  size_t sum = 0;
+  for (const Entry& entry : obstacle_) sum += entry.before.triangle.size();
+  return sum;
+}
+
+size_t ObstacleSet::level_set_bytes() const {
+  size_t sum = 0;
+  for (const Entry& entry : obstacle_) {
+    if (!entry.bracket) continue;
+    for (const LevelSet& set : entry.bracket->set)
+      sum += set.block.size() * sizeof(int) + set.value.size() * sizeof(float);
+  }
+  return sum;
 }
 
 ObstacleSet sinks_of(const Shot& shot, const LocalFrame& frame, LevelSetMaker make_level_set) {

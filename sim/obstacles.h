@@ -40,8 +40,25 @@ class ObstacleSet {
   /// The longest step from `time` on in which no surface moves farther than 0.4 spacings, at most
   /// dt, s.
   double limit(double time, double dt);
-  /// Signed distance of the nearest obstacle at `time`, m; 1e30 where none is near. World.
-  double distance(const V3d& point, double time);
+  /// The nearest obstacle at `time` and the signed distance to it, m; 1e30 and -1 where none is
+  /// near. World.
+  struct Nearest {
+    double distance = 1e30;
+    int obstacle = -1;
+  };
+  Nearest nearest(const V3d& point, double time);
+  double distance(const V3d& point, double time) { return nearest(point, time).distance; }
+  double distance_to(int obstacle, const V3d& point, double time);
+  /// Whether an obstacle moves by keys or deforms, and whether any does.
+  bool moves(int obstacle) const;
+  bool any_moves() const;
+  const Obstacle& obstacle(int k) const { return obstacle_[size_t(k)].obstacle; }
+  /// Bounds of an obstacle in its own coordinates, m; of a sequence as of the first frame.
+  const V3d& low(int k) const { return obstacle_[size_t(k)].low; }
+  const V3d& high(int k) const { return obstacle_[size_t(k)].high; }
+  /// Of meshes: triangles, and the bytes of the level sets that have been made.
+  size_t triangles() const;
+  size_t level_set_bytes() const;
   /// The largest speed of a surface by its keys, m/s: what a shot is to be ready for.
   double fastest() const;
 

@@ -4,6 +4,13 @@
 
 namespace drench::sim {
 
+void set_gravity(Parameters& p, const float (&gravity)[3]) {
+  for (int k = 0; k < 3; ++k) {
+    const bool held = p.full && p.wall[k];
+    p.gravity[k] = held ? 0 : gravity[k], p.held[k] = held ? gravity[k] : 0;
+  }
+}
+
 StepLimit stable_step(const Parameters& p, const Limits& limits) {
   StepLimit ruling{1e30, "none"};
   const auto consider = [&](double dt, const char* name) {
@@ -12,7 +19,7 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
   const double h = p.support_radius, a = p.spacing;
   const double viscosity = double(p.dynamic_viscosity) / p.rest_density;
   if (sheets_are_implicit(p)) {
-    const double g = std::hypot(p.gravity[0], p.gravity[1], p.gravity[2]);
+    const double g = std::hypot(p.gravity[0], p.gravity[1], p.gravity[2]) + p.carried;
     // What has not moved yet may be about to: the sound speed is ten times what is expected.
     const double speed = limits.max_speed > 0 ? limits.max_speed : 0.1 * p.sound_speed;
     if (speed > 0) consider(0.4 * a / speed, "speed");

@@ -31,6 +31,8 @@ struct Parameters {
   float surface_tension = 0;          // N/m
   float wetting = 0;                  // cosine of the contact angle at the domain's walls
   bool wets = false;                  // at anything at another angle than a right one
+  bool turns = false;                 // the domain does, as FrameNow says
+  float carried = 0;                  // m/s^2, bound of the centrifugal acceleration in it
   // domain, in the local frame
   double origin[3] = {0, 0, 0};  // m, local = world - origin
   float low[3], high[3];         // m, local
@@ -48,6 +50,9 @@ struct Parameters {
   // time
   double fixed_dt = 0;  // s, 0 is adaptive
 };
+
+/// Sets the gravity of a step, m/s^2: what the walls of a full box hold is pressure alone.
+void set_gravity(Parameters& parameters, const float (&gravity)[3]);
 
 /// dt nu / h^2, which rules how viscosity is stepped. The largest eigenvalue of the viscous matrix
 /// is about 50 times as large: up to 0.01 an explicit step is stable with room for clumps.

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/probe_check.h"
 
 namespace drench::sim {
@@ -31,6 +32,10 @@ std::vector<std::string> columns_of(ProbeType type) {
     case ProbeType::volume:
       return {"particles [1]",        "volume [m^3]",         "centre of mass x [m]",
               "centre of mass y [m]", "centre of mass z [m]", "mean density error [1]"};
+    case ProbeType::velocity:
+      return {"velocity x [m/s]", "velocity y [m/s]", "velocity z [m/s]"};
+    case ProbeType::front:
+      return {"front [m]"};
   }
   return {};
 }
@@ -44,7 +49,8 @@ ProbeKind kind_of(const Probe& probe, const Shot& shot) {
     case ProbeType::height:
       return ProbeKind::height;
     case ProbeType::pressure:
-      return wall_under(probe, shot) ? ProbeKind::wall_pressure : ProbeKind::inner_pressure;
+      return probe.on.empty() && wall_under(probe, shot) ? ProbeKind::wall_pressure
+                                                         : ProbeKind::inner_pressure;
     case ProbeType::force:
       if (wall_named(probe.target)) return ProbeKind::wall_force;
       return obstacle_named(shot, probe.target) ? ProbeKind::obstacle_force
@@ -55,6 +61,10 @@ ProbeKind kind_of(const Probe& probe, const Shot& shot) {
       return ProbeKind::energy;
     case ProbeType::volume:
       return ProbeKind::volume;
+    case ProbeType::velocity:
+      return ProbeKind::velocity;
+    case ProbeType::front:
+      return ProbeKind::front;
   }
   return ProbeKind::volume;
 }
@@ -65,21 +75,53 @@ size_t sheet_named(const Scene& scene, const std::string& name) {
   return s;
 }
 
-int tip_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
-  const int count = int(sheet.rest.size());
+/// m, of the triangles around a vertex at rest.
+double longest_edge_at(const Sheet& sheet, int vertex) {
+  double longest = 0;
+  for (const auto& t : sheet.triangle) {
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t a = t[c], b = t[(c + 1) % 3];
+      if (int(a) == vertex || int(b) == vertex)
+        longest = std::max(longest, (sheet.rest[a] - sheet.rest[b]).length());
+    }
+  }
+  return longest;
+}
+
+/// Number `vertex` of the sheet's file or grid.
+int named_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
+  const bool from_file = !sheet.of_file.empty();
+  const int count = int(from_file ? sheet.of_file.size() : sheet.rest.size());
   if (probe.vertex >= count) {
     throw Error(fmt::format(
         "{}: probe \"{}\" names vertex {}, but sheet \"{}\" has vertices 0 to {}. Use one of "
         "these, or position",
         shot.file.string(), probe.name, probe.vertex, sheet.name, count - 1));
   }
-  if (probe.vertex >= 0) return probe.vertex;
+  const int vertex = from_file ? sheet.of_file[size_t(probe.vertex)] : probe.vertex;
+  if (vertex >= 0) return vertex;
+  throw Error(fmt::format(
+      "{}: probe \"{}\" names vertex {} of sheet \"{}\", which belongs to no triangle. Use "
+      "another, or position",
+      shot.file.string(), probe.name, probe.vertex, sheet.name));
+}
+
+int tip_vertex(const Probe& probe, const Shot& shot, const Sheet& sheet) {
+  if (probe.vertex >= 0) return named_vertex(probe, shot, sheet);
   int best = 0;
   const auto far = [&](int v) { return (sheet.rest[size_t(v)] - probe.position).length2(); };
-  for (int v = 1; v < count; ++v) {
+  for (int v = 1; v < int(sheet.rest.size()); ++v) {
     if (far(v) < far(best)) best = v;
   }
-  return best;
+  const double off = std::sqrt(far(best)), reach = longest_edge_at(sheet, best);
+  if (off <= reach) return best;
+  const V3d& p = sheet.rest[size_t(best)];
+  throw Error(fmt::format(
+      "{}: probe \"{}\" at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m off sheet \"{}\": the nearest "
+      "vertex, at ({:.6g}, {:.6g}, {:.6g}) m, has no edge longer than {:.3g} m. Move it onto the "
+      "sheet, or name the vertex",
+      shot.file.string(), probe.name, probe.position.x, probe.position.y, probe.position.z, off,
+      sheet.name, p.x, p.y, p.z, reach));
 }
 
 /// The integral of a sensor's weight (SoftDisc) over what of it lies between the walls: m^2 on a
@@ -123,16 +165,23 @@ void put(float (&to)[3], const V3d& from) {
 }  // namespace
 
 ProbeSeries::ProbeSeries(const Shot& shot, const Scene& scene)
-    : shot_(shot.name), frame_(scene.frame), spacing_(shot.fluid.spacing) {
+    : shot_(shot.name),
+      frame_(scene.frame),
+      timeline_(shot.timeline),
+      spacing_(shot.fluid.spacing) {
+  for (int k = 0; k < 3; ++k) {
+    low_[k] = scene.parameters.low[k];
+    period_[k] = scene.parameters.periodic[k] ? scene.parameters.high[k] - low_[k] : 0;
+  }
   for (const Probe& probe : shot.probe) add(probe, shot, scene);
 }
 
 void ProbeSeries::add(const Probe& probe, const Shot& shot, const Scene& scene) {
-  Series series{probe, {}, V3d(0), columns_of(probe.type), width_, averaged_of(probe.type)};
+  Series series{probe, {}, V3d(0), columns_of(probe.type), width_, averaged_of(probe.type), {}};
+  if (!probe.on.empty()) series.carrier = shot.obstacle[size_t(*obstacle_named(shot, probe.on))];
   series.query.kind = kind_of(probe, shot);
   aim(series, shot, scene);
   width_ += series.columns.size();
-  queries_.push_back(series.query);
   series_.push_back(std::move(series));
 }
 
@@ -142,7 +191,7 @@ void ProbeSeries::aim(Series& series, const Shot& shot, const Scene& scene) cons
   V3d place = probe.position;
   if (q.kind == ProbeKind::energy) {
     for (int k = 0; k < 3; ++k)
-      place[k] = shot.gravity[k] > 0 ? shot.domain.max[k] : shot.domain.min[k];
+      place[k] = shot.gravity.keys.front().second[k] > 0 ? shot.domain.max[k] : shot.domain.min[k];
   }
   for (int k = 0; k < 3; ++k) q.place[k] = float(place[k] - frame_.origin[k]);
   if (q.kind == ProbeKind::wall_pressure || q.kind == ProbeKind::wall_force) {
@@ -155,7 +204,10 @@ void ProbeSeries::aim(Series& series, const Shot& shot, const Scene& scene) cons
     q.rim = scene.parameters.spacing;
     q.radius = std::max(float(probe.radius), q.rim);
     q.extent = float(extent_of(q, scene.parameters));
+    if (series.carrier) q.on = *obstacle_named(shot, probe.on);
   }
+  if (q.kind == ProbeKind::velocity) q.radius = float(std::max(probe.radius, spacing_));
+  if (q.kind == ProbeKind::front) put(q.normal, probe.direction.normalized());
   if (q.kind == ProbeKind::cloth_force) {
     const size_t s = sheet_named(scene, probe.target);
     q.begin = scene.first_vertex[s], q.end = scene.first_vertex[s + 1];
@@ -189,8 +241,13 @@ std::vector<double> ProbeSeries::values_of(const Series& series,
       for (int k = 0; k < 3; ++k) values.push_back(answer[size_t(k) + 1] + frame_.origin[k]);
       values.push_back(answer[4]);
       break;
+    case ProbeType::front:
+      for (int k = 0; k < 3; ++k)
+        values[0] += frame_.origin[k] * series.probe.direction.normalized()[k];
+      break;
     case ProbeType::pressure:
     case ProbeType::force:
+    case ProbeType::velocity:
       break;
   }
   return values;
@@ -200,7 +257,7 @@ void ProbeSeries::start(double time, Solver& solver) {
   if (series_.empty()) return;
   std::vector<ProbeQuery> known;
   for (const Series& s : series_) {
-    if (s.averaged == 0) known.push_back(s.query);
+    if (s.averaged == 0) known.push_back(query_at(s, time));
   }
   const std::vector<std::vector<double>> answers = solver.probe(known);
   rows_.push_back(time);
@@ -214,17 +271,44 @@ void ProbeSeries::start(double time, Solver& solver) {
 
 void ProbeSeries::record(double time, Solver& solver) {
   if (series_.empty()) return;
-  const std::vector<std::vector<double>> answers = solver.probe(queries_);
+  const double before = rows_[rows_.size() - width_];
+  const auto asked = [&](const Series& s) { return s.averaged > 0 || due(s, before, time); };
+  std::vector<ProbeQuery> queries;
+  for (const Series& s : series_)
+    if (asked(s)) queries.push_back(query_at(s, time));
+  const std::vector<std::vector<double>> answers = solver.probe(queries);
   const size_t row = rows_.size();
   rows_.resize(row + width_, unknown);
   rows_[row] = time;
-  for (size_t k = 0; k < series_.size(); ++k) {
-    const Series& s = series_[k];
-    const std::vector<double> values = values_of(s, answers[k]);
+  size_t next = 0;
+  for (const Series& s : series_) {
+    if (!asked(s)) continue;
+    const std::vector<double> values = values_of(s, answers[next++]);
     std::copy(values.begin(), values.end(), rows_.begin() + ptrdiff_t(row + s.first));
     for (size_t c = 0; c < s.averaged; ++c)
       rows_[row + s.first + s.averaged + c] = mean(s.first + c, s.probe.window);
   }
+}
+
+bool ProbeSeries::due(const Series& series, double before, double time) {
+  const double interval = series.probe.interval;
+  // Of a thousandth of an interval: steps end at its multiples but for rounding.
+  const auto count = [&](double t) { return std::floor(t / interval + 1e-3); };
+  return interval == 0 || count(time) > count(before);
+}
+
+ProbeQuery ProbeSeries::query_at(const Series& series, double time) const {
+  ProbeQuery q = series.query;
+  if (!series.carrier) return q;
+  const Pose pose = obstacle_pose(*series.carrier, timeline_.first + time * timeline_.fps);
+  const V3d place = pose.to_world(series.probe.position);
+  for (int k = 0; k < 3; ++k) {
+    double x = place[k] - frame_.origin[k];
+    if (period_[k] > 0) x -= period_[k] * std::floor((x - low_[k]) / period_[k]);
+    q.place[k] = float(x);
+  }
+  put(q.normal, (pose.to_world(series.probe.normal) - pose.position).normalized());
+  return q;
 }
 
 /// Mean of a column over the `window` before the last row; a value holds over its whole step, since
@@ -253,6 +337,8 @@ std::string ProbeSeries::definition(const Series& series) const {
   const auto vector = [](const V3d& v) {
     return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x, v.y, v.z);
   };
+  const std::string on =
+      p.on.empty() ? "" : fmt::format(" of the obstacle \"{}\"'s own coordinates", p.on);
   const auto window = [&] {
     return fmt::format(
         "; the value of a row holds over the step that ends there; mean: over the {:.9g} s before "
@@ -262,19 +348,21 @@ std::string ProbeSeries::definition(const Series& series) const {
   switch (q.kind) {
     case ProbeKind::height:
       return fmt::format(
-          "y of the topmost place on the vertical line at x = {:.9g} m, z = {:.9g} m where the "
-          "density reaches half of rest density; empty where none does",
-          p.position.x, p.position.z);
+          "y of the topmost place on the vertical line {} where the density reaches half of rest "
+          "density; empty where none does",
+          p.on.empty() ? fmt::format("at x = {:.9g} m, z = {:.9g} m", p.position.x, p.position.z)
+                       : fmt::format("through {} m{}", vector(p.position), on));
     case ProbeKind::wall_pressure:
     case ProbeKind::inner_pressure:
       return fmt::format(
-          "{} a disc of radius {:.9g} m about {} m, normal {}, its weight falling from 1 to 0 "
+          "{} a disc of radius {:.9g} m about {} m{}, normal {}, its weight falling from 1 to 0 "
           "within a spacing of {:.9g} m about the rim{}",
-          q.kind == ProbeKind::wall_pressure
-              ? "force of the fluid on the wall over area, for"
-              : "stress along the normal, fluid-free parts counting as 0, in",
-          std::max(p.radius, spacing_), vector(p.position), vector(p.normal.normalized()), spacing_,
-          window());
+          q.kind == ProbeKind::wall_pressure ? "force of the fluid on the wall over area, for"
+                                             : "force on the obstacle or sheet that it lies on "
+                                               "over area, or else stress along the "
+                                               "normal, fluid-free parts counting as 0, in",
+          std::max(p.radius, spacing_), vector(p.position), on, vector(p.normal.normalized()),
+          spacing_, window());
     case ProbeKind::wall_force:
       return fmt::format("force of the fluid on the domain wall {}{}", p.target, window());
     case ProbeKind::cloth_force:
@@ -292,6 +380,14 @@ std::string ProbeSeries::definition(const Series& series) const {
           "potential energy is 0 at {} m",
           vector(V3d(frame_.to_world(0, q.place[0]), frame_.to_world(1, q.place[1]),
                      frame_.to_world(2, q.place[2]))));
+    case ProbeKind::velocity:
+      return fmt::format(
+          "mean velocity of the fluid in a ball of radius {:.9g} m about {} m{}; "
+          "empty where there is none",
+          std::max(p.radius, spacing_), vector(p.position), on);
+    case ProbeKind::front:
+      return fmt::format("place along {} of the farthest fluid: half a spacing beyond a particle",
+                         vector(p.direction.normalized()));
     case ProbeKind::volume:
       return "particles, their volume at rest density, centre of mass, mean of max(density / rest "
              "density - 1, 0)";
@@ -306,11 +402,14 @@ std::vector<ProbeText> ProbeSeries::texts() const {
     const auto to = fmt::appender(out);
     fmt::format_to(to, "# drench probe \"{}\" of shot \"{}\"\n# {}\n", s.probe.name, shot_,
                    definition(s));
-    fmt::format_to(to,
-                   "# time since the first frame; the first row is the state at the start, every "
-                   "other one the end of a step\ntime [s],{}\n",
-                   fmt::join(s.columns, ","));
+    fmt::format_to(
+        to,
+        "# time since the first frame; the first row is the state at the start, every "
+        "other one the end of a step{}\ntime [s],{}\n",
+        s.probe.interval > 0 ? fmt::format(", the first in every {:.9g} s", s.probe.interval) : "",
+        fmt::join(s.columns, ","));
     for (size_t row = 0; row < rows_.size(); row += width_) {
+      if (row > 0 && !due(s, rows_[row - width_], rows_[row])) continue;
       fmt::format_to(to, "{:.12g}", rows_[row]);
       for (size_t c = s.first; c < s.first + s.columns.size(); ++c) {
         const double value = rows_[row + c];

@@ -26,6 +26,12 @@ float Scene::place(int axis, double world) const {
   return cpu::wrap(local, parameters.low[axis], parameters.high[axis]);
 }
 
+void Scene::set_drive(double time) {
+  const V3d g = motion.gravity(time);
+  set_gravity(parameters, {float(g.x), float(g.y), float(g.z)});
+  parameters.carried = float(motion.carried(time));
+}
+
 namespace {
 
 LocalFrame local_frame(const Shot& shot) {
@@ -74,10 +80,13 @@ double fastest(const Animated<V3d>& track, const Timeline& time) {
 /// 10 sqrt(g H): about 1 % compression under the weight of the whole fall; impacts of speed v at
 /// start count as the height v^2/2g they would have fallen.
 double automatic_sound_speed(const Shot& shot, const InitialFluid& fluid,
-                             const std::vector<MeshEmitter>& emitters, double obstacle_speed) {
-  const double g = shot.gravity.length();
+                             const std::vector<MeshEmitter>& emitters, const FrameMotion& motion,
+                             double obstacle_speed) {
+  const V3d first = shot.gravity.keys.front().second;
+  const double g = motion.moves() ? motion.largest_acceleration() : first.length();
   double speed2 = obstacle_speed * obstacle_speed, top = -1e300, bottom = 1e300;
-  const V3d down = g > 0 ? shot.gravity / g : V3d(0, -1, 0);
+  if (motion.moves()) speed2 = std::max(speed2, std::pow(motion.largest_speed(), 2));
+  const V3d down = first.length() > 0 ? first / first.length() : V3d(0, -1, 0);
   const auto see = [&](const V3d& p, double speed) {
     speed2 = std::max(speed2, speed * speed);
     top = std::max(top, -p.dot(down)), bottom = std::min(bottom, -p.dot(down));
@@ -148,8 +157,8 @@ void set_wetting(const Shot& shot, Parameters& p) {
 }
 
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
-                            const std::vector<MeshEmitter>& emitters,
-                            const ObstacleSet& obstacles) {
+                            const std::vector<MeshEmitter>& emitters, const ObstacleSet& obstacles,
+                            const FrameMotion& motion) {
   Parameters p;
   const double a = shot.fluid.spacing, h = a * support_ratio(shot);
   p.fluid = shot.fluid.present();
@@ -163,8 +172,9 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   : poly6          ? calibrate<cpu::Poly6>(a, h, p)
                    : calibrate<cpu::Spiky>(a, h, p);
   const bool chosen = shot.fluid.sound_speed > 0 && !is_incompressible(shot);
-  p.sound_speed = float(chosen ? shot.fluid.sound_speed
-                               : automatic_sound_speed(shot, fluid, emitters, obstacles.fastest()));
+  p.sound_speed =
+      float(chosen ? shot.fluid.sound_speed
+                   : automatic_sound_speed(shot, fluid, emitters, motion, obstacles.fastest()));
   p.obstacles = obstacles.count(), p.sinks = int(shot.sink.size());
   // Monaghan's alpha as the viscosity it amounts to in three dimensions, nu = alpha c h / 10, h his
   // smoothing length, half the support radius.
@@ -174,7 +184,6 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.dynamic_viscosity = float(shot.fluid.rest_density * viscosity);
   p.wall_viscosity = float(shot.fluid.rest_density * shot.fluid.kinematic_viscosity);
   for (int k = 0; k < 3; ++k) {
-    p.gravity[k] = float(shot.gravity[k]);
     p.origin[k] = frame.origin[k];
     p.low[k] = float(shot.domain.min[k] - frame.origin[k]);
     p.high[k] = float(shot.domain.max[k] - frame.origin[k]);
@@ -182,11 +191,11 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
   p.full = p.incompressible && fills_domain(shot, fluid);
-  // There gravity is the gradient of a pressure that no velocity feels. Left to the solve, whose
-  // rows differ from packing to packing, it stirred a sealed tank of water to 1 m/s.
-  for (int k = 0; k < 3 && p.full; ++k) {
-    if (p.wall[k]) std::swap(p.gravity[k], p.held[k]);
-  }
+  // In a full box gravity is the gradient of a pressure that no velocity feels. Left to the solve,
+  // whose rows differ from packing to packing, it stirred a sealed tank of water to 1 m/s.
+  const V3d g = motion.moves() ? motion.gravity(-shot.preroll) : shot.gravity.keys.front().second;
+  set_gravity(p, {float(g.x), float(g.y), float(g.z)});
+  p.turns = motion.turns();
   if (p.incompressible) set_viscosity(shot, p);
   if (shot.wind.present) {
     p.air_density = float(shot.wind.air_density);
@@ -468,10 +477,53 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
   }
 }
 
+bool is_outside(const Domain& domain, const V3d& p) {
+  for (int k = 0; k < 3; ++k) {
+    const bool open = domain.axis[size_t(k)] == Axis::open;
+    if (open && (p[k] < domain.min[k] || p[k] > domain.max[k])) return true;
+  }
+  return false;
+}
+
+/// The first state of the fluid: what its sources have, less what starts in obstacles.
+void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
+  HostState& start = scene.start;
+  scene.report.source = fluid.report;
+  std::vector<std::vector<size_t>> lost(fluid.report.size(),
+                                        std::vector<size_t>(shot.obstacle.size(), 0));
+  for (size_t i = 0; i < fluid.position.size(); ++i) {
+    const V3d p = fluid.position[i], u = fluid.velocity[i];
+    const auto source = size_t(fluid.source[i]);
+    const int obstacle = obstacle_in_the_way(scene.obstacles, p, -shot.preroll, shot.fluid.spacing);
+    if (obstacle >= 0) {
+      ++scene.inside_obstacles, ++lost[source][size_t(obstacle)];
+      continue;
+    }
+    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
+    start.velocity.push(float(u.x), float(u.y), float(u.z));
+    scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
+    start.id.push_back(int(start.id.size()));
+    ++(is_outside(shot.domain, p) ? scene.report.source[source].outside
+                                  : scene.report.source[source].kept);
+  }
+  for (size_t s = 0; s < lost.size(); ++s) {
+    for (size_t k = 0; k < lost[s].size(); ++k) {
+      if (lost[s][k] > 0)
+        scene.report.source[s].lost.push_back({shot.obstacle[k].name, lost[s][k]});
+    }
+  }
+  check_sources_start(shot, scene.report);
+  start.memory_triangle.assign(start.id.size(), -1);
+  start.memory_side.assign(start.id.size(), 1);
+  start.owed.resize(start.id.size());
+}
+
 }  // namespace
 
-bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
-  return obstacles.count() == 0 || obstacles.distance(point, time) > 0.499 * spacing;
+int obstacle_in_the_way(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
+  if (obstacles.count() == 0) return -1;
+  const ObstacleSet::Nearest nearest = obstacles.nearest(point, time);
+  return nearest.distance > 0.499 * spacing ? -1 : nearest.obstacle;
 }
 
 Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
@@ -488,24 +540,12 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   if (shot.wind.present) scene.wind = Wind(shot, scene.frame);
   scene.sinks = sinks_of(shot, scene.frame, make_level_set);
   scene.mesh_emitter = mesh_emitters(shot, make_level_set);
+  scene.motion = FrameMotion(shot, scene.frame);
   scene.parameters =
-      build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles);
+      build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles, scene.motion);
   scene.obstacles.set_images(ObstacleImages(scene.parameters));
-  HostState& start = scene.start;
-  for (size_t i = 0; i < fluid.position.size(); ++i) {
-    const V3d p = fluid.position[i], u = fluid.velocity[i];
-    if (!clear_of_obstacles(scene.obstacles, p, -shot.preroll, shot.fluid.spacing)) {
-      ++scene.inside_obstacles;
-      continue;
-    }
-    start.position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
-    start.velocity.push(float(u.x), float(u.y), float(u.z));
-    scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
-    start.id.push_back(int(start.id.size()));
-  }
-  start.memory_triangle.assign(start.id.size(), -1);
-  start.memory_side.assign(start.id.size(), 1);
-  start.owed.resize(start.id.size());
+  note_meshes(shot, scene);
+  place_fluid(shot, fluid, scene);
   double dt_limit = 1e30;
   for (size_t s = 0; s < shot.cloth.size(); ++s) {
     scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
@@ -526,6 +566,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
   check_overlap(shot, scene);
   check_cloth_outside(shot, scene);
+  complete_report(shot, scene);
   return scene;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // From a shot to the initial state: parameters, particles, sheets.
 
+#include <algorithm>
 #include <array>
 #include <random>
 #include <string>
@@ -9,8 +10,10 @@
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot.h"
 #include "sim/births.h"
+#include "sim/frame_motion.h"
 #include "sim/mesh_emitter.h"
 #include "sim/obstacles.h"
+#include "sim/scene_report.h"
 #include "sim/solver.h"
 #include "sim/wind.h"
 
@@ -35,13 +38,16 @@ struct Seams {
 Seams seams_of(const Shot& shot);
 
 /// One sheet as its builder leaves it, world coordinates. Vertices are those that are drawn; the
-/// mass points of the simulation are the nodes: the same, but that a sheet which spans a periodic
-/// axis has one line of nodes for its two edges there.
+/// mass points of the simulation are the nodes: the same, but that vertices which are split at a
+/// seam of the texture share one, and that a sheet which spans a periodic axis has one line of
+/// nodes for its two edges there.
 struct Sheet {
   std::string name;
   std::vector<V3d> position, rest;
   std::vector<Imath::V2f> uv;
   std::vector<Imath::Vec3<uint32_t>> triangle;
+  std::vector<uint32_t> welded;   // of a vertex: the first one at its point of the sheet
+  std::vector<int> of_file;       // of a vertex of its mesh file: the vertex here, -1: left out
   std::vector<int> node;          // of a vertex
   std::vector<Imath::V3i> image;  // periods from its node to a vertex
   std::vector<uint32_t> point;    // of a node: the vertex that stands where it does
@@ -55,19 +61,31 @@ struct Sheet {
   };
   std::vector<Spring> spring;
 
-  bool joined() const { return point.size() < position.size(); }
+  /// Whether it is joined to itself across a periodic axis.
+  bool joined() const {
+    return std::any_of(image.begin(), image.end(),
+                       [](const Imath::V3i& i) { return i != Imath::V3i(0); });
+  }
+  /// Whether several vertices of its mesh file are one point of it.
+  bool is_sewn() const {
+    for (uint32_t v = 0; v < welded.size(); ++v)
+      if (welded[v] != v) return true;
+    return false;
+  }
   V3d along(const Spring& s) const {  // m, from a to b
     return position[point[size_t(s.b)]] + V3d(s.image) * period - position[point[size_t(s.a)]];
   }
 };
 
-/// Finds the nodes of a sheet of vertices and triangles: vertices on free edges that are images of
-/// one another across a seam share one. @throws Error if edges nearly meet at a seam, or meet with
-/// fewer than three cells around.
+/// Finds the nodes of a sheet of vertices and triangles: vertices that are welded share one, and so
+/// do vertices on free edges that are images of one another across a seam. @throws Error if edges
+/// nearly meet at a seam, or meet with fewer than three cells around.
 void join_at_seams(Sheet& sheet, const Seams& seams);
 
-/// Grid or mesh file, checked. @throws Error for a degenerate or non-manifold triangle, an unused
-/// vertex, a pin that holds nothing, or as join_at_seams.
+/// Grid or mesh file, checked. Vertices of a file that no triangle uses are left out with a
+/// warning, and those on free edges within cloth.weld are joined, with another.
+/// @throws Error for a degenerate or non-manifold triangle, a pin that holds nothing, or as
+///         join_at_seams.
 Sheet build_sheet(const Cloth& cloth, const Seams& seams = {});
 
 /// What leaves a disc or rectangle at once, again and again. A layer holds the volume that passes
@@ -98,8 +116,9 @@ std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const 
 /// from it, so that nothing is filled twice.
 struct InitialFluid {
   std::vector<V3d> position, velocity;
-  std::vector<int> source;  // as in Birth
-  size_t overlapping = 0;   // particles that later sources lost
+  std::vector<int> source;           // as in Birth
+  size_t overlapping = 0;            // particles that later sources lost
+  std::vector<SourceReport> report;  // of each source; what obstacles take is not known yet
 };
 /// @param make_level_set  needed for volumes. @throws Error as fill_volume, or if a source loses
 /// all.
@@ -115,21 +134,30 @@ struct Scene {
   ObstacleSet obstacles, sinks;
   std::vector<MeshEmitter> mesh_emitter;
   Wind wind;
+  FrameMotion motion;
   HostState start;
   Births births;                                 // of the start
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out
+  SceneReport report;
 
+  /// Gravity and what is carried at a time, s, for stable_step.
+  void set_drive(double time);
   /// One coordinate of a particle, m local, inside the domain where an axis is periodic.
   float place(int axis, double world) const;
 };
 
-/// Whether fluid may start at a point: not within an obstacle or nearer to one than half a spacing,
-/// which is what a lattice has to a wall.
-bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
+/// The obstacle because of which no fluid may start at a point: within it or nearer to it than half
+/// a spacing, which is what a lattice has to a wall; -1: none.
+int obstacle_in_the_way(ObstacleSet& obstacles, const V3d& point, double time, double spacing);
+inline bool clear_of_obstacles(ObstacleSet& obstacles, const V3d& point, double time,
+                               double spacing) {
+  return obstacle_in_the_way(obstacles, point, time, spacing) < 0;
+}
 
 /// @param make_level_set  see ObstacleSet.
-/// @throws Error as build_sheet, ObstacleSet and MeshEmitter, if nothing is to be simulated, or if
-/// fluid starts inside cloth.
+/// @throws Error as build_sheet, ObstacleSet and MeshEmitter, if nothing is to be simulated, if
+/// fluid starts inside cloth, if all of a source is lost, or if an emitter can never send a
+/// particle.
 Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set = {});
 
 }  // namespace drench::sim

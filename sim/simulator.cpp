@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot_file.h"
+#include "sim/blow_up.h"
 #include "sim/checkpoint.h"
 #include "sim/probe_series.h"
+#include "sim/room.h"
 #include "sim/scene.h"
 
 namespace drench {
@@ -61,6 +64,8 @@ struct Simulator::Implementation {
   int reported_id = 0;             // next_id of the last report
   sim::ProbeSeries probes;
   sim::Limits limits;
+  std::optional<double> room;   // sim::room_of, once it is asked for
+  std::vector<bool> told_full;  // emitters whose warning was given
   std::filesystem::path last_checkpoint;
 
   Implementation(const Shot& shot_, const SimulatorOptions& options_)
@@ -72,6 +77,7 @@ struct Simulator::Implementation {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0);
+    told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
     layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 5").finish();
@@ -93,6 +99,7 @@ struct Simulator::Implementation {
                                   "half a spacing of them and were left out",
                                   scene.inside_obstacles));
     }
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
     probes.start(time, *solver);
   }
 
@@ -100,6 +107,7 @@ struct Simulator::Implementation {
 
   /// Layers due by `until`, each moved on from the moment it left; the next step knows their speed.
   void emit(double until) {
+    const std::vector<bool> crowded = crowded_inlets(until);
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& source = shot.fluid.emitter[e];
       if (source.type == EmitterType::mesh) continue;
@@ -108,6 +116,8 @@ struct Simulator::Implementation {
             source.start - shot.preroll + (double(emitted[e]) + 0.5) * layer[e].interval;
         if (leaves > until || leaves > source.stop - shot.preroll) break;
         check_room(e, layer[e].place.size(), until);
+        if (that_fit(e, layer[e].place.size(), until) < layer[e].place.size()) continue;
+        if (crowded[e]) continue;
         const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
         sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
         limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
@@ -133,6 +143,52 @@ struct Simulator::Implementation {
         shot.file.string(), emitter + 1, max_particles, now));
   }
 
+  /// Once an emitter.
+  void warn_full(size_t emitter, double now, const std::string& what) {
+    if (told_full[emitter]) return;
+    told_full[emitter] = true;
+    log_warning("sim", fmt::format("fluid.emitter[{}] has no room at t = {:.4g} s: {}. It sends "
+                                   "nothing until there is room. Stop it earlier (stop), leave a "
+                                   "way out, or add a [[sink]]",
+                                   emitter, now, what));
+  }
+
+  /// Of `more` particles of an emitter those that a closed domain has room for. Nothing but their
+  /// number decides, so that a sink lets it send again and a resumed run does the same.
+  size_t that_fit(size_t emitter, size_t more, double now) {
+    if (!room) room = sim::room_of(shot, scene);
+    const double there = double(solver->particles());
+    if (there + double(more) <= *room) return more;
+    warn_full(
+        emitter, now,
+        fmt::format("the domain is closed and full ({:.0f} of {:.0f} particles)", there, *room));
+    return size_t(std::max(0.0, *room - there));
+  }
+
+  /// Emitters before whose inlets fluid has nowhere to go, as in a vessel that is full: the last
+  /// step did not reach its tolerance, and it is too dense there.
+  std::vector<bool> crowded_inlets(double now) {
+    std::vector<bool> crowded(layer.size(), false);
+    if (layer.empty() || !(limits.residual > scene.parameters.tolerance)) return crowded;
+    const sim::HostVec position = solver->positions();
+    const std::vector<float> density = solver->density();
+    for (size_t e = 0; e < layer.size(); ++e) {
+      const FluidEmitter& emitter = shot.fluid.emitter[e];
+      const double since = now + shot.preroll;
+      if (emitter.type == EmitterType::mesh || since < emitter.start || since > emitter.stop)
+        continue;
+      const double crowding = sim::crowding_at(
+          shot, scene, emitter, shot.timeline.first + now * shot.timeline.fps, position, density);
+      if (crowding < sim::crowded) continue;
+      crowded[e] = true;
+      warn_full(e, now,
+                fmt::format("the fluid around it is {:.1f} % too dense, as in a vessel that "
+                            "is closed and full",
+                            100 * (crowding - 1)));
+    }
+    return crowded;
+  }
+
   /// What a mesh that is kept full lacks, less what would appear inside an obstacle.
   void fill(sim::MeshEmitter& emitter, double now) {
     sim::HostVec position, velocity;
@@ -147,6 +203,10 @@ struct Simulator::Implementation {
     }
     if (id.empty()) return;
     check_room(emitter.index(), id.size(), now);
+    const size_t fit = that_fit(emitter.index(), id.size(), now);
+    next_id -= int(id.size() - fit);
+    position.resize(fit), velocity.resize(fit), id.resize(fit);
+    if (id.empty()) return;
     solver->append(position, velocity, id);
     emitted[emitter.index()] += id.size();
   }
@@ -172,7 +232,7 @@ struct Simulator::Implementation {
     while (time < end) {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
       emit(time);
-      sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+      sim::StepLimit limit = driven_step();
       const double moves = scene.obstacles.limit(time, limit.dt);
       if (moves < limit.dt) limit = {moves, "obstacle speed"};
       if (shot.time_step > 0) limit = fixed_step(limit);
@@ -188,10 +248,11 @@ struct Simulator::Implementation {
       scene.obstacles.place(*solver, time, then);
       scene.sinks.place(*solver, time, then);
       if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(then));
+      if (scene.motion.moves()) solver->drive(scene.motion.over(time, then));
       limits = solver->step(dt, substeps);
       time = then;
       ++steps;
-      check_state();
+      check_state(dt);
       probes.record(time, *solver);
       report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
       report.largest_dt = std::max(report.largest_dt, dt);
@@ -210,6 +271,16 @@ struct Simulator::Implementation {
     }
   }
 
+  /// The stable step, of gravity and the frame's motion as they are now.
+  sim::StepLimit driven_step() {
+    if (scene.motion.moves()) scene.set_drive(time);
+    const sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
+    if (!scene.motion.turns()) return limit;
+    sim::Limits more = limits;
+    more.max_speed += float(scene.motion.kick(time, limit.dt));
+    return sim::stable_step(scene.parameters, more);
+  }
+
   sim::StepLimit fixed_step(const sim::StepLimit& stable) const {
     if (shot.time_step > stable.dt) {
       throw Error(fmt::format(
@@ -220,8 +291,9 @@ struct Simulator::Implementation {
     return {shot.time_step, "fixed"};
   }
 
-  /// @throws Error if anything is not finite or absurdly fast: what, where, when, and what is safe.
-  void check_state() const {
+  /// @throws Error if anything is not finite or absurdly fast after a step of dt: what, where,
+  /// when, why, and what is safe.
+  void check_state(double dt) {
     if (limits.bad_particle < 0 && limits.bad_vertex < 0) return;
     const sim::HostState state = solver->save();
     const bool particle = limits.bad_particle >= 0;
@@ -233,16 +305,13 @@ struct Simulator::Implementation {
     throw Error(fmt::format(
         "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m "
         "has speed "
-        "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. Try a "
-        "smaller shot.time_step{}",
+        "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. {}",
         shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll",
         time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
         scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
-        !scene.parameters.incompressible ? ", a softer cloth or a larger fluid.sound_speed"
-        : particle                       ? " or a smaller fluid.tolerance"
-                                         : " or a softer cloth"));
+        sim::cause_of_blow_up(shot, scene, state, solver->density(), {particle, i}, time, dt)));
   }
 
   /// What emitters added, sinks took and open sides let go since the last report.
@@ -262,7 +331,8 @@ struct Simulator::Implementation {
                       "did not reach fluid.tolerance = {:.2g}; mean density error {:.2g} "
                       "at worst",
                       frame, report.unconverged, report.steps, scene.parameters.most_iterations,
-                      scene.parameters.tolerance, report.worst_residual));
+                      scene.parameters.tolerance, report.worst_residual),
+          "pressure solve unconverged");
     }
     if (report.viscous_unconverged > 0) {
       log_warning("sim",
@@ -271,13 +341,15 @@ struct Simulator::Implementation {
                               "(shot.time_step) ask for fewer",
                               frame, report.viscous_unconverged, report.steps,
                               scene.parameters.most_viscous_iterations,
-                              scene.parameters.viscous_tolerance, report.worst_viscous_residual));
+                              scene.parameters.viscous_tolerance, report.worst_viscous_residual),
+                  "viscous solve unconverged");
     }
     if (report.sheets_cut_short > 0) {
       log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
                                      "they lack some of what pushed them. Shorter steps "
                                      "(shot.time_step) or softer cloth ask for less",
-                                     frame, report.sheets_cut_short, report.steps));
+                                     frame, report.sheets_cut_short, report.steps),
+                  "sheets' solve cut short");
     }
     const std::vector<float> density = solver->density();
     const sim::HostState state = solver->save();
@@ -342,6 +414,7 @@ struct Simulator::Implementation {
         out.mesh.rest_position.push_back(V3f(sheet.rest[point]));
       }
       out.mesh.uv = sheet.uv;
+      if (sheet.is_sewn()) out.mesh.point = sheet.welded;
       out.mesh.triangle = sheet.triangle;
       frames.push_back(std::move(out));
     }

@@ -208,6 +208,10 @@ class BackendSolver : public Solver {
     o.stopped.clear_bytes(0);
   }
   void blow(const WindNow& wind) override { state_.wind = wind; }
+  void drive(const FrameNow& frame) override {
+    set_gravity(state_.parameters, frame.gravity);
+    state_.frame = frame;
+  }
   std::vector<ObstacleImpulse> obstacle_impulses() const override {
     const ObstacleState& o = state_.obstacles;
     const std::vector<long long> stopped = to_host(o.stopped, o.stopped.size());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/contract/level_set.h"
+#include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
 #include "sim/probe_query.h"
@@ -124,6 +125,8 @@ class Solver {
   virtual void place(Solids which, const std::vector<ObstaclePlacement>& placement) = 0;
   /// The wind of the next step, where Parameters::air_density is above 0.
   virtual void blow(const WindNow& wind) = 0;
+  /// Gravity and the turning frame of the next step; without a call Parameters::gravity.
+  virtual void drive(const FrameNow& frame) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no

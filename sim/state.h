@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "sim/frame_now.h"
 #include "sim/geometry.h"
 #include "sim/grid.h"
 #include "sim/neighbours.h"
@@ -281,6 +282,7 @@ struct State {
   ContactState contact;
   ObstacleState obstacles, sinks;
   WindNow wind;
+  FrameNow frame;  // where Parameters::turns
   SortScratch scratch;
   Column<float> swap_float;
   double dt = 0;     // s, of the step being made

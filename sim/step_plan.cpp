@@ -13,6 +13,7 @@
 #include "sim/passes/sheet_side.h"
 #include "sim/passes/sort_particles.h"
 #include "sim/passes/surface_tension.h"
+#include "sim/passes/turning_frame.h"
 #include "sim/passes/viscosity_solve.h"
 #include "sim/passes/wetting.h"
 #include "sim/passes/wind_on_cloth.h"
@@ -119,6 +120,7 @@ void paper_move(State& state) {
   move_cloth(state);
 }
 
+bool turning(const Parameters& p, bool) { return p.turns; }
 bool fluid(const Parameters& p, bool) { return p.fluid; }
 bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; }
 bool free_of_obstacles(const Parameters& p, bool cloth) {
@@ -165,6 +167,7 @@ bool implicit_alone(const Parameters& p, bool cloth) {
 constexpr unsigned moving = column_position | column_velocity;
 
 const Pass all_passes[] = {
+    {"turn_frame", turning, column_position, column_velocity, turn_frame},
     {"predict_particles", free_of_obstacles, moving, moving, predict_particles},
     {"predict_around_obstacles", around_obstacles, moving, moving, predict_around_obstacles},
     {"sort_particles", fluid, column_position, moving, sort_particles},
@@ -248,6 +251,7 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
 
 void step_cloth_alone(State& state) {
   state.cloth.force.clear();
+  if (state.parameters.turns) turn_frame(state);
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
 }
 

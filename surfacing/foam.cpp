@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/gravity.h"
 #include "surfacing/foam_source.h"
 #include "surfacing/foam_walls.h"
 
@@ -100,7 +101,7 @@ class FoamMotion {
         fluid_(fluid),
         walls_(shot, frame, level_set),
         dt_(float(1 / shot.timeline.fps)),
-        gravity_(shot.gravity) {
+        gravity_(gravity_at(shot, frame + 0.5)) {
     const float g = gravity_.length();
     if (g > 0) {
       // A sphere without weight in water has half its mass of water to move: 2 g.

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "pipeline/contract/gravity.h"
+
 namespace drench::surfacing {
 namespace {
 
@@ -147,7 +149,7 @@ float breaking_speed(const Shot& shot) {
   const double spacing = shot.fluid.spacing;
   const double tension = shot.fluid.surface_tension > 0 ? shot.fluid.surface_tension : 0.072;
   return float(
-      std::sqrt(shot.gravity.length() * spacing + tension / (shot.fluid.rest_density * spacing)));
+      std::sqrt(largest_gravity(shot) * spacing + tension / (shot.fluid.rest_density * spacing)));
 }
 
 std::vector<Potential> potentials(const FluidMoment& fluid, float breaking) {

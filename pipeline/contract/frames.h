@@ -48,6 +48,8 @@ struct TriangleMesh {
   std::vector<float> source;              // fluid: of the nearest particle, or empty
   std::vector<float> age;                 // fluid: as of its particles, or empty
   std::vector<float> wetness;             // as age; cloth: share that is wet, 0 to 1; or empty
+  std::vector<uint32_t> point;  // the first vertex at the same point of the surface, where
+                                // several differ in uv or normal; or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside
   std::vector<uint8_t> contact;                 // by triangle, 1: lies on a sheet; or empty
 };

@@ -78,7 +78,8 @@ Digest hash_file(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct stat status {};
   int reason = descriptor < 0 || ::fstat(descriptor, &status) != 0 ? errno : 0;
-  if (reason == 0 && !S_ISREG(status.st_mode)) reason = S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
+  const bool other = reason == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+  if (reason == 0 && !S_ISREG(status.st_mode)) reason = other ? EINVAL : EISDIR;
   Hasher hasher;
   std::vector<char> buffer(reason == 0 ? 1 << 20 : 0);
   while (reason == 0) {
@@ -89,8 +90,8 @@ Digest hash_file(const std::filesystem::path& file) {
   }
   if (descriptor >= 0) ::close(descriptor);
   if (reason != 0) {
-    throw Error(
-        fmt::format("{}: cannot be read for its digest: {}", file.string(), std::strerror(reason)));
+    throw Error(fmt::format("{}: cannot be read for its digest: {}", file.string(),
+                            other ? "it is not a regular file" : std::strerror(reason)));
   }
   return hasher.finish();
 }

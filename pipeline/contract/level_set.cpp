@@ -5,11 +5,14 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/frames.h"
+#include "pipeline/contract/shells.h"
 #include "pipeline/contract/triangle.h"
 #include "pipeline/contract/vdb_archive.h"
 
@@ -17,21 +20,48 @@ namespace drench {
 
 namespace {
 
-openvdb::FloatGrid::Ptr narrow_band(const TriangleMesh& mesh, double voxel, double band) {
+using Imath::V3d, Imath::V3f;
+using openvdb::FloatGrid;
+
+/// How OpenVDB finds what is inside: by filling from the outside, cavities and pockets included, or
+/// not at all.
+enum class Inside { filled, unknown };
+
+FloatGrid::Ptr narrow_band(const TriangleMesh& mesh, double voxel, double band, Inside inside) {
   std::vector<openvdb::Vec3s> positions;
   positions.reserve(mesh.position.size());
-  for (const Imath::V3f& x : mesh.position) positions.emplace_back(x.x, x.y, x.z);
+  for (const V3f& x : mesh.position) positions.emplace_back(x.x, x.y, x.z);
   std::vector<openvdb::Vec3I> triangles;
   triangles.reserve(mesh.triangle.size());
   for (const auto& t : mesh.triangle) triangles.emplace_back(t.x, t.y, t.z);
   initialize_vdb();
   const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
   const float width = float(band / voxel) + 1;
-  return openvdb::tools::meshToSignedDistanceField<openvdb::FloatGrid>(*transform, positions,
-                                                                       triangles, {}, width, width);
+  if (mesh.triangle.empty()) return FloatGrid::create(float(band) + float(voxel));
+  if (inside == Inside::unknown) {
+    return openvdb::tools::meshToUnsignedDistanceField<FloatGrid>(*transform, positions, triangles,
+                                                                  {}, width);
+  }
+  return openvdb::tools::meshToSignedDistanceField<FloatGrid>(*transform, positions, triangles, {},
+                                                              width, width);
 }
 
-/// Blocks that the active voxels touch, and a rim so that a sample beside them finds a block.
+struct Box {
+  V3d low{1e300}, high{-1e300};
+};
+
+Box bounds_of(const TriangleMesh& mesh) {
+  Box box;
+  for (const V3f& p : mesh.position) {
+    for (int k = 0; k < 3; ++k) {
+      box.low[k] = std::min(box.low[k], double(p[k]));
+      box.high[k] = std::max(box.high[k], double(p[k]));
+    }
+  }
+  return box;
+}
+
+/// Blocks that a box of voxels touches, and a rim so that a sample beside them finds a block.
 void frame_blocks(const openvdb::CoordBBox& box, LevelSet& set) {
   double total = 1;
   for (int k = 0; k < 3; ++k) {
@@ -41,10 +71,24 @@ void frame_blocks(const openvdb::CoordBBox& box, LevelSet& set) {
   }
   if (total > 1e9) {
     throw Error(
-        fmt::format("an obstacle's mesh spans {} x {} x {} blocks of {} voxels of {} m; "
+        fmt::format("the mesh spans {} x {} x {} blocks of {} voxels of {:.4g} m; "
                     "use a larger fluid.spacing or a smaller mesh",
                     set.blocks[0], set.blocks[1], set.blocks[2], LevelSet::side, set.voxel));
   }
+}
+
+/// Voxels of the band around what a mesh has within bounds.
+openvdb::CoordBBox voxels_of(const Box& mesh, const LevelSetBounds& bounds, double voxel,
+                             double band) {
+  openvdb::Coord low, high;
+  for (int k = 0; k < 3; ++k) {
+    // Bounds that the mesh does not meet have one block, which is outside.
+    const double begin = std::max(mesh.low[k] - band, bounds.low[k]);
+    const double end = std::max(begin, std::min(mesh.high[k] + band, bounds.high[k]));
+    low[k] = int(std::clamp(std::floor(begin / voxel), -1e9, 1e9));
+    high[k] = int(std::clamp(std::ceil(end / voxel), -1e9, 1e9));
+  }
+  return {low, high};
 }
 
 /// Within this of a triangle distances are exact, voxels. OpenVDB takes the nearest of the
@@ -110,26 +154,22 @@ void refine(const TriangleMesh& mesh, uint32_t triangle, const openvdb::Coord& l
   }
 }
 
-}  // namespace
+/// Lower corner of block b, voxels.
+openvdb::Coord origin_of(const LevelSet& set, int b) {
+  constexpr int side = LevelSet::side;
+  return openvdb::Coord(side * (set.low[0] + b % set.blocks[0]),
+                        side * (set.low[1] + b / set.blocks[0] % set.blocks[1]),
+                        side * (set.low[2] + b / set.blocks[0] / set.blocks[1]));
+}
 
-LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band) {
-  if (!(voxel > 0) || !(band >= voxel)) throw std::logic_error("make_level_set: voxel or band");
-  const openvdb::FloatGrid::Ptr grid = narrow_band(mesh, voxel, band);
-  LevelSet set;
-  set.voxel = float(voxel), set.band = float(band);
-  frame_blocks(grid->evalActiveVoxelBoundingBox(), set);
-  const int bx = set.blocks[0], by = set.blocks[1], total = bx * by * set.blocks[2];
+/// Values of the blocks of which any corner lies in the band; of the others where they are.
+void take_values(const FloatGrid& grid, const TriangleMesh& mesh, LevelSet& set) {
+  const int total = set.blocks[0] * set.blocks[1] * set.blocks[2];
   set.block.assign(size_t(total), LevelSet::outside);
-  const auto origin = [&](int b) {
-    constexpr int side = LevelSet::side;
-    return openvdb::Coord(side * (set.low[0] + b % bx), side * (set.low[1] + b / bx % by),
-                          side * (set.low[2] + b / bx / by));
-  };
-  // A block has values if any of its corners lies in the band.
   std::vector<char> wanted(size_t(total), 0);
   ::tbb::parallel_for(0, total, [&](int b) {
-    auto at = grid->getConstAccessor();
-    const openvdb::Coord low = origin(b);
+    auto at = grid.getConstAccessor();
+    const openvdb::Coord low = origin_of(set, b);
     for (int k = 0; k < LevelSet::corners && !wanted[size_t(b)]; ++k)
       wanted[size_t(b)] = at.isValueOn(low + openvdb::Coord(k % 9, k / 9 % 9, k / 81));
     if (!wanted[size_t(b)] && at.getValue(low) < 0) set.block[size_t(b)] = LevelSet::inside;
@@ -141,8 +181,8 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band) {
   const std::vector<std::vector<uint32_t>> near = triangles_by_block(mesh, set);
   ::tbb::parallel_for(0, total, [&](int b) {
     if (set.block[size_t(b)] < 0) return;
-    auto at = grid->getConstAccessor();
-    const openvdb::Coord low = origin(b);
+    auto at = grid.getConstAccessor();
+    const openvdb::Coord low = origin_of(set, b);
     float* to = set.value.data() + size_t(set.block[size_t(b)]) * LevelSet::corners;
     for (int k = 0; k < LevelSet::corners; ++k) {
       const float d = at.getValue(low + openvdb::Coord(k % 9, k / 9 % 9, k / 81));
@@ -150,6 +190,199 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band) {
     }
     for (const uint32_t t : near[size_t(b)]) refine(mesh, t, low, set.voxel, to);
   });
+}
+
+/// Which corners of one layer of blocks are inside, by rays along x.
+class LayerSigns {
+ public:
+  LayerSigns(const LevelSet& set, int layer, const TriangleMesh& mesh, const Shells& shells,
+             const std::vector<uint32_t>& triangles)
+      : nx_(LevelSet::side * set.blocks[0] + 1),
+        ny_(LevelSet::side * set.blocks[1] + 1),
+        inside_(size_t(nx_) * size_t(ny_) * 9, 0) {
+    ShellRays::Grid grid;
+    const double voxel = double(set.voxel);
+    grid.low[0] = LevelSet::side * set.low[1] * voxel;
+    grid.low[1] = LevelSet::side * (set.low[2] + layer) * voxel;
+    grid.step[0] = grid.step[1] = voxel, grid.count[0] = ny_, grid.count[1] = 9;
+    const ShellRays rays(mesh, shells.shell, triangles, grid);
+    BodyCount count(shells);
+    for (int z = 0; z < 9; ++z) {
+      for (int y = 0; y < ny_; ++y) {
+        char* row = inside_.data() + (size_t(z) * size_t(ny_) + size_t(y)) * size_t(nx_);
+        int at = 0;
+        for (const auto* c = rays.begin(y, z); c != rays.end(y, z); ++c) {
+          const double corner = std::floor(c->x / voxel) + 1 - LevelSet::side * set.low[0];
+          const int next = int(std::clamp(corner, double(at), double(nx_)));
+          std::fill(row + at, row + next, char(count.inside()));
+          at = next;
+          count.pass(*c);
+        }
+      }
+    }
+  }
+  /// Corner k of the block in column (x, y) of the layer.
+  bool inside(int x, int y, int k) const {
+    const size_t row = size_t(k / 81) * size_t(ny_) + size_t(LevelSet::side * y + k / 9 % 9);
+    return inside_[row * size_t(nx_) + size_t(LevelSet::side * x + k % 9)] != 0;
+  }
+
+ private:
+  int nx_, ny_;
+  std::vector<char> inside_;
+};
+
+/// Calls visit(block, corner -> inside) for every block.
+template <class Visit>
+void for_each_sign(const LevelSet& set, const TriangleMesh& mesh, const Shells& shells,
+                   const Visit& visit) {
+  const int bx = set.blocks[0], by = set.blocks[1], bz = set.blocks[2];
+  std::vector<std::vector<uint32_t>> by_layer(size_t(bz), std::vector<uint32_t>{});
+  const double length = LevelSet::side * double(set.voxel);
+  for (uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+    const auto& c = mesh.triangle[t];
+    const double a = mesh.position[c.x].z, b = mesh.position[c.y].z, d = mesh.position[c.z].z;
+    const double low = std::floor(std::min({a, b, d}) / length) - set.low[2] - 1;
+    const double high = std::floor(std::max({a, b, d}) / length) - set.low[2];
+    for (int z = int(std::clamp(low, 0., double(bz))); z <= std::min(high, double(bz - 1)); ++z)
+      by_layer[size_t(z)].push_back(t);
+  }
+  ::tbb::parallel_for(0, bz, [&](int z) {
+    const LayerSigns signs(set, z, mesh, shells, by_layer[size_t(z)]);
+    for (int y = 0; y < by; ++y) {
+      for (int x = 0; x < bx; ++x)
+        visit((z * by + y) * bx + x, [&](int corner) { return signs.inside(x, y, corner); });
+    }
+  });
+}
+
+/// Whether what filling found inside is so. Within three quarters of a voxel of the surface either
+/// may be right: thin parts are rounded off.
+bool filled_right(const LevelSet& set, const TriangleMesh& mesh, const Shells& shells) {
+  std::atomic<bool> right{true};
+  for_each_sign(set, mesh, shells, [&](int b, const auto& inside) {
+    const int block = set.block[size_t(b)];
+    if (block < 0) {
+      if ((block == LevelSet::inside) != inside(0)) right = false;
+      return;
+    }
+    const float* value = set.value.data() + size_t(block) * LevelSet::corners;
+    for (int k = 0; k < LevelSet::corners; ++k) {
+      if (std::abs(value[k]) > 0.75f * set.voxel && (value[k] < 0) != inside(k)) right = false;
+    }
+  });
+  return right;
+}
+
+void set_signs(LevelSet& set, const TriangleMesh& mesh, const Shells& shells) {
+  for_each_sign(set, mesh, shells, [&](int b, const auto& inside) {
+    int& block = set.block[size_t(b)];
+    if (block < 0) {
+      block = inside(0) ? LevelSet::inside : LevelSet::outside;
+      return;
+    }
+    float* value = set.value.data() + size_t(block) * LevelSet::corners;
+    for (int k = 0; k < LevelSet::corners; ++k)
+      value[k] = std::copysign(value[k], inside(k) ? -1.f : 1.f);
+  });
+}
+
+// ---- what is asked for, and what it takes ----
+
+/// The part of a convex polygon on one side of a plane across axis k.
+std::vector<V3d> cut(const std::vector<V3d>& polygon, int k, double at, double side) {
+  std::vector<V3d> kept;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const V3d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double da = side * (a[k] - at), db = side * (b[k] - at);
+    if (da >= 0) kept.push_back(a);
+    if ((da > 0 && db < 0) || (da < 0 && db > 0)) kept.push_back(a + (b - a) * (da / (da - db)));
+  }
+  return kept;
+}
+
+/// What of the triangles lies in a box: no closed mesh, but at the same distances near it.
+TriangleMesh part_within(const TriangleMesh& mesh, const Box& box) {
+  TriangleMesh part;
+  for (const auto& t : mesh.triangle) {
+    std::vector<V3d> polygon;
+    for (int c = 0; c < 3; ++c) polygon.emplace_back(mesh.position[t[c]]);
+    for (int k = 0; k < 3 && !polygon.empty(); ++k) {
+      polygon = cut(polygon, k, box.low[k], 1);
+      polygon = cut(polygon, k, box.high[k], -1);
+    }
+    const auto first = uint32_t(part.position.size());
+    for (uint32_t c = 2; c < polygon.size(); ++c)
+      part.triangle.emplace_back(first, first + c - 1, first + c);
+    if (polygon.size() > 2)
+      for (const V3d& p : polygon) part.position.emplace_back(p);
+  }
+  return part;
+}
+
+/// Bytes that a level set takes while it is made, from above: blocks in a band of about ten voxels
+/// on either side of the surface, OpenVDB's and its own, and copies and lists of the triangles.
+double bytes_of(const TriangleMesh& mesh, double voxel) {
+  double area = 0;
+  for (const auto& t : mesh.triangle) {
+    const V3d a(mesh.position[t.x]), b(mesh.position[t.y]), c(mesh.position[t.z]);
+    area += 0.5 * (b - a).cross(c - a).length();
+  }
+  constexpr double layers = 3, a_block = 13000, a_triangle = 300;
+  const double blocks = layers * area / (LevelSet::side * LevelSet::side * voxel * voxel);
+  return blocks * a_block + double(mesh.triangle.size()) * a_triangle;
+}
+
+/// A failing allocation within OpenVDB ends the program, since its trees allocate where they are
+/// destroyed: what is needed is asked for before.
+void check_memory(double bytes, double voxel, const LevelSetBounds& bounds) {
+  const auto refuse = [&](const std::string& why) {
+    throw Error(
+        fmt::format("its level set in voxels of {:.3g} m (half of fluid.spacing) would "
+                    "take about {:.3g} GiB of memory, {}. Use a larger fluid.spacing or a "
+                    "smaller mesh (is its scale right?)",
+                    voxel, bytes / (1 << 30), why));
+  };
+  if (bounds.most_bytes > 0 && bytes > bounds.most_bytes)
+    refuse(fmt::format("more than the {:.3g} GiB that it may", bounds.most_bytes / (1 << 30)));
+  void* const probe = bytes < 1e15 ? std::malloc(size_t(bytes)) : nullptr;
+  if (!probe) refuse("which the system does not give");
+  std::free(probe);
+}
+
+}  // namespace
+
+LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
+                        const LevelSetBounds& bounds) {
+  if (!(voxel > 0) || !(band >= voxel)) throw std::logic_error("make_level_set: voxel or band");
+  constexpr double worth_cutting = 256.0 * (1 << 20);
+  const Box whole = bounds_of(mesh);
+  Box reach;
+  bool beyond = false;
+  for (int k = 0; k < 3; ++k) {
+    beyond |= whole.low[k] < bounds.low[k] || whole.high[k] > bounds.high[k];
+    reach.low[k] = bounds.low[k] - band - 4 * voxel;
+    reach.high[k] = bounds.high[k] + band + 4 * voxel;
+  }
+  const bool cut = beyond && bytes_of(mesh, voxel) > worth_cutting;
+  const TriangleMesh part = cut ? part_within(mesh, reach) : TriangleMesh{};
+  const TriangleMesh& near = cut ? part : mesh;
+  check_memory(bytes_of(near, voxel), voxel, bounds);
+  const Shells shells = find_shells(mesh);
+  const bool cavities = std::any_of(shells.depth.begin(), shells.depth.end(),
+                                    [](int depth) { return depth % 2 == 1; });
+  LevelSet set;
+  set.voxel = float(voxel), set.band = float(band);
+  if (!cut && !cavities) {
+    const FloatGrid::Ptr grid = narrow_band(mesh, voxel, band, Inside::filled);
+    frame_blocks(grid->evalActiveVoxelBoundingBox(), set);
+    take_values(*grid, mesh, set);
+    if (filled_right(set, mesh, shells)) return set;
+  }
+  const FloatGrid::Ptr grid = narrow_band(near, voxel, band, Inside::unknown);
+  frame_blocks(voxels_of(whole, cut ? bounds : LevelSetBounds{}, voxel, band), set);
+  take_values(*grid, near, set);
+  set_signs(set, mesh, shells);
   return set;
 }
 

@@ -23,11 +23,22 @@ struct LevelSet {
   std::vector<float> value;  // m, x fastest; shared faces are repeated
 };
 
-/// Makes level sets of closed meshes: make_level_set of drench_vdb.
-using LevelSetMaker = std::function<LevelSet(const TriangleMesh& mesh, double voxel, double band)>;
+/// What a level set may be and must be: where it is asked, and what it may take.
+struct LevelSetBounds {
+  double low[3] = {-1e30, -1e30, -1e30}, high[3] = {1e30, 1e30, 1e30};  // m, own coordinates
+  double most_bytes = 8.0 * (1 << 30);  // while it is made, 0: no limit
+};
 
-/// Narrow-band level set of a closed mesh by OpenVDB. Any orientation. Library drench_vdb.
-/// @param voxel, band  m. @throws Error if the mesh would need more than 2^31 values.
-LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band);
+/// Makes level sets of closed meshes: make_level_set of drench_vdb.
+using LevelSetMaker = std::function<LevelSet(const TriangleMesh& mesh, double voxel, double band,
+                                             const LevelSetBounds& bounds)>;
+
+/// Narrow-band level set of a closed mesh: distances by OpenVDB, exact near triangles; inside as
+/// find_shells (shells.h) says, whatever the orientation. Library drench_vdb.
+/// @param voxel, band  m. @param bounds  what reaches beyond them is made within them only if it
+/// would take more than 256 MiB; samples beyond are outside then.
+/// @throws Error, before it takes any, if it would take more memory than it may or there is.
+LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
+                        const LevelSetBounds& bounds = {});
 
 }  // namespace drench

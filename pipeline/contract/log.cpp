@@ -2,21 +2,45 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <mutex>
+
+#include "pipeline/contract/error.h"
+
+#include "pipeline/contract/printable.h"
 
 namespace drench {
 
 namespace {
 
 std::atomic<LogLevel> level{LogLevel::normal};
+std::atomic<OnWarning> on_warning{OnWarning::go_on};
 const auto start = std::chrono::steady_clock::now();
+
+std::mutex warnings_mutex;
+std::vector<LoggedWarning> warnings;
+
+/// Whether it is the first of its cause.
+bool remember(std::string_view part, std::string_view text, std::string_view cause) {
+  const std::scoped_lock lock(warnings_mutex);
+  const auto known = std::find_if(warnings.begin(), warnings.end(),
+                                  [&](const LoggedWarning& w) { return w.cause == cause; });
+  if (known != warnings.end()) {
+    ++known->times;
+    return false;
+  }
+  warnings.push_back({std::string(part), std::string(text), std::string(cause), 1});
+  return true;
+}
 
 // One fwrite a line: stderr is unbuffered, so lines of two threads do not mix.
 void write_line(std::string_view part, std::string_view mark, std::string_view text) {
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
-  const std::string line = fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, text);
+  const std::string line =
+      fmt::format("{:.3f} {} {}{}\n", since.count(), part, mark, printable(text, Lines::one));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -32,8 +56,21 @@ void log_verbose(std::string_view part, std::string_view text) {
   if (level == LogLevel::verbose) write_line(part, "", text);
 }
 
-void log_warning(std::string_view part, std::string_view text) {
-  write_line(part, "warning: ", text);
+void log_warning(std::string_view part, std::string_view text, std::string_view cause) {
+  if (on_warning == OnWarning::fail) throw Error(std::string(text));
+  if (remember(part, text, cause.empty() ? text : cause)) write_line(part, "warning: ", text);
+}
+
+void set_on_warning(OnWarning what) { on_warning = what; }
+
+std::vector<LoggedWarning> logged_warnings() {
+  const std::scoped_lock lock(warnings_mutex);
+  return warnings;
+}
+
+void forget_warnings() {
+  const std::scoped_lock lock(warnings_mutex);
+  warnings.clear();
 }
 
 }  // namespace drench

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/mesh_text.h"
 #include "pipeline/contract/obj_file.h"
 #include "pipeline/contract/ply_file.h"
 
@@ -50,7 +51,8 @@ void check_columns(const TriangleMesh& mesh) {
   const size_t n = mesh.position.size();
   const auto fits = [&](const auto& column) { return column.empty() || column.size() == n; };
   if (mesh.velocity.size() != n || !fits(mesh.normal) || !fits(mesh.uv) ||
-      !fits(mesh.rest_position) || !fits(mesh.source) || !fits(mesh.age) || !fits(mesh.wetness)) {
+      !fits(mesh.rest_position) || !fits(mesh.source) || !fits(mesh.age) || !fits(mesh.wetness) ||
+      !fits(mesh.point)) {
     throw std::logic_error("mesh file: vertex columns differ in length");
   }
   if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
@@ -78,6 +80,7 @@ std::string header_of(const TriangleMesh& mesh, const std::vector<VertexColumns>
   for (const VertexColumns& column : columns) {
     for (const char* name : column.names) header += fmt::format("property float {}\n", name);
   }
+  if (!mesh.point.empty()) header += "property uint point\n";
   if (columns.empty()) header += "property float x\nproperty float y\nproperty float z\n";
   return header +
          fmt::format("element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
@@ -146,6 +149,7 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
       check_finite(path, column.names[0], i, row, width);
       append(bytes, row, width * sizeof(float));
     }
+    if (!mesh.point.empty()) append(bytes, &mesh.point[i], sizeof(uint32_t));
   }
   for (size_t k = 0; k < mesh.triangle.size(); ++k) {
     bytes.push_back(3);
@@ -170,7 +174,7 @@ WrittenFile write_obj(const fs::path& path, const TriangleMesh& mesh) {
   return write_file_whole(path, text.text());
 }
 
-TriangleMesh read_mesh(const fs::path& path) {
+TriangleMesh read_mesh(const fs::path& path, CornerData corners) {
   std::string kind = path.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) {
     return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : char(c);
@@ -179,8 +183,8 @@ TriangleMesh read_mesh(const fs::path& path) {
     throw Error(
         fmt::format("{}: meshes are read from .ply and .obj files, not '{}'", path.string(), kind));
   }
-  const std::string text = read_text(path, uint64_t(1) << 34);
-  return kind == ".obj" ? read_obj(path, text) : read_ply(path, text);
+  const std::string text = plain_text(path, read_text(path, uint64_t(1) << 34));
+  return kind == ".obj" ? read_obj(path, text, corners) : read_ply(path, text, corners);
 }
 
 }  // namespace drench

@@ -8,7 +8,7 @@
 
 namespace drench {
 
-/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z; faces
+/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z, point; faces
 /// of 3, contact if present.
 WrittenFile write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
@@ -16,9 +16,14 @@ WrittenFile write_mesh(const std::filesystem::path& path, const TriangleMesh& me
 /// floats in the fewest digits that read back equal.
 WrittenFile write_obj(const std::filesystem::path& path, const TriangleMesh& mesh);
 
-/// Reads PLY (ASCII or little-endian; polygons are cut into triangles) or OBJ, by extension. Input
-/// is hostile: counts are checked against the file's size, indices against the vertex count, values
-/// for being finite. @throws Error naming the file and the reason.
-TriangleMesh read_mesh(const std::filesystem::path& path);
+/// What of a file's corners is kept beside the vertices, which are split where corners differ in it.
+enum class CornerData { none, uv, uv_and_normal };
+
+/// Reads PLY (ASCII or binary of either byte order) or OBJ, by extension; polygons are cut into
+/// triangles (polygon.h). Input is hostile: counts are checked against the file's size, indices
+/// against the vertex count, positions for being finite. What is left out or mended is a warning.
+/// @return velocities are 0 where the file has none; `point` where vertices were split.
+/// @throws Error naming the file, the place in it and the reason.
+TriangleMesh read_mesh(const std::filesystem::path& path, CornerData corners = CornerData::none);
 
 }  // namespace drench

@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <cmath>
 #include <optional>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/mesh_builder.h"
+#include "pipeline/contract/mesh_text.h"
 
 namespace drench {
 
@@ -18,21 +19,22 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(const fs::path& path, std::string_view text) : path_(path), text_(text) {}
+  ObjReader(const fs::path& path, std::string_view text, CornerData corners)
+      : path_(path), text_(text), builder_(path, corners, [&path](uint64_t line) {
+          return fmt::format("{}:{}", path.string(), line);
+        }) {}
 
   TriangleMesh read() {
+    // Lines of old Macintoshes end with a carriage return alone.
+    if (text_.find('\n') == std::string_view::npos) end_of_line_ = '\r';
     std::string joined;
     while (!text_.empty()) {
       const std::string_view line = next_line(joined);
       read_line(line.substr(0, line.find('#')));
     }
-    if (mesh_.triangle.empty()) fail("has no faces; a triangle mesh is expected");
-    for (const auto& t : mesh_.triangle) {
-      if (std::max({t.x, t.y, t.z}) >= mesh_.position.size()) fail("has a face without its vertex");
-    }
-    mesh_.velocity.resize(mesh_.position.size(), Imath::V3f(0));
-    take_uv();
-    return std::move(mesh_);
+    if (faces_ == 0) fail("has no faces; a triangle mesh is expected");
+    warn();
+    return builder_.finish();
   }
 
  private:
@@ -45,7 +47,7 @@ class ObjReader {
     joined.clear();
     while (true) {
       ++line_;
-      std::string_view line = text_.substr(0, text_.find('\n'));
+      std::string_view line = text_.substr(0, text_.find(end_of_line_));
       text_.remove_prefix(std::min(line.size() + 1, text_.size()));
       while (line.ends_with('\r')) line.remove_suffix(1);
       if (!line.ends_with('\\') || text_.empty()) {
@@ -71,33 +73,33 @@ class ObjReader {
     const std::string_view keyword = take_word(line);
     if (keyword == "v") {
       const float x = next_float(line), y = next_float(line), z = next_float(line);
-      mesh_.position.emplace_back(x, y, z);
+      builder_.mesh.position.emplace_back(x, y, z);
     } else if (keyword == "vt") {
       const float u = next_float(line);
-      uv_.emplace_back(u, take_word(std::string_view(line)).empty() ? 0.f : next_float(line));
-    } else if (keyword == "f") {
+      builder_.uv.emplace_back(
+          u, std::string_view(line).find_first_not_of(" \t") == std::string_view::npos
+                 ? 0.f
+                 : next_float(line));
+    } else if (keyword == "vn") {
+      const float x = next_float(line), y = next_float(line), z = next_float(line);
+      builder_.normal.emplace_back(x, y, z);
+    } else if (keyword == "f" || keyword == "fo") {
       read_face(line);
+    } else if (keyword == "surf" || keyword == "curv") {
+      ++curved_;
+    } else if (keyword.find('\0') != std::string_view::npos) {
+      fail("holds bytes of 0: it is UTF-16 without a byte order mark, or no OBJ");
     }
   }
 
-  static std::string_view take_word(std::string_view&& line) { return take_word(line); }
-
-  float next_float(std::string_view& line) const {
-    std::string_view word = take_word(line);
-    if (word.starts_with('+')) word.remove_prefix(1);
-    // Rounded once, so that what write_obj wrote comes back equal; by way of double what float
-    // calls out of range because it is next to nothing.
-    float value = 0;
-    if (parsed(word, value) && std::isfinite(value)) return value;
-    double wide = 0;
-    if (parsed(word, wide) && std::isfinite(float(wide))) return float(wide);
-    fail(fmt::format("holds '{}' where a finite number is expected", word.substr(0, 40)));
-  }
-
-  template <class T>
-  static bool parsed(std::string_view word, T& value) {
-    const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
-    return code == std::errc() && end == word.data() + word.size();
+  float next_float(std::string_view& line) {
+    const std::string_view word = take_word(line);
+    if (const std::optional<float> value = number_.single(word)) return *value;
+    fail(fmt::format("holds '{}' where a number is expected{}", word.substr(0, 40),
+                     number_.commas() == 0 && word.find(',') == std::string_view::npos
+                         ? ""
+                         : ", beside numbers with another decimal sign: a decimal comma in one "
+                           "place and a point in another could mean two things"));
   }
 
   /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far.
@@ -115,64 +117,56 @@ class ObjReader {
     return uint32_t(index);
   }
 
-  uint32_t read_corner(std::string_view word) {
-    const std::string_view vertex_word = word.substr(0, word.find('/'));
-    const uint32_t vertex = index_of(vertex_word, mesh_.position.size());
-    std::optional<uint32_t> texture;
-    if (vertex_word.size() < word.size()) {
-      word.remove_prefix(vertex_word.size() + 1);
-      const std::string_view texture_word = word.substr(0, word.find('/'));
-      if (!texture_word.empty()) texture = index_of(texture_word, uv_.size());
-    }
-    corners_.push_back({vertex, texture});
-    return vertex;
+  MeshBuilder::Corner read_corner(std::string_view word) {
+    MeshBuilder::Corner corner;
+    const auto next_part = [&] {
+      const std::string_view part = word.substr(0, word.find('/'));
+      word.remove_prefix(std::min(part.size() + 1, word.size()));
+      return part;
+    };
+    corner.vertex = index_of(next_part(), builder_.mesh.position.size());
+    if (const auto part = next_part(); !part.empty())
+      corner.uv = index_of(part, builder_.uv.size());
+    if (const auto part = next_part(); !part.empty())
+      corner.normal = index_of(part, builder_.normal.size());
+    return corner;
   }
 
   void read_face(std::string_view line) {
-    std::array<uint32_t, 2> kept{};
-    size_t n = 0;
-    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line), ++n) {
-      const uint32_t vertex = read_corner(word);
-      if (n >= 2) mesh_.triangle.emplace_back(kept[0], kept[1], vertex);
-      kept[n == 0 ? 0 : 1] = vertex;
-    }
-    if (n < 3) fail(fmt::format("has a face of {} vertices", n));
+    corners_.clear();
+    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line))
+      corners_.push_back(read_corner(word));
+    ++faces_;
+    builder_.add_face(corners_, uint64_t(line_));
   }
 
-  /// Vertices stay one (a sheet must not come apart at a texture seam), so uv is taken only when no
-  /// vertex has two.
-  void take_uv() {
-    constexpr uint32_t none = 0xffffffff;
-    std::vector<uint32_t> chosen(mesh_.position.size(), none);
-    for (const Corner& corner : corners_) {
-      if (!corner.texture || *corner.texture >= uv_.size()) return;
-      uint32_t& mine = chosen[corner.vertex];
-      if (mine != none && uv_[mine] != uv_[*corner.texture]) return;
-      mine = *corner.texture;
+  void warn() const {
+    if (number_.commas() > 0) {
+      log_warning("mesh", fmt::format("{}: {} numbers have a decimal comma, which was taken for a "
+                                      "point; export with points",
+                                      path_.string(), number_.commas()));
     }
-    mesh_.uv.resize(mesh_.position.size(), Imath::V2f(0));
-    for (size_t i = 0; i < chosen.size(); ++i) {
-      if (chosen[i] != none) mesh_.uv[i] = uv_[chosen[i]];
+    if (curved_ > 0) {
+      log_warning("mesh", fmt::format("{}: {} curves and curved surfaces were left out; export "
+                                      "them as polygons",
+                                      path_.string(), curved_));
     }
   }
-
-  struct Corner {
-    uint32_t vertex;
-    std::optional<uint32_t> texture;
-  };
 
   const fs::path& path_;
   std::string_view text_;
+  char end_of_line_ = '\n';
   int line_ = 0;
-  TriangleMesh mesh_;
-  std::vector<Imath::V2f> uv_;
-  std::vector<Corner> corners_;
+  uint64_t faces_ = 0, curved_ = 0;
+  NumberReader number_;
+  MeshBuilder builder_;
+  std::vector<MeshBuilder::Corner> corners_;
 };
 
 }  // namespace
 
-TriangleMesh read_obj(const fs::path& path, std::string_view text) {
-  return ObjReader(path, text).read();
+TriangleMesh read_obj(const fs::path& path, std::string_view text, CornerData corners) {
+  return ObjReader(path, text, corners).read();
 }
 
 }  // namespace drench

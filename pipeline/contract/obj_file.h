@@ -4,13 +4,14 @@
 #include <filesystem>
 #include <string_view>
 
-#include "pipeline/contract/frames.h"
+#include "pipeline/contract/mesh_file.h"
 
 namespace drench {
 
-/// Positions, faces (polygons are cut into triangles; negative indices count back) and, where every
-/// vertex has one texture coordinate only, uv. Velocity is zero. Groups, materials, normals, lines
-/// and points are left out. @throws Error naming file, line and reason.
-TriangleMesh read_obj(const std::filesystem::path& path, std::string_view text);
+/// Positions, faces (negative indices count back) and, as wanted, texture coordinates and normals
+/// of corners. Velocity is zero. Groups, materials, lines and points are left out.
+/// @throws Error naming file, line and reason.
+TriangleMesh read_obj(const std::filesystem::path& path, std::string_view text,
+                      CornerData corners = CornerData::none);
 
 }  // namespace drench

@@ -4,13 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <numbers>
 #include <regex>
+#include <set>
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/shells.h"
+#include "pipeline/contract/weld.h"
 
 namespace drench {
 
@@ -44,43 +47,71 @@ Field frame_field(const std::string& name) {
           match[1].matched ? std::stoi(match[1]) : 0};
 }
 
-/// Every edge belongs to as many triangles one way as the other; vertices at one place are one.
-void check_closed(const TriangleMesh& mesh, const std::filesystem::path& file) {
-  std::map<std::array<float, 3>, uint32_t> place;
-  std::vector<uint32_t> welded;
-  for (const V3f& p : mesh.position)
-    welded.push_back(place.try_emplace({p.x, p.y, p.z}, uint32_t(place.size())).first->second);
-  std::map<std::pair<uint32_t, uint32_t>, int> edges;
-  for (const Triangle& t : mesh.triangle) {
-    for (int c = 0; c < 3; ++c) {
-      const uint32_t a = welded[t[c]], b = welded[t[(c + 1) % 3]];
-      if (a != b) a < b ? ++edges[{a, b}] : --edges[{b, a}];
-    }
+/// Between two corners of open edges, of the first thousand.
+double narrowest_gap(const TriangleMesh& mesh,
+                     const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+  std::set<uint32_t> rim;
+  for (const auto& [a, b] : open) {
+    rim.insert({a, b});
+    if (rim.size() > 1000) break;
   }
-  const auto open =
-      std::find_if(edges.begin(), edges.end(), [](const auto& e) { return e.second != 0; });
-  if (open == edges.end() && !mesh.triangle.empty()) return;
-  if (mesh.triangle.empty())
-    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
-  const auto corner = [&](uint32_t of) {
-    const auto found =
-        std::find_if(place.begin(), place.end(), [&](const auto& p) { return p.second == of; });
-    return fmt::format("({:.4g}, {:.4g}, {:.4g})", found->first[0], found->first[1],
-                       found->first[2]);
-  };
-  throw Error(
-      fmt::format("{}: the mesh is not closed: the edge from {} to {} has not as many "
-                  "triangles one way as the other. It needs an inside: close its "
-                  "holes and orient it in one way",
-                  file.string(), corner(open->first.first), corner(open->first.second)));
+  double gap = std::numeric_limits<double>::infinity();
+  for (auto a = rim.begin(); a != rim.end(); ++a)
+    for (auto b = rim.begin(); b != a; ++b)
+      gap = std::min(gap, V3d(mesh.position[*a] - mesh.position[*b]).length());
+  return gap;
 }
 
-void orient_outward(TriangleMesh& mesh) {
-  double volume = 0;
-  for (const Triangle& t : mesh.triangle)
-    volume += V3d(mesh.position[t.x]).dot(V3d(mesh.position[t.y]).cross(V3d(mesh.position[t.z])));
-  if (volume < 0)
-    for (Triangle& t : mesh.triangle) std::swap(t.y, t.z);
+[[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
+                              const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+  // Nine digits tell any two floats apart.
+  const auto corner = [&](uint32_t v) {
+    const V3f& p = mesh.position[v];
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", p.x, p.y, p.z);
+  };
+  const auto [a, b] = open.front();
+  throw Error(fmt::format(
+      "{}: the mesh is not closed: the edge from {} to {} has not as many triangles one way as the "
+      "other, and so have {} edges in all. The nearest of their corners are {:.3g} apart, in the "
+      "file's unit; gaps up to {:.3g} are closed. It needs an inside: close its holes, merge its "
+      "vertices by distance, and orient it in one way",
+      file.string(), corner(a), corner(b), open.size(), narrowest_gap(mesh, open),
+      weld_share * diagonal_of(mesh)));
+}
+
+/// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
+void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
+  if (mesh.triangle.empty())
+    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
+  const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
+  const auto open = free_edges(mesh, welded.first);
+  if (!open.empty()) refuse_open(mesh, file, open);
+  size_t moved = 0;
+  for (size_t v = 0; v < mesh.position.size(); ++v) {
+    const V3f& first = mesh.position[welded.first[v]];
+    if (mesh.position[v] == first) continue;
+    mesh.position[v] = first;
+    ++moved;
+  }
+  if (moved > 0) {
+    log_warning("mesh", fmt::format("{}: hairline gaps were closed: {} vertices moved by up to "
+                                    "{:.3g} of the file's unit onto their neighbours. Merge its "
+                                    "vertices by distance",
+                                    file.string(), moved, welded.widest));
+  }
+}
+
+/// Turns normals that point away from their faces.
+void turn_normals(TriangleMesh& mesh) {
+  if (mesh.normal.empty()) return;
+  std::vector<V3d> face(mesh.position.size(), V3d(0));
+  for (const Triangle& t : mesh.triangle) {
+    const V3d a(mesh.position[t.x]);
+    const V3d n = (V3d(mesh.position[t.y]) - a).cross(V3d(mesh.position[t.z]) - a);
+    for (const uint32_t v : {t.x, t.y, t.z}) face[v] += n;
+  }
+  for (size_t v = 0; v < face.size(); ++v)
+    if (face[v].dot(V3d(mesh.normal[v])) < 0) mesh.normal[v] = -mesh.normal[v];
 }
 
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
@@ -148,7 +179,7 @@ TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
     case ObstacleType::sphere:
       return sphere_mesh(obstacle.radius);
     case ObstacleType::mesh:
-      return read_obstacle_mesh(shot, obstacle, frame);
+      return read_obstacle_mesh(shot, obstacle, frame, CornerData::uv_and_normal);
   }
   throw std::logic_error("own_mesh: no such type");
 }
@@ -167,8 +198,44 @@ Pose obstacle_pose(const Obstacle& obstacle, double frame) {
   return pose;
 }
 
+LevelSetBounds bounds_in_own_space(const Shot& shot, const Obstacle& obstacle, double begin,
+                                   double end) {
+  LevelSetBounds bounds;
+  for (const Axis axis : shot.domain.axis)
+    if (axis == Axis::periodic) return bounds;
+  const V3d size = shot.domain.max - shot.domain.min;
+  const double margin =
+      shot.cloth.empty() ? 2 * support_ratio(shot) * shot.fluid.spacing : size.length();
+  for (int k = 0; k < 3; ++k) bounds.low[k] = 1e30, bounds.high[k] = -1e30;
+  const bool moves = obstacle.position.keys.size() > 1 || obstacle.rotation_deg.keys.size() > 1;
+  constexpr double part = 0.25;  // frames
+  V3d before[8];
+  double travel = 0;  // m, farthest of a corner from one look to the next
+  const int looks = moves ? int(std::min(std::ceil((end - begin) / part), 1e5)) : 0;
+  for (int look = 0; look <= looks; ++look) {
+    const Pose pose =
+        obstacle_pose(obstacle, begin + (looks > 0 ? (end - begin) * look / looks : 0));
+    for (int c = 0; c < 8; ++c) {
+      V3d corner;
+      for (int k = 0; k < 3; ++k)
+        corner[k] = c >> k & 1 ? shot.domain.max[k] + margin : shot.domain.min[k] - margin;
+      const V3d own = pose.to_own(corner);
+      for (int k = 0; k < 3; ++k) {
+        bounds.low[k] = std::min(bounds.low[k], own[k]);
+        bounds.high[k] = std::max(bounds.high[k], own[k]);
+      }
+      if (look > 0) travel = std::max(travel, (own - before[c]).length());
+      before[c] = own;
+    }
+  }
+  for (int k = 0; k < 3; ++k) bounds.low[k] -= travel, bounds.high[k] += travel;
+  return bounds;
+}
+
 bool is_sequence(const std::filesystem::path& mesh_file) {
-  return frame_field(mesh_file.filename().string()).at != std::string::npos;
+  std::error_code code;
+  return frame_field(mesh_file.filename().string()).at != std::string::npos &&
+         !std::filesystem::exists(mesh_file, code);
 }
 
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame) {
@@ -179,20 +246,22 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
   return pattern.parent_path() / name;
 }
 
-TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale) {
-  TriangleMesh mesh = read_mesh(file);
-  check_closed(mesh, file);
-  orient_outward(mesh);
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
+  TriangleMesh mesh = read_mesh(file, corners);
+  close_gaps(mesh, file);
+  orient_shells(mesh);
+  turn_normals(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
   return mesh;
 }
 
-TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
+                                CornerData corners) {
   const bool sequence = is_sequence(obstacle.mesh_file);
   const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
-  return read_closed_mesh(file, obstacle.scale);
+  return read_closed_mesh(file, obstacle.scale, corners);
 }
 
 TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {
@@ -215,7 +284,8 @@ TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int fr
     const V3d own(mesh.position[k]);
     V3d velocity = (later.to_world(own) - earlier.to_world(own)) / (2 * step);  // m a frame
     if (deforms && between > 0) {
-      const V3d change = V3d(after.position[k] - before.position[k]) / between;
+      const size_t point = mesh.point.empty() ? k : mesh.point[k];
+      const V3d change = V3d(after.position[point] - before.position[point]) / between;
       velocity += pose.to_world(change) - pose.position;
     }
     moves |= velocity.length2() > 0;
@@ -230,7 +300,13 @@ TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int fr
 
 void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
                          const Obstacle& obstacle) {
-  if (mesh.triangle == other.triangle && mesh.position.size() == other.position.size()) return;
+  // Where vertices are split depends on a frame's normals; points do not.
+  const std::vector<uint32_t> point = points_of(mesh), other_point = points_of(other);
+  bool same = mesh.triangle.size() == other.triangle.size();
+  for (size_t k = 0; same && k < mesh.triangle.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      same &= point[mesh.triangle[k][c]] == other_point[other.triangle[k][c]];
+  if (same) return;
   throw Error(fmt::format(
       "obstacle \"{}\": the files of {} do not have the same triangles in every frame, so that "
       "there is nothing to interpolate. Export the sequence with constant topology",

@@ -3,7 +3,8 @@
 
 #include <filesystem>
 
-#include "pipeline/contract/frames.h"
+#include "pipeline/contract/level_set.h"
+#include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/shot.h"
 
 namespace drench {
@@ -25,19 +26,28 @@ struct Pose {
 /// @param frame  film frame, may be fractional. A plane's own y axis is its normal.
 Pose obstacle_pose(const Obstacle& obstacle, double frame);
 
-/// Whether the name holds %d or %04d: one file for every frame.
+/// The part of an obstacle's own space that the domain, and what of the shot may reach beyond it,
+/// takes up from film frame `begin` to `end`: two supports around it, or as far again as it is wide
+/// where there is cloth. Everything where an axis is periodic.
+LevelSetBounds bounds_in_own_space(const Shot& shot, const Obstacle& obstacle, double begin,
+                                   double end);
+
+/// Whether the name holds %d or %04d, one file for every frame, and is not that of a file itself.
 bool is_sequence(const std::filesystem::path& mesh_file);
 /// The file of a film frame. @throws std::logic_error if the name is no sequence.
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame);
 
-/// A closed mesh in its own coordinates times `scale`, m, turned outward.
+/// A closed mesh in its own coordinates times `scale`, m, turned away from what is solid: see
+/// shells.h. Gaps of less than weld_share of its diagonal are closed with a warning.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
-TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale);
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
+                              CornerData corners = CornerData::none);
 
 /// The mesh of a frame in its own coordinates, m, from the file or the file of a sequence; frames
 /// beyond the shot's are those of its ends.
 /// @throws Error if the file cannot be read or is not closed.
-TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame);
+TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
+                                CornerData corners = CornerData::none);
 
 /// @throws Error if two meshes of a sequence differ in more than where their vertices are.
 void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,

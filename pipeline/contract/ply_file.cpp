@@ -7,11 +7,13 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/mesh_builder.h"
+#include "pipeline/contract/mesh_text.h"
 
 namespace drench {
 
@@ -40,7 +42,7 @@ struct Element {
 };
 
 struct PlyHeader {
-  bool ascii = false;
+  bool ascii = false, big_endian = false;
   std::vector<Element> elements;
   size_t body = 0;  // offset of the first byte after the header
 };
@@ -54,13 +56,21 @@ constexpr RealColumn real_columns[] = {{"source", &TriangleMesh::source},
                                        {"age", &TriangleMesh::age},
                                        {"wetness", &TriangleMesh::wetness}};
 
+/// How programs call texture coordinates of vertices.
+constexpr std::array<std::string_view, 2> uv_names[] = {
+    {"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}};
+
 class PlyReader {
  public:
-  PlyReader(const fs::path& path, std::string_view text) : path_(path), text_(text) {}
+  PlyReader(const fs::path& path, std::string_view text, CornerData corners)
+      : path_(path), text_(text), corners_(corners), builder_(path, corners, [&path](uint64_t row) {
+          return fmt::format("{}: face {}", path.string(), row);
+        }) {}
 
   TriangleMesh read() {
     const PlyHeader header = read_header();
     ascii_ = header.ascii;
+    swapped_ = header.big_endian;
     rest_ = text_.substr(header.body);
     bool vertices = false;
     bool faces = false;
@@ -80,15 +90,22 @@ class PlyReader {
     }
     if (!vertices || !faces) fail("has no vertex or no face element; a triangle mesh is expected");
     check_end();
-    check_indices();
-    return std::move(mesh_);
+    if (number_.commas() > 0) {
+      log_warning("mesh", fmt::format("{}: {} numbers have a decimal comma, which was taken for a "
+                                      "point; export with points",
+                                      path_.string(), number_.commas()));
+    }
+    TriangleMesh mesh = builder_.finish();
+    keep_contact(mesh);
+    keep_points(mesh);
+    return mesh;
   }
 
  private:
   // Bytes that belong to nothing: a count in the header is wrong, or the file is damaged.
   void check_end() const {
-    const bool blank = rest_.find_first_not_of(" \t\r\n") == std::string_view::npos;
-    if (!rest_.empty() && !(ascii_ && blank)) fail("has more data than its header says");
+    if (rest_.find_first_not_of(" \t\r\n") != std::string_view::npos)
+      fail("has more data than its header says");
   }
 
   [[noreturn]] void fail(const std::string& why) const {
@@ -123,11 +140,14 @@ class PlyReader {
 
   void read_format(const std::vector<std::string_view>& words, PlyHeader& header) const {
     if (words.size() < 2) fail("has a format line without a format");
-    if (words[1] != "ascii" && words[1] != "binary_little_endian") {
-      fail(fmt::format("has format '{}'; ascii and binary_little_endian can be read",
-                       words[1].substr(0, 40)));
-    }
     header.ascii = words[1] == "ascii";
+    header.big_endian = words[1] == "binary_big_endian";
+    if (!header.ascii && !header.big_endian && words[1] != "binary_little_endian") {
+      fail(
+          fmt::format("has format '{}'; ascii, binary_little_endian and binary_big_endian can be "
+                      "read",
+                      words[1].substr(0, 40)));
+    }
   }
 
   Element element_of(const std::vector<std::string_view>& words) const {
@@ -210,14 +230,9 @@ class PlyReader {
 
   double next_value(Type type) {
     if (ascii_) {
-      std::string_view word = next_word();
-      if (word.starts_with('+')) word.remove_prefix(1);
-      double value = 0;
-      const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), value);
-      if (code != std::errc() || end != word.data() + word.size()) {
-        fail(fmt::format("holds '{}' where a number is expected", word.substr(0, 40)));
-      }
-      return value;
+      const std::string_view word = next_word();
+      if (const std::optional<double> value = number_.real(word)) return *value;
+      fail(fmt::format("holds '{}' where a number is expected", word.substr(0, 40)));
     }
     if (rest_.size() < size_of(type)) fail("ends before its last value: cut off or damaged");
     const char* const data = rest_.data();
@@ -244,10 +259,11 @@ class PlyReader {
   }
 
   template <class T>
-  static double load(const char* data) {
-    T value;
-    std::memcpy(&value, data, sizeof value);
-    return double(value);
+  double load(const char* data) const {
+    std::array<char, sizeof(T)> bytes;
+    std::copy_n(data, sizeof(T), bytes.begin());
+    if (swapped_) std::reverse(bytes.begin(), bytes.end());
+    return double(std::bit_cast<T>(bytes));
   }
 
   uint64_t next_count(Type type) {
@@ -273,8 +289,10 @@ class PlyReader {
       if (name == n[i]) return slot(mesh_.normal, i);
       if (name == r[i]) return slot(mesh_.rest_position, i);
     }
-    if (name == "u" || name == "s") return slot(mesh_.uv, 0);
-    if (name == "v" || name == "t") return slot(mesh_.uv, 1);
+    for (const auto& [u, v] : uv_names) {
+      if (name == u) return slot(mesh_.uv, 0);
+      if (name == v) return slot(mesh_.uv, 1);
+    }
     for (const auto& [real, values] : real_columns)
       if (name == real) return slot(mesh_.*values, 0);
     return nullptr;
@@ -283,7 +301,9 @@ class PlyReader {
   static size_t stride_of(std::string_view name) {
     for (const auto& [real, values] : real_columns)
       if (name == real) return 1;
-    return name == "u" || name == "v" || name == "s" || name == "t" ? 2 : 3;
+    for (const auto& [u, v] : uv_names)
+      if (name == u || name == v) return 2;
+    return 3;
   }
 
   // A group counts as present only when every component was named.
@@ -306,7 +326,9 @@ class PlyReader {
     if (!has3("vx", "vy", "vz")) mesh_.velocity.assign(element.count, Imath::V3f(0));
     if (!has3("nx", "ny", "nz")) mesh_.normal.clear();
     if (!has3("rest_x", "rest_y", "rest_z")) mesh_.rest_position.clear();
-    if (!(has("u") && has("v")) && !(has("s") && has("t"))) mesh_.uv.clear();
+    if (std::none_of(std::begin(uv_names), std::end(uv_names),
+                     [&](const auto& names) { return has(names[0]) && has(names[1]); }))
+      mesh_.uv.clear();
   }
 
   void read_vertices(const Element& element) {
@@ -326,12 +348,9 @@ class PlyReader {
           skip_list(p);
           continue;
         }
-        const float value = float(next_value(p.type));
-        if (slot[i] == nullptr) continue;
-        if (!std::isfinite(value)) {
-          fail(fmt::format("has a {} of vertex {} that is not finite", p.name, row));
-        }
-        slot[i][row * stride_of(p.name)] = value;
+        const double value = next_value(p.type);
+        if (p.name == "point") point_.push_back(value);
+        if (slot[i] != nullptr) slot[i][row * stride_of(p.name)] = float(value);
       }
     }
     check_groups(element);
@@ -344,36 +363,59 @@ class PlyReader {
     if (std::count_if(element.properties.begin(), element.properties.end(), is_index_list) != 1) {
       fail("has faces without a list vertex_indices");
     }
-    std::vector<uint8_t> contact;
+    std::vector<MeshBuilder::Corner> corner;
     for (uint64_t row = 0; row < element.count; ++row) {
+      size_t uv = 0;  // numbers that were read of the face's texture coordinates
       for (const Property& p : element.properties) {
         if (is_index_list(p)) {
-          read_polygon(p, row);
+          corner.assign(next_count(*p.count_type), {});
+          for (MeshBuilder::Corner& c : corner) c.vertex = next_index(p.type, row);
+        } else if (p.count_type && p.name == "texcoord" && corners_ != CornerData::none) {
+          uv = read_texcoord(p);
         } else if (p.count_type) {
           skip_list(p);
         } else {
           const double value = next_value(p.type);
-          if (p.name == "contact") contact.push_back(value != 0);
+          if (p.name == "contact") contact_.push_back(value != 0);
         }
       }
+      if (uv > 0) name_texcoord(corner, uv, row);
+      builder_.add_face(corner, row);
     }
-    keep_contact(std::move(contact));
+  }
+
+  /// u, v of every corner; none where the list is empty.
+  size_t read_texcoord(const Property& p) {
+    const uint64_t n = next_count(*p.count_type);
+    for (uint64_t k = 0; k < n; ++k) {
+      const auto value = float(next_value(p.type));
+      if (k % 2 == 0)
+        builder_.uv.emplace_back(value, 0.f);
+      else
+        builder_.uv.back().y = value;
+    }
+    return n;
+  }
+
+  void name_texcoord(std::vector<MeshBuilder::Corner>& corner, size_t n, uint64_t row) const {
+    if (n != 2 * corner.size())
+      fail(fmt::format("has a face {} of {} vertices with {} numbers of texcoord, {} are expected",
+                       row, corner.size(), n, 2 * corner.size()));
+    for (size_t k = 0; k < corner.size(); ++k)
+      corner[k].uv = uint32_t(builder_.uv.size() - corner.size() + k);
   }
 
   // Of polygons that were cut into triangles nobody knows which lies where.
-  void keep_contact(std::vector<uint8_t> contact) {
-    if (contact.size() == mesh_.triangle.size()) mesh_.contact = std::move(contact);
+  void keep_contact(TriangleMesh& mesh) {
+    if (contact_.size() == mesh.triangle.size()) mesh.contact = std::move(contact_);
   }
 
-  void read_polygon(const Property& p, uint64_t row) {
-    const uint64_t n = next_count(*p.count_type);
-    if (n < 3) fail(fmt::format("has a face {} of {} vertices", row, n));
-    const uint32_t first = next_index(p.type, row);
-    uint32_t previous = next_index(p.type, row);
-    for (uint64_t i = 2; i < n; ++i) {
-      const uint32_t index = next_index(p.type, row);
-      mesh_.triangle.emplace_back(first, previous, index);
-      previous = index;
+  void keep_points(TriangleMesh& mesh) const {
+    if (point_.empty() || point_.size() != mesh.position.size()) return;
+    for (const double point : point_) {
+      const bool is_vertex = point >= 0 && point < double(point_.size());
+      if (!is_vertex) return mesh.point.clear();  // of a program that means something else
+      mesh.point.push_back(uint32_t(point));
     }
   }
 
@@ -402,26 +444,21 @@ class PlyReader {
     }
   }
 
-  void check_indices() const {
-    for (size_t i = 0; i < mesh_.triangle.size(); ++i) {
-      const auto& t = mesh_.triangle[i];
-      if (std::max({t.x, t.y, t.z}) >= mesh_.position.size()) {
-        fail(fmt::format("has a triangle {} with index {} but only {} vertices", i,
-                         std::max({t.x, t.y, t.z}), mesh_.position.size()));
-      }
-    }
-  }
-
   const fs::path& path_;
   std::string_view text_, rest_;
-  bool ascii_ = false;
-  TriangleMesh mesh_;
+  bool ascii_ = false, swapped_ = false;
+  NumberReader number_;
+  CornerData corners_;
+  MeshBuilder builder_;
+  TriangleMesh& mesh_ = builder_.mesh;
+  std::vector<uint8_t> contact_;
+  std::vector<double> point_;
 };
 
 }  // namespace
 
-TriangleMesh read_ply(const fs::path& path, std::string_view text) {
-  return PlyReader(path, text).read();
+TriangleMesh read_ply(const fs::path& path, std::string_view text, CornerData corners) {
+  return PlyReader(path, text, corners).read();
 }
 
 }  // namespace drench

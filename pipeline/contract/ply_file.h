@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <string_view>
 
-#include "pipeline/contract/frames.h"
+#include "pipeline/contract/mesh_file.h"
 
 namespace drench {
 
-/// ASCII or binary little-endian; elements and properties that nobody reads are skipped.
+/// ASCII or binary; elements and properties that nobody reads are skipped. Texture coordinates stand
+/// at vertices (u v, s t, texture_u texture_v) or, as wanted, at the corners of faces (texcoord).
 /// @throws Error naming the file and the reason.
-TriangleMesh read_ply(const std::filesystem::path& path, std::string_view text);
+TriangleMesh read_ply(const std::filesystem::path& path, std::string_view text,
+                      CornerData corners = CornerData::none);
 
 }  // namespace drench

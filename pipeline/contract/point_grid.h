@@ -78,12 +78,14 @@ T meta_value(const openvdb::GridBase& grid, const char* name) {
   return meta->value();
 }
 
-/// The "count" that the grid says it holds. @throws std::runtime_error if it holds another.
+/// The "count" that the grid says it holds. @throws std::runtime_error if it holds another, or a
+/// leaf's columns are not as long as its voxels say.
 inline size_t checked_count(const points::PointDataGrid& grid) {
   const int64_t count = meta_value<int64_t>(grid, "count");
   if (count < 0 || openvdb::Index64(count) != points::pointCount(grid.tree())) {
     throw std::runtime_error("it holds another number of particles than it says");
   }
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) leaf->validateOffsets();
   return size_t(count);
 }
 
@@ -120,7 +122,13 @@ auto read_points(const std::filesystem::path& path, const char* what, const char
                  FrameOf frame_of) {
   const std::vector<std::byte> bytes = read_file(path);
   try {
-    return frame_of(vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+    const auto grid = vdb_grid({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    // Columns of one value take no room in a file, but positions do.
+    constexpr int64_t most_a_byte = 64;
+    const auto count = grid->getMetadata<openvdb::Int64Metadata>("count");
+    if (count && count->value() / most_a_byte > int64_t(bytes.size()))
+      throw std::runtime_error("it says to hold more particles than fit into it");
+    return frame_of(grid);
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& problem) {

@@ -21,13 +21,17 @@ class ProbeChecker {
 
   void check() const {
     const bool of_fluid = probe_.type == ProbeType::height || probe_.type == ProbeType::pressure ||
-                          probe_.type == ProbeType::force || probe_.type == ProbeType::volume;
+                          probe_.type == ProbeType::force || probe_.type == ProbeType::volume ||
+                          probe_.type == ProbeType::velocity || probe_.type == ProbeType::front;
     if (of_fluid && !shot_.fluid.present()) {
       fail("type", fmt::format("{} \"{}\" measures fluid, but the shot has none. Add a "
                                "[[fluid.box]] or remove the probe",
                                path_, probe_.name));
     }
-    if (probe_.type == ProbeType::height) check_inside(V3d(0), {0, 2});
+    if (!probe_.on.empty()) check_carrier();
+    if (probe_.type == ProbeType::velocity && probe_.on.empty()) check_inside(V3d(0), {0, 1, 2});
+    if (probe_.type == ProbeType::front) check_direction("direction", probe_.direction);
+    if (probe_.type == ProbeType::height && probe_.on.empty()) check_inside(V3d(0), {0, 2});
     if (probe_.type == ProbeType::pressure) check_disc();
     if (probe_.type == ProbeType::force) check_target();
     if (probe_.type == ProbeType::tip) check_tip();
@@ -48,6 +52,13 @@ class ProbeChecker {
       // Its images are seen across a seam, but each particle once.
       const bool periodic = domain.axis[size_t(k)] == Axis::periodic;
       if (periodic && 2 * reach[k] <= domain.max[k] - domain.min[k]) continue;
+      if (periodic && 2 * reach[k] > domain.max[k] - domain.min[k]) {
+        fail("radius",
+             fmt::format("{} \"{}\" is {:.6g} m wide in {}, more than the period of {:.6g} m: it "
+                         "would see its fluid twice. Use a radius of at most {:.6g} m",
+                         path_, probe_.name, 2 * reach[k], "xyz"[k], domain.max[k] - domain.min[k],
+                         0.5 * (domain.max[k] - domain.min[k])));
+      }
       const double low = probe_.position[k] - reach[k], high = probe_.position[k] + reach[k];
       if (low >= domain.min[k] - slack && high <= domain.max[k] + slack) continue;
       fail("position",
@@ -57,12 +68,26 @@ class ProbeChecker {
     }
   }
 
+  void check_direction(const char* key, const V3d& direction) const {
+    if (direction.length() > 1e-9) return;
+    fail(key, fmt::format("{}.{} has no direction; give it a length other than 0, for example "
+                          "[0, 1, 0]",
+                          path_, key));
+  }
+
+  void check_carrier() const {
+    if (obstacle_named(shot_, probe_.on)) return;
+    std::vector<std::string> names;
+    for (const Obstacle& obstacle : shot_.obstacle) names.push_back(obstacle.name);
+    fail("on", fmt::format("{}.on is \"{}\", which is not an obstacle; the obstacles of this shot: "
+                           "{}",
+                           path_, probe_.on,
+                           names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  }
+
   void check_disc() const {
-    if (!(probe_.normal.length() > 1e-9)) {
-      fail("normal", fmt::format("{}.normal has no direction; give it a length other than 0, for "
-                                 "example [0, 1, 0]",
-                                 path_));
-    }
+    check_direction("normal", probe_.normal);
+    if (!probe_.on.empty()) return;
     const V3d n = probe_.normal.normalized();
     V3d reach;
     for (int k = 0; k < 3; ++k)

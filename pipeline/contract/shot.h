@@ -156,6 +156,7 @@ struct Cloth {
   V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
   V2i cells{64, 64};
   std::filesystem::path mesh_file;  // PLY or OBJ triangles, absolute after reading
+  double weld = -1;                 // m: vertices on free edges closer than this are one; < 0: a share
   std::vector<ClothPin> pin;
   V3d velocity{0, 0, 0};            // m/s at the start
   double areal_density = 0.2;       // kg/m^2
@@ -221,15 +222,19 @@ struct Coupling {
   CouplingScheme scheme = CouplingScheme::exact;
 };
 
-enum class ProbeType { height, pressure, force, tip, energy, volume };
+enum class ProbeType { height, pressure, force, tip, energy, volume, velocity, front };
 
 /// A measurement of every simulation step; sim/probe_series.h says what the columns mean.
 struct Probe {
   ProbeType type = ProbeType::height;
   std::string name = "probe";    // part of its file's name
-  V3d position{0, 0, 0};         // m; height: the line's x and z, pressure: centre, tip: rest place
+  // m; height: the line's x and z, pressure, velocity: centre, tip: rest place
+  V3d position{0, 0, 0};
   V3d normal{0, 1, 0};           // pressure: of the disc
-  double radius = 0.01;          // pressure: of the disc, m
+  double radius = 0.01;          // pressure: of the disc, velocity: of the ball, m
+  V3d direction{1, 0, 0};        // front: along which fluid is farthest
+  std::string on;                // obstacle whose own coordinates position and normal are; or none
+  double interval = 0;           // s between rows; 0: every step
   double window = 1e-3;          // pressure, force: the mean columns are over this time, s
   std::string target = "y_low";  // force: a wall, x_low to z_high, an obstacle or a sheet
   std::string cloth = "cloth";   // tip: name of the sheet
@@ -289,7 +294,7 @@ struct Light {
   double radius = 0.1;             // sphere, disk, m
   V3d direction{0, -1, 0};         // sun, disk: the way its light travels
   double angle_deg = 0.53;         // sun: apparent diameter
-  std::filesystem::path map;       // environment: latitude-longitude EXR; empty: constant
+  std::filesystem::path map;       // environment: latitude-longitude picture; empty: constant
   double rotation_deg = 0;         // environment, about Y
   bool split_suns = true;          // environment: small bright regions of its map become suns
   V3f horizon{1, 1, 1};  // environment without a map: radiance at the horizon / at the zenith
@@ -315,8 +320,8 @@ struct Material {
   double ior = 1.333;                 // dielectric, coat, what wets cloth
   int priority = 0;                   // dielectric: of bodies in one place the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
-  std::filesystem::path texture;      // PNG, JPEG or EXR, multiplies reflectance
-  std::filesystem::path normal_map;   // PNG, JPEG or EXR, tangent space, x along u, y along v
+  std::filesystem::path texture;      // a picture, multiplies reflectance
+  std::filesystem::path normal_map;   // a picture, tangent space, x along u, y along v
   double texture_size = 1;            // edge that both pictures cover, in uv; on the ground m
   bool checker = false;               // diffuse, coated: built-in checker of checker_size
   double checker_size = 0.1;          // m
@@ -387,7 +392,10 @@ struct Shot {
   Timeline timeline;
   double preroll = 0;  // s simulated before the first frame
   uint32_t seed = 1;
-  V3d gravity{0, -9.81, 0};  // m/s^2
+  Animated<V3d> gravity{V3d(0, -9.81, 0)};  // m/s^2
+  // The domain turns about an axis; what moves is seen from it. Of keys, linear between them.
+  Animated<double> frame_rotation_deg{0};
+  V3d frame_axis{0, 1, 0}, frame_center{0, 0, 0};  // any length but 0; m, a point of the axis
   double time_step = 0;      // s; 0: adaptive. Fixed steps above the stable one are refused
   Domain domain;
   Fluid fluid;

@@ -5,7 +5,9 @@
 
 #include "pipeline/contract/check_base.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/light_check.h"
 #include "pipeline/contract/picture_check.h"
+#include "pipeline/contract/printable.h"
 #include "pipeline/contract/probe_check.h"
 #include "pipeline/contract/seam_check.h"
 #include "pipeline/contract/source_check.h"
@@ -28,6 +30,7 @@ class Checker : CheckBase {
   void check() const {
     check_time();
     check_domain();
+    check_frame();
     check_wall_velocity();
     check_fluid();
     for (size_t i = 0; i < shot_.cloth.size(); ++i) check_cloth(i);
@@ -43,6 +46,7 @@ class Checker : CheckBase {
     }
     check_particles();
     check_picture(shot_, sources_);
+    warn_of_useless_lights(shot_, sources_);
   }
 
  private:
@@ -91,6 +95,22 @@ class Checker : CheckBase {
                  shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i], cells, most_cells));
       }
       if (domain.axis[size_t(i)] == Axis::periodic) check_periodic(i);
+    }
+  }
+
+  /// A frame that turns has an axis and repeats itself only along it.
+  void check_frame() const {
+    const auto& angle = shot_.frame_rotation_deg.keys;
+    if (angle.size() < 2 && angle.front().second == 0) return;
+    check_not_zero("shot.frame_axis", shot_.frame_axis);
+    const V3d along = shot_.frame_axis.normalized();
+    for (int k = 0; k < 3; ++k) {
+      if (shot_.domain.axis[size_t(k)] != Axis::periodic || std::abs(along[k]) > 1 - 1e-6) continue;
+      fail("shot.frame_rotation_deg",
+           fmt::format("shot.frame_rotation_deg turns the domain about {}, but domain.{} is "
+                       "\"periodic\": what turns is not the same a period on. Use \"walls\" or "
+                       "\"open\", or an axis along {}",
+                       text_of(shot_.frame_axis), "xyz"[k], "xyz"[k]));
     }
   }
 
@@ -406,6 +426,8 @@ class Checker : CheckBase {
   void check_obstacle_files(const Obstacle& obstacle, const std::string& key) const {
     if (obstacle.mesh_file.empty())
       fail(key, fmt::format("{} is missing; add mesh = \"file.ply\"", key));
+    if (!is_utf8(obstacle.mesh_file.string()))
+      fail(key, fmt::format("{}: its folder's name is not UTF-8; rename the folder", key));
     if (!is_sequence(obstacle.mesh_file)) return;
     for (int frame = shot_.timeline.first; frame <= shot_.timeline.last; ++frame) {
       const std::filesystem::path file = sequence_file(obstacle.mesh_file, frame);

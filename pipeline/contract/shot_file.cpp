@@ -8,6 +8,8 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/period_fit.h"
 #include "pipeline/contract/shot_check.h"
 #include "pipeline/contract/shot_table.h"
 #include "pipeline/contract/shot_value.h"
@@ -451,6 +453,20 @@ void resolve_pins(Draft& draft) {
   }
 }
 
+/// What a shot makes goes to out/NAME/QUALITY and is named after it.
+void check_file_names(const Shot& shot, const std::string& label, const std::string& quality) {
+  if (const char* const why = shot_table::file_name_problem(shot.name)) {
+    throw Error(
+        fmt::format("{}: the shot is named '{}' after its file: {}. Rename the file or set "
+                    "shot.name",
+                    label, shot.name, why));
+  }
+  if (const char* const why = shot_table::file_name_problem(quality)) {
+    throw Error(fmt::format("{}: the quality '{}' cannot be made: {}. Rename [quality.{}]", label,
+                            quality, why, quality));
+  }
+}
+
 }  // namespace
 
 Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions& options) {
@@ -463,9 +479,15 @@ Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions
   draft.shot.name = file.stem().string();
   draft.shot.material = shot_table::built_in_materials();
   Reader(draft, Mode::write, label, folder).read_top(top);
+  const double spacing = draft.shot.fluid.spacing;
   apply_quality(draft, top, label, folder, options.quality);
   for (const std::string& change : options.set) apply_override(draft, change, fs::current_path());
+  if (draft.shot.fluid.spacing != spacing && draft.shot.fluid.spacing > 0) {
+    for (const std::string& text : fit_periods(draft.shot))
+      log_warning("shot", label + ": " + text);
+  }
   resolve_pins(draft);
+  check_file_names(draft.shot, label, options.quality);
   check_shot(draft.shot, draft.sources);
   return draft.shot;
 }

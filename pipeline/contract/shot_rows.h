@@ -97,6 +97,7 @@ inline constexpr Limits none{};
 inline constexpr Limits share{0, 1};
 inline constexpr Limits place{-1e5, 1e5};      // m: beyond, float steps are wider than a millimetre
 inline constexpr Limits speed{-1000, 1000};    // m/s
+inline constexpr Limits turns{-360000, 360000};  // deg
 inline constexpr Limits seeds{0, 4294967295};  // uint32_t
 inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits of ObstacleType
 

@@ -69,7 +69,8 @@ std::vector<Parameter> light_rows() {
           .only(sun | disk),
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
           .only(sun),
-      row<&Light::map>("light", "map", "", none, render, "latitude-longitude EXR; none: constant")
+      row<&Light::map>("light", "map", "", none, render,
+                       "latitude-longitude EXR or HDR; none: constant")
           .only(environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
           .only(environment),
@@ -145,10 +146,10 @@ std::vector<Parameter> material_rows() {
           .as(Kind::spectrum)
           .only(dielectric),
       row<&Material::texture>("material", "texture", "", none, render,
-                              "PNG, JPEG or EXR that multiplies reflectance")
+                              "EXR, HDR, PNG, JPEG or TIFF that multiplies reflectance")
           .only(cloth_type | diffuse | metal | coated),
       row<&Material::normal_map>("material", "normal_map", "", none, render,
-                                 "PNG, JPEG or EXR of normals, linear: x along u, y along v, on "
+                                 "the same of normals, never converted: x along u, y along v, on "
                                  "meshes with uv and the ground"),
       row<&Material::texture_size>("material", "texture_size", "", {1e-6, 1e6}, render,
                                    "edge that texture and normal_map cover, in uv; on the ground "

@@ -5,7 +5,6 @@ namespace drench::shot_table {
 namespace {
 
 constexpr unsigned disc = 1, rectangle = 2, body = 4;  // bits of EmitterType
-constexpr Limits turns{-360000, 360000};               // deg
 
 std::vector<Parameter> emitter_rows() {
   return {

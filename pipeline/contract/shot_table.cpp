@@ -40,7 +40,8 @@ Row grid_pins_row() {
 constexpr const char* contact_angle =
     "at which the fluid's surface meets it, measured within the fluid, where there is "
     "fluid.surface_tension: below 90 it wets, above it beads";
-constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8;  // bits of ProbeType
+// bits of ProbeType
+constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8, velocity = 64, front = 128;
 
 std::vector<Parameter> shot_rows() {
   return {
@@ -57,8 +58,21 @@ std::vector<Parameter> shot_rows() {
                           "time simulated before the first frame"),
       row<&Shot::seed>("shot", "seed", "", seeds, simulate,
                        "of everything drawn by chance in the simulation"),
-      row<&Shot::gravity>("shot", "gravity", "m/s^2", speed, simulate,
-                          "acceleration of everything"),
+      row<&Shot::gravity>(
+          "shot", "gravity", "m/s^2", speed, simulate,
+          "acceleration of everything; may be animated, as in a tank that is shaken: less the "
+          "tank's own acceleration"),
+      row<&Shot::frame_rotation_deg>(
+          "shot", "frame_rotation_deg", "deg", turns, simulate,
+          "angle by which the domain with all in it is turned about frame_axis: fluid and sheets "
+          "feel the centrifugal, Coriolis and Euler forces, and gravity, which stays the world's, "
+          "turns in it. Positions, velocities and wind are relative to the domain. It turns evenly "
+          "between keys, not at all before and after them; at the start all moves with it; may be "
+          "animated"),
+      row<&Shot::frame_axis>("shot", "frame_axis", "", place, simulate,
+                             "about which the domain turns, right-handed; any length but 0"),
+      row<&Shot::frame_center>("shot", "frame_center", "m", place, simulate,
+                               "a point of that axis"),
       row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
                             "fixed step; 0 chooses the largest stable one, step by step"),
 
@@ -181,6 +195,10 @@ std::vector<Parameter> cloth_rows() {
           "grid: [along u, along v]; vertex j (cells_u + 1) + i stands at i along u"),
       row<&Cloth::mesh_file>("cloth", "mesh", "", none, simulate,
                              "PLY or OBJ file of triangles instead of a grid"),
+      row<&Cloth::weld>("cloth", "weld", "m", {-1, 1}, simulate,
+                        "mesh: vertices on free edges within this distance of one another are "
+                        "sewn, as exporters split them at seams of the texture; 0 keeps them "
+                        "apart, -1 is 1e-5 of the mesh's diagonal"),
       grid_pins_row(),
       row<&Cloth::velocity>("cloth", "velocity", "m/s", speed, simulate, "at the start"),
       row<&Cloth::areal_density>("cloth", "areal_density", "kg/m^2", {1e-4, 1e4}, simulate,
@@ -274,7 +292,7 @@ std::vector<Parameter> obstacle_rows() {
 std::vector<Parameter> probe_rows() {
   return {
       row<&Probe::type>("probe", "type", "", none, simulate, "what is measured on every step")
-          .one_of({"height", "pressure", "force", "tip", "energy", "volume"})
+          .one_of({"height", "pressure", "force", "tip", "energy", "volume", "velocity", "front"})
           .needed()
           .identity(),
       row<&Probe::name>("probe", "name", "", none, simulate,
@@ -283,15 +301,27 @@ std::vector<Parameter> probe_rows() {
           .identity(),
       row<&Probe::position>("probe", "position", "m", place, simulate,
                             "height: the vertical line through it; pressure: centre of the disc; "
-                            "tip: the vertex nearest to it at rest")
-          .only(height | pressure | tip),
+                            "velocity: centre of the ball; tip: the vertex nearest to it at rest")
+          .only(height | pressure | tip | velocity),
       row<&Probe::normal>("probe", "normal", "", place, simulate,
-                          "of the disc; any length but 0. A disc within half a spacing of a "
-                          "domain wall measures the wall")
+                          "of the disc; any length but 0. A disc within half a spacing of a wall "
+                          "of the domain, an obstacle or a sheet, and along it, measures what is "
+                          "pushed there; of a sheet the side that it points to")
           .only(pressure),
       row<&Probe::radius>("probe", "radius", "m", {1e-6, 1e4}, simulate,
-                          "of the disc; below a spacing it counts as one")
-          .only(pressure),
+                          "of the disc or ball; below a spacing it counts as one")
+          .only(pressure | velocity),
+      row<&Probe::direction>("probe", "direction", "", place, simulate,
+                             "along which the farthest fluid is looked for; any length but 0")
+          .only(front),
+      row<&Probe::on>("probe", "on", "", none, simulate,
+                      "an obstacle by name: position and normal are its own coordinates, in m from "
+                      "its position along its turned axes, and move with it; a plane's y axis is "
+                      "its normal")
+          .as(Kind::label)
+          .only(height | pressure | velocity),
+      row<&Probe::interval>("probe", "interval", "s", {0, 1e6}, simulate,
+                            "between rows, at ends of steps; 0: a row for every step"),
       row<&Probe::window>("probe", "window", "s", {0, 1}, simulate,
                           "the mean columns are means over so much time before each row")
           .only(pressure | force),

@@ -9,13 +9,17 @@
 
 #include "pipeline/contract/colour.h"
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/named_file.h"
 #include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/printable.h"
 
 namespace drench::shot_table {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr const char* not_utf8 = "its folder's name is not UTF-8; rename the folder";
 
 std::string number_text(double value) {
   std::string text = fmt::format("{}", value);
@@ -184,11 +188,12 @@ class ValueReader {
   fs::path path(const toml::node& node) const {
     const std::string word = text(node);
     if (word.empty() || word.find('\0') != std::string::npos) fail("a path to a file is expected");
-    const fs::path file = fs::absolute(site_.folder / fs::path(word)).lexically_normal();
+    const fs::path file = named_file(site_.folder, word);
+    if (!is_utf8(file.string())) fail(not_utf8);
     std::error_code code;
     if (!fs::exists(file, code)) {
-      fail(fmt::format("the file {} does not exist; paths are relative to the shot's folder",
-                       file.string()));
+      fail(fmt::format("the file {} does not exist; paths are relative to the shot's folder{}",
+                       file.string(), hint_on_name(word)));
     }
     if (!fs::is_regular_file(file, code)) fail(file.string() + " is not a regular file");
     return file;
@@ -196,9 +201,8 @@ class ValueReader {
 
   /// A path, or the pattern of a sequence, whose files are looked for once the frames are known.
   fs::path mesh_files(const toml::node& node) const {
-    const fs::path word = text(node);
-    if (!is_sequence(word)) return path(node);
-    return fs::absolute(site_.folder / word).lexically_normal();
+    const fs::path file = named_file(site_.folder, text(node));
+    return is_sequence(file) ? file : path(node);
   }
 
   V3f colour(const toml::node& node) const {
@@ -445,7 +449,8 @@ std::string printable(std::string text) {
 const char* file_name_problem(std::string_view name) {
   const auto control = [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; };
   if (name.empty()) return "it names output files, so it must not be empty";
-  if (name.size() > 200) return "it names output files; use at most 200 characters";
+  if (name.size() > 200) return "it names output files; use at most 200 bytes";
+  if (!is_utf8(name)) return "it names output files; use UTF-8";
   if (name.find('/') != name.npos || std::any_of(name.begin(), name.end(), control)) {
     return "it names output files; use neither '/' nor control characters";
   }

@@ -227,8 +227,9 @@ Shot one_of_everything(const std::string& name) {
   sheet.pin[0].vertices = {0, 64};
   sheet.pin[1].box = {V3d(-0.5, 0.9, 0.4), V3d(0.5, 1.1, 0.6)};
   shot.cloth.push_back(sheet);
-  for (const ProbeType type : {ProbeType::height, ProbeType::pressure, ProbeType::force,
-                               ProbeType::tip, ProbeType::energy, ProbeType::volume}) {
+  for (const ProbeType type :
+       {ProbeType::height, ProbeType::pressure, ProbeType::force, ProbeType::tip, ProbeType::energy,
+        ProbeType::volume, ProbeType::velocity, ProbeType::front}) {
     Probe probe;
     probe.type = type;
     probe.name += std::to_string(shot.probe.size() + 1);

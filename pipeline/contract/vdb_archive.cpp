@@ -5,8 +5,11 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
+#include <istream>
 #include <sstream>
 #include <stdexcept>
+#include <streambuf>
 
 #include "pipeline/contract/hash.h"
 
@@ -35,6 +38,41 @@ class SeekableArchive : public openvdb::io::Archive {
   void write_to(std::ostream& stream, const openvdb::GridCPtrVec& grids) const {
     write(stream, grids, /*seekable=*/true, openvdb::MetaMap());
   }
+};
+
+/// Bytes as a stream that throws at the end of them, and when far more of them are read than there
+/// are: OpenVDB itself goes on with whatever it has, for as long as a number in the file says.
+class BytesBuffer final : public std::streambuf {
+ public:
+  explicit BytesBuffer(std::string_view bytes) : left_(8 * uint64_t(bytes.size()) + (1 << 20)) {
+    char* const begin = const_cast<char*>(bytes.data());  // a get area is not written to
+    setg(begin, begin, begin + bytes.size());
+  }
+
+ protected:
+  int_type underflow() override { throw std::runtime_error("it ends too early"); }
+  std::streamsize xsgetn(char* to, std::streamsize count) override {
+    if (count > egptr() - gptr()) throw std::runtime_error("it ends too early");
+    if (uint64_t(count) + 1 > left_) throw std::runtime_error("its parts contain each other");
+    left_ -= uint64_t(count) + 1;  // reading nothing counts, too
+    std::copy_n(gptr(), count, to);
+    setg(eback(), gptr() + count, egptr());
+    return count;
+  }
+  pos_type seekoff(off_type by, std::ios_base::seekdir from, std::ios_base::openmode) override {
+    const off_type base = from == std::ios::beg   ? 0
+                          : from == std::ios::cur ? gptr() - eback()
+                                                  : egptr() - eback();
+    if (by < -base || by > egptr() - eback() - base) return pos_type(off_type(-1));
+    setg(eback(), eback() + base + by, egptr());
+    return pos_type(base + by);
+  }
+  pos_type seekpos(pos_type to, std::ios_base::openmode mode) override {
+    return seekoff(off_type(to), std::ios::beg, mode);
+  }
+
+ private:
+  uint64_t left_;  // bytes and calls
 };
 
 }  // namespace
@@ -71,7 +109,9 @@ openvdb::GridBase::Ptr vdb_grid(std::string_view bytes) {
         "its content does not match its own digest: damaged, or not written by "
         "Drench");
   }
-  std::istringstream stream{std::string(bytes), std::ios::binary};
+  BytesBuffer buffer(bytes);
+  std::istream stream(&buffer);
+  stream.exceptions(std::ios::badbit | std::ios::failbit);
   openvdb::io::Stream archive(stream, /*delayLoad=*/false);
   const openvdb::GridPtrVecPtr grids = archive.getGrids();
   if (!stream || !grids || grids->empty()) throw std::runtime_error("it holds no grid");

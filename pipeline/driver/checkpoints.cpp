@@ -12,10 +12,6 @@ namespace drench {
 
 namespace fs = std::filesystem;
 
-namespace {
-constexpr const char* step = "checkpoint";
-}
-
 CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, const Wanted& wanted,
                                    std::vector<Digest> keys, int every, int kept)
     : folder_(std::move(folder)),
@@ -28,7 +24,7 @@ CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, const Wa
 
 void CheckpointKeeper::remove_stale() {
   for (const auto& [file, record] : manifest_.records()) {
-    if (record.step != step) continue;
+    if (record.step != checkpoint_step) continue;
     // Those beyond the frames asked for now may belong to the same, longer simulation.
     const bool beyond = record.frame >= first_ + int(keys_.size());
     const bool same_stage = record.parts == parts_;
@@ -62,7 +58,7 @@ void CheckpointKeeper::remove_unlisted() {
 std::vector<Record> CheckpointKeeper::on_frames() const {
   std::vector<Record> found;
   for (const auto& [file, record] : manifest_.records()) {
-    if (record.step == step && file != layout::stop_checkpoint) found.push_back(record);
+    if (record.step == checkpoint_step && file != layout::stop_checkpoint) found.push_back(record);
   }
   std::sort(found.begin(), found.end(),
             [](const Record& a, const Record& b) { return a.frame < b.frame; });
@@ -71,7 +67,7 @@ std::vector<Record> CheckpointKeeper::on_frames() const {
 
 void CheckpointKeeper::write(const Simulation& simulation, int frame, const std::string& file) {
   Record record = record_of_file(folder_, simulation.write_checkpoint(folder_ / file));
-  record.step = step;
+  record.step = checkpoint_step;
   record.frame = frame;
   record.key = keys_.at(size_t(frame - first_));
   record.parts = parts_;
@@ -93,11 +89,12 @@ void CheckpointKeeper::before_frame(const Simulation& simulation, int frame) {
   if (stop && stop->frame < frame) remove(stop->file);
 }
 
-void CheckpointKeeper::on_stop(const Simulation& simulation, int frame) {
+bool CheckpointKeeper::on_stop(const Simulation& simulation, int frame) {
   const int last = first_ + int(keys_.size()) - 1;
-  if (frame < first_ || frame >= last) return;  // nothing to continue
+  if (frame < first_ || frame >= last) return false;  // nothing to continue
   write(simulation, frame, std::string(layout::stop_checkpoint));
   log_info("sim", fmt::format("checkpoint written after frame {}", frame));
+  return true;
 }
 
 std::string CheckpointKeeper::last_good() const {

@@ -24,7 +24,8 @@ class CheckpointKeeper {
   /// ones.
   void before_frame(const Simulation& simulation, int frame);
   /// On stop: the state may stand between `frame`, which is committed, and the next.
-  void on_stop(const Simulation& simulation, int frame);
+  /// @return whether there is something to continue, and so a checkpoint.
+  bool on_stop(const Simulation& simulation, int frame);
   /// The file of the last one, or "none".
   std::string last_good() const;
 

@@ -3,15 +3,20 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <map>
 #include <new>
+#include <sstream>
 
 #include "build_id.h"
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/printable.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/process.h"
 
@@ -24,7 +29,7 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   std::filesystem::path folder, name;
-  bool verbose = false, json = false, reference = false;
+  bool verbose = false, json = false, reference = false, strict = false;
 };
 
 void add_common(CLI::App& command, Arguments& arguments) {
@@ -47,10 +52,14 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--threads", shot.threads, "cores to use; default all")
       ->check(CLI::Range(1, 4096));
   command.add_option("--memory", shot.memory_gib, "GiB; a run that needs more stops")
-      ->check(CLI::Range(0.01, 1e6));
+      ->check(CLI::Range(0.01, 1e6))
+      ->check([](const std::string& text) {  // nan lies in every range
+        return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "is no number of GiB";
+      });
   command.add_option("--set", shot.set, "section.key=value; may be given again")
       ->allow_extra_args(false);
   command.add_option("--quality", shot.quality, "a [quality.NAME] of the shot; default final");
+  command.add_flag("--strict", arguments.strict, "take warnings for errors");
   add_common(command, arguments);
 }
 
@@ -60,6 +69,8 @@ CLI::App* add_make(CLI::App& app, Arguments& arguments, const std::string& name,
                    const std::string& what, const std::string& example, const Steps& steps) {
   CLI::App* command = app.add_subcommand(name, what);
   add_shot_options(*command, arguments);
+  command->add_flag("--verify", arguments.shot.verify,
+                    "hash every file first; damaged ones are made again");
   command->footer(fmt::format("Example: drench {} {}", name, example));
   command->callback([&arguments, steps] { make_command(arguments.shot, steps); });
   return command;
@@ -104,7 +115,18 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   });
 }
 
-void say(const char* kind, const char* text) { std::fprintf(stderr, "drench: %s%s\n", kind, text); }
+void say(const char* kind, const char* text) {
+  std::fprintf(stderr, "drench: %s%s\n", kind, printable(text, Lines::many).c_str());
+}
+
+/// What CLI11 says of help, version and bad words. @return the exit code
+int say_of_parsing(const CLI::App& app, const CLI::ParseError& error) {
+  std::ostringstream out, err;
+  const bool asked = app.exit(error, out, err) == 0;  // --help and --version are no errors
+  std::fputs(out.str().c_str(), stdout);
+  std::fputs(printable(err.str(), Lines::many).c_str(), stderr);
+  return asked ? done : user_error;
+}
 
 int parse_and_run(int argc, char** argv) {
   Arguments arguments;
@@ -114,6 +136,7 @@ int parse_and_run(int argc, char** argv) {
   app.footer("Example: drench run shots/pour.toml --quality preview");
   app.parse_complete_callback([&arguments] {
     if (arguments.verbose) set_log_level(LogLevel::verbose);
+    if (arguments.strict) set_on_warning(OnWarning::fail);
     if (arguments.json) arguments.shot.format = OutputFormat::json;
     if (arguments.shot.quiet) set_log_level(LogLevel::quiet);
   });
@@ -121,7 +144,7 @@ int parse_and_run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? done : user_error;  // --help and --version are no errors
+    return say_of_parsing(app, error);
   }
   return done;
 }
@@ -129,6 +152,7 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 
 int drench_program(int argc, char** argv) {
+  open_standard_streams();  // before anything opens a file
   install_signal_handlers();
   try {
     return parse_and_run(argc, argv);
@@ -137,6 +161,16 @@ int drench_program(int argc, char** argv) {
     return stopped;
   } catch (const Error& error) {
     say("", error.what());
+    return user_error;
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string reason = system_reason(error.code().value());
+    say("", fmt::format("{}: {}", error.path1().string(), reason).c_str());
+    return user_error;
+  } catch (const std::system_error& error) {  // of starting a thread
+    say("", fmt::format("the system gives no more threads or other resources: {}; raise the limits "
+                        "(ulimit -a) or give --threads fewer",
+                        error.code().message())
+                .c_str());
     return user_error;
   } catch (const std::bad_alloc&) {
     say("",

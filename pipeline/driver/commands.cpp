@@ -8,14 +8,22 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/level_set.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/printable.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/device.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/frame_range.h"
+#include "pipeline/driver/inputs.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/plan.h"
 #include "pipeline/driver/process.h"
+#include "pipeline/driver/scene_text.h"
+#include "pipeline/driver/standard_output.h"
+#include "pipeline/driver/stats_file.h"
+#include "sim/probe_series.h"
+#include "sim/scene.h"
 
 namespace drench {
 
@@ -41,12 +49,6 @@ Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
                                 : parse_frames(arguments.frames, job.shot.timeline);
   job.wanted = want(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
   return job;
-}
-
-void print(const std::string& text) {
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
-    throw Error("standard output: cannot be written; is the disk full or the reader gone?");
-  }
 }
 
 void report_beyond(const Plan& plan, const ShotArguments& arguments) {
@@ -86,18 +88,40 @@ Counts count_of(const Plan& plan) {
   return counts;
 }
 
+std::vector<std::string> warning_texts() {
+  std::vector<std::string> texts;
+  for (const LoggedWarning& warning : logged_warnings()) texts.push_back(warning.text);
+  return texts;
+}
+
+/// Says all warnings once more, as the last lines of a run, and keeps them with its times.
+void repeat_warnings(const fs::path& folder) {
+  const std::vector<LoggedWarning> warnings = logged_warnings();
+  if (warnings.empty()) return;
+  StatsFile stats(folder / layout::stats);
+  log_info("driver", fmt::format("{} warning{}:", warnings.size(), warnings.size() > 1 ? "s" : ""));
+  for (const LoggedWarning& warning : warnings) {
+    const std::string times =
+        warning.times > 1 ? fmt::format(" ({} times)", warning.times) : std::string();
+    log_info(warning.part, fmt::format("warning: {}{}", warning.text, times));
+    stats.add(
+        "warning",
+        json{{"part", warning.part}, {"text", warning.text}, {"times", warning.times}}.dump());
+  }
+}
+
 void report_done(const Job& job, const ShotArguments& arguments, const Plan& first) {
   const bool nothing = first.nothing_to_do();
   const Counts counts = count_of(first);
   if (arguments.format == OutputFormat::json) {
-    print(json{{"shot", job.shot.name},
-               {"folder", job.folder.string()},
-               {"frames", job.wanted.frames},
-               {"nothing_to_do", nothing},
-               {"planned", nothing ? 0 : counts.ran},
-               {"skipped", counts.skipped}}
-              .dump() +
-          "\n");
+    print(json_line({{"shot", job.shot.name},
+                     {"folder", job.folder.string()},
+                     {"frames", job.wanted.frames},
+                     {"nothing_to_do", nothing},
+                     {"planned", nothing ? 0 : counts.ran},
+                     {"skipped", counts.skipped},
+                     {"warnings", logged_warnings().size()},
+                     {"warning", warning_texts()}}));
   }
   if (nothing) {
     log_info("driver", fmt::format("nothing to do: all {} steps of {} are up to date",
@@ -126,27 +150,26 @@ ExecuteOptions execute_options(const ShotArguments& arguments) {
 
 /// Plans and executes until nothing is left; a damaged input found on the way is planned again.
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
-  constexpr int attempts = 5;  // every attempt drops a damaged file: more means a failing disk
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style());
   const std::unique_ptr<Stages> stages =
       shot_stages(job.shot, job.folder, {arguments.device, arguments.memory_gib});
+  Again again(job.folder, manifest);
   for (int attempt = 1;; ++attempt) {
     const Plan plan =
         make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+    if (again.drops_inputs_of(job.wanted, plan)) continue;
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
-    if (plan.nothing_to_do()) return plan;
     write_shot_lock(job, manifest);
+    if (plan.nothing_to_do()) return plan;
     try {
+      const GracefulStop graceful;
       execute(job.wanted, plan, job.folder, manifest, *stages, progress,
               execute_options(arguments));
       return plan;
     } catch (const PlanAgain& found) {
-      if (attempt == attempts) {
-        throw Error(fmt::format("{}: files keep changing or failing ({}); check the disk",
-                                job.folder.string(), found.what()));
-      }
       log_warning("driver", fmt::format("{}; it is made again", found.what()));
+      again.found(found);
     }
   }
 }
@@ -175,16 +198,35 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
                             (job.folder / layout::manifest).string(), manifest.damaged_lines()));
   }
   manifest.open_for_append();
-  const Plan plan = make_all(job, arguments, manifest);
-  report_done(job, arguments, plan);
+  try {
+    if (arguments.verify) drop_all_damaged(job.folder, manifest);
+    const Plan plan = make_all(job, arguments, manifest);
+    report_done(job, arguments, plan);
+  } catch (...) {
+    try {
+      repeat_warnings(job.folder);
+    } catch (const Error&) {  // a full disk again: what came first is what is wrong
+    }
+    throw;
+  }
+  repeat_warnings(job.folder);
 }
 
 void plan_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   const Manifest manifest(job.folder / layout::manifest);
-  const Plan plan =
-      make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-  print(arguments.format == OutputFormat::json ? plan_json(plan) + "\n" : plan_text(plan));
+  Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  std::string text = plan_text(plan), scene_object;
+  if (plan.simulation.needed) {
+    const sim::Scene scene = sim::build_scene(job.shot, make_level_set);
+    const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
+    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
+    text += scene_text(scene.report);
+    scene_object = json_line(scene_json(scene.report));
+  }
+  for (const std::string& warning : warning_texts()) plan.warnings.push_back(warning);
+  if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
+  print(printable(text, Lines::many));
 }
 
 void clean_command(const ShotArguments& arguments) {
@@ -211,52 +253,8 @@ void clean_command(const ShotArguments& arguments) {
     }
   }
   remove_frame_samples(job.folder);
-  if (arguments.format == OutputFormat::json) print(json{{"removed", plan.beyond}}.dump() + "\n");
+  if (arguments.format == OutputFormat::json) print(json_line({{"removed", plan.beyond}}));
   log_info("driver", fmt::format("removed {} files", plan.beyond.size()));
-}
-
-void verify_command(const fs::path& folder, OutputFormat format) {
-  if (!fs::exists(folder / layout::manifest)) {
-    throw Error(fmt::format("{}: holds no manifest.jsonl; give the output folder of a run",
-                            folder.string()));
-  }
-  // Without the lock (another driver at work, a read-only folder) it only reports.
-  std::unique_ptr<FolderLock> lock;
-  try {
-    lock = std::make_unique<FolderLock>(folder);
-  } catch (const Error& error) {
-    log_info("verify", fmt::format("only looking: {}", error.what()));
-  }
-  Manifest manifest(folder / layout::manifest);
-  const std::map<std::string, Record> records = manifest.records();
-  std::vector<std::string> bad;
-  for (const auto& [file, record] : records) {
-    if (!has_recorded_digest(folder, record)) bad.push_back(file);
-  }
-  const std::vector<std::string> unlisted = unlisted_files(folder, manifest);
-  if (lock && !bad.empty()) {
-    manifest.open_for_append();
-    for (const std::string& file : bad) manifest.drop(file);
-  }
-  if (format == OutputFormat::json) {
-    print(json{{"files", records.size()},
-               {"bad", bad},
-               {"unlisted", unlisted},
-               {"damaged_records", manifest.damaged_lines()}}
-              .dump() +
-          "\n");
-  } else {
-    std::string text;
-    for (const std::string& file : bad) text += fmt::format("missing or damaged  {}\n", file);
-    for (const std::string& file : unlisted) text += fmt::format("not listed          {}\n", file);
-    text += fmt::format("{} files, {} missing or damaged\n", records.size(), bad.size());
-    print(text);
-  }
-  if (bad.empty()) return;
-  throw Error(
-      fmt::format("{}: {} of {} files are missing or damaged, the first is {}; `drench run` "
-                  "makes them again",
-                  folder.string(), bad.size(), records.size(), bad.front()));
 }
 
 void init_command(const fs::path& name, InitialShot kind) {

@@ -24,6 +24,7 @@ struct ShotArguments {
   std::string quality = "final";
   OutputFormat format = OutputFormat::text;
   bool quiet = false;
+  bool verify = false;  // hash every file first instead of trusting sizes and times
 };
 
 /// run, simulate, mesh, render: brings the output folder up to date as far as `steps` go.
@@ -33,7 +34,8 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
 void plan_command(const ShotArguments& arguments);
 /// Removes frames outside the shot's range and files of sheets it no longer has.
 void clean_command(const ShotArguments& arguments);
-/// Hashes every file. @throws Error if one is missing or damaged; the next run makes those again.
+/// Hashes every file; never writes and takes no lock. @throws Error if one is missing or damaged: a
+/// run that verifies makes those again; or if one may not be read.
 void verify_command(const std::filesystem::path& folder, OutputFormat format);
 enum class InitialShot { commented, reference };
 /// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.

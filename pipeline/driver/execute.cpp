@@ -8,6 +8,7 @@
 #include <exception>
 #include <semaphore>
 #include <set>
+#include <system_error>
 #include <thread>
 
 #include "build_id.h"
@@ -32,9 +33,9 @@ constexpr size_t queued_frames = 2;
 constexpr int cores_a_frame = 32, most_frames_at_once = 4;
 constexpr int most_stage_threads = 2 + most_frames_at_once;
 
+int cores(int threads) { return threads > 0 ? threads : tbb::this_task_arena::max_concurrency(); }
 int frames_at_once(int threads) {
-  const int cores = threads > 0 ? threads : tbb::this_task_arena::max_concurrency();
-  return std::min(2 + cores / cores_a_frame, most_frames_at_once);
+  return std::min(2 + cores(threads) / cores_a_frame, most_frames_at_once);
 }
 
 double seconds_since(Clock::time_point start) {
@@ -54,7 +55,7 @@ class Executor {
   void advance_to(int frame);
   void mesh_frames();
   bool is_held(int frame) const;
-  StageReport held_mesh(int frame) const;
+  StageReport held_mesh(int frame);
   void make_mesh(int frame);
   void make_foam(int frame);
   void render_frames();
@@ -69,7 +70,6 @@ class Executor {
   void commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
               const Key& key);
   void finished(Step step, int frame, Clock::time_point start, const StageReport& report);
-  void check_input(const std::string& file);
   std::optional<KnownFile> look_up(const std::string& file) const;
   Attributes attributes_of(int frame, const Key& key) const;
 
@@ -78,10 +78,16 @@ class Executor {
   }
   void fail(std::exception_ptr error);
   void guard(void (Executor::*work)());
+  void start(std::vector<std::thread>& threads, void (Executor::*work)());
   void watch();
+  std::string memory_message() const;
   /// Runs one frame of one stage in that stage's arena, when fewer than `threads` others compute.
   template <class Work>
   void compute(tbb::task_arena& arena, const Work& work);
+  /// The same for work on files of the folder: none is read before its digest was checked.
+  template <class Work>
+  void compute_from(const std::vector<std::string>& files, tbb::task_arena& arena,
+                    const Work& work);
 
   const Wanted& wanted_;
   const Plan& plan_;
@@ -99,6 +105,8 @@ class Executor {
   std::unique_ptr<Simulation> simulation_;
   int committed_ = 0;  // frame of the last commit of simulation_, or of the state it started with
   bool has_committed_ = false;
+  bool kept_work_ = false;  // in a checkpoint, when it was stopped
+  double over_memory_ = 0;  // bytes in use when that were too many
 
   int next_foam_;  // frame that foam was not looked at yet; foam comes in order
   std::mutex denoise_mutex_;
@@ -169,6 +177,7 @@ void Executor::guard(void (Executor::*work)()) {
   } catch (...) {
     fail(std::current_exception());
   }
+  if (work == &Executor::simulate_frames) simulating_ = false;
   --running_;
 }
 
@@ -184,6 +193,19 @@ void Executor::compute(tbb::task_arena& arena, const Work& work) {
     throw;
   }
   slots_.release();
+}
+
+template <class Work>
+void Executor::compute_from(const std::vector<std::string>& files, tbb::task_arena& arena,
+                            const Work& work) {
+  for (const std::string& file : files) check_input(folder_, manifest_, file);
+  try {
+    compute(arena, work);
+  } catch (const Error&) {
+    drop_unreadable(folder_, manifest_, files,
+                    [this](const fs::path& file) { return stages_.why_unreadable(file); });
+    throw;
+  }
 }
 
 void Executor::commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
@@ -210,13 +232,6 @@ void Executor::finished(Step step, int frame, Clock::time_point start, const Sta
   progress_.done(step, frame, seconds, report.line);
 }
 
-void Executor::check_input(const std::string& file) {
-  const std::optional<Record> record = manifest_.find(file);
-  if (record && has_recorded_digest(folder_, *record)) return;
-  manifest_.drop(file);
-  throw PlanAgain(fmt::format("{} is missing or damaged", file));
-}
-
 // ---- simulate ----
 
 void Executor::start_simulation() {
@@ -226,17 +241,18 @@ void Executor::start_simulation() {
   if (file.empty()) {
     return compute(simulate_arena_, [&] { simulation_->preroll([this] { return !stopping(); }); });
   }
-  check_input(file);
+  check_input(folder_, manifest_, file);
   try {
     compute(simulate_arena_, [&] { simulation_->read_checkpoint(folder_ / file); });
   } catch (const Error& error) {
     manifest_.drop(file);
-    throw PlanAgain(fmt::format("{} cannot be used: {}", file, error.what()));
+    throw PlanAgain(fmt::format("{} cannot be used: {}", file, error.what()), file);
   }
   if (simulation_->frame() != plan_.simulation.from) {
     manifest_.drop(file);
-    throw PlanAgain(fmt::format("{} holds frame {}, not {}", file, simulation_->frame(),
-                                plan_.simulation.from));
+    throw PlanAgain(
+        fmt::format("{} holds frame {}, not {}", file, simulation_->frame(), plan_.simulation.from),
+        file);
   }
   if (!to_simulate_.contains(plan_.simulation.from)) {
     committed_ = plan_.simulation.from;  // its files are there and right
@@ -299,7 +315,7 @@ void Executor::write_probes(int frame) {
 void Executor::simulate_frames() {
   const auto keep_work = [this] {
     if (!simulation_ || !has_committed_ || simulation_->frame() != committed_) return;
-    checkpoints_.on_stop(*simulation_, committed_);
+    kept_work_ = checkpoints_.on_stop(*simulation_, committed_);
   };
   try {
     const int begin = to_simulate_.empty() ? wanted_.frames.front() : wanted_.first;
@@ -335,14 +351,13 @@ bool Executor::is_held(int frame) const {
   return decision && !decision->make;
 }
 
-StageReport Executor::held_mesh(int frame) const {
+StageReport Executor::held_mesh(int frame) {
   StageReport report;
   const std::vector<std::string> files = mesh_files(wanted_, frame),
                                  before = mesh_files(wanted_, frame - 1);
   for (size_t k = 0; k < files.size(); ++k) {
-    const std::vector<std::byte> bytes = read_file(folder_ / before[k]);
-    report.files.push_back(write_file_whole(
-        folder_ / files[k], {reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+    report.files.push_back(
+        write_file_whole(folder_ / files[k], checked_bytes(folder_, manifest_, before[k])));
   }
   report.line = fmt::format("as frame {}", frame - 1);
   report.json = fmt::format("{{\"held\":{}}}", frame - 1);
@@ -351,13 +366,12 @@ StageReport Executor::held_mesh(int frame) const {
 
 void Executor::make_mesh(int frame) {
   const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame));
+  if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame), "");
   if (!decision->make) return progress_.not_needed(Step::mesh, frame);
   const Clock::time_point start = Clock::now();
-  for (const std::string& file : simulated_files(wanted_, frame)) check_input(file);
   StageReport report;
-  compute(mesh_arena_,
-          [&] { report = is_held(frame) ? held_mesh(frame) : stages_.mesh(folder_, frame); });
+  compute_from(simulated_files(wanted_, frame), mesh_arena_,
+               [&] { report = is_held(frame) ? held_mesh(frame) : stages_.mesh(folder_, frame); });
   commit(report.files, step_name(Step::mesh), frame, decision->key);
   finished(Step::mesh, frame, start, report);
 }
@@ -365,12 +379,12 @@ void Executor::make_mesh(int frame) {
 void Executor::make_foam(int frame) {
   const std::optional<Decision> decision = decide_foam(wanted_, frame, lookup_);
   if (!decision)
-    throw PlanAgain(fmt::format("what the foam of frame {} is made of is missing", frame));
+    throw PlanAgain(fmt::format("what the foam of frame {} is made of is missing", frame), "");
   if (!decision->make) return progress_.not_needed(Step::foam, frame);
   const Clock::time_point start = Clock::now();
-  for (const std::string& file : foam_inputs(wanted_, frame)) check_input(file);
   StageReport report;
-  compute(mesh_arena_, [&] { report = stages_.foam(folder_, frame); });
+  compute_from(foam_inputs(wanted_, frame), mesh_arena_,
+               [&] { report = stages_.foam(folder_, frame); });
   commit(report.files, step_name(Step::foam), frame, decision->key);
   finished(Step::foam, frame, start, report);
 }
@@ -403,16 +417,15 @@ Attributes Executor::attributes_of(int frame, const Key& key) const {
 
 void Executor::make_image(int frame) {
   const std::optional<Decision> decision = decide_render(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the meshes of frame {} are missing", frame));
+  if (!decision) throw PlanAgain(fmt::format("the meshes of frame {} are missing", frame), "");
   if (!decision->make) return progress_.not_needed(Step::render, frame);
   const Clock::time_point start = Clock::now();
-  for (const std::string& file : render_inputs(wanted_, frame)) check_input(file);
   StageReport report;
   const auto share = [&](double finished) {
     if (stopping()) throw Stopped("stopped while rendering");
     progress_.share(Step::render, frame, finished);
   };
-  compute(render_arena_, [&] {
+  compute_from(render_inputs(wanted_, frame), render_arena_, [&] {
     report = stages_.render(folder_, frame, attributes_of(frame, decision->key), share);
   });
   commit(report.files, step_name(Step::render), frame, decision->key);
@@ -469,19 +482,19 @@ void Executor::denoise_rest() {
 
 void Executor::make_denoised(int frame) {
   const std::optional<Decision> decision = decide_denoise(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the noisy frame {} is missing", frame));
+  if (!decision) throw PlanAgain(fmt::format("the noisy frame {} is missing", frame), "");
   if (!decision->make) return progress_.not_needed(Step::denoise, frame);
   const Clock::time_point start = Clock::now();
   const NoisyFiles noisy = denoise_inputs(wanted_, frame, lookup_);
   Attributes attributes{{"key.denoise", decision->key.digest.hex()}};
   for (const std::string& file : noisy.all()) {
-    check_input(file);
     const std::optional<Record> record = manifest_.find(file);
     if (record)
       attributes.emplace_back(fmt::format("key.noisy.{}", record->frame), record->digest.hex());
   }
   StageReport report;
-  compute(render_arena_, [&] { report = stages_.denoise(folder_, frame, noisy, attributes); });
+  compute_from(noisy.all(), render_arena_,
+               [&] { report = stages_.denoise(folder_, frame, noisy, attributes); });
   commit(report.files, step_name(Step::denoise), frame, decision->key);
   finished(Step::denoise, frame, start, report);
 }
@@ -492,12 +505,13 @@ void Executor::make_dailies(Step step) {
                                     [&](const Task& task) { return task.step == step; });
   if (planned == plan_.tasks.end() || planned->action == Action::skip) return;
   const std::optional<Decision> decision = decide_dailies(wanted_, step, lookup_);
-  if (!decision) throw PlanAgain("a rendered frame is missing");
+  if (!decision) throw PlanAgain("a rendered frame is missing", "");
   if (!decision->make) return progress_.not_needed(step, 0);
   const Clock::time_point start = Clock::now();
-  for (const int frame : wanted_.frames) check_input(layout::image(wanted_.shot, frame));
+  std::vector<std::string> images;
+  for (const int frame : wanted_.frames) images.push_back(layout::image(wanted_.shot, frame));
   StageReport report;
-  compute(render_arena_, [&] {
+  compute_from(images, render_arena_, [&] {
     report = step == Step::movie
                  ? stages_.movie(folder_, wanted_.frames, [this] { return !stopping(); })
                  : stages_.contact_sheet(folder_, wanted_.frames);
@@ -523,40 +537,51 @@ void Executor::watch() {
       if (options_.abandon) options_.abandon();
     }
     if (limit > 0 && !stopping() && resident_memory() > limit) {
-      fail(std::make_exception_ptr(Error(fmt::format(
-          "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was "
-          "stopped with a checkpoint. Give more, a larger spacing or smaller frames",
-          folder_.string(), double(resident_memory()) / double(1 << 30), options_.memory_gib))));
+      over_memory_ = double(resident_memory());
+      fail(nullptr);  // the message waits for what the simulation can keep
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+void Executor::start(std::vector<std::thread>& threads, void (Executor::*work)()) {
+  ++running_;
+  try {
+    threads.emplace_back([this, work] { guard(work); });
+  } catch (const std::system_error&) {
+    --running_;
+    fail(std::current_exception());
   }
 }
 
 void Executor::run() {
   progress_.start(plan_);
   const int at_once = frames_at_once(options_.threads);
-  running_ = 2 + at_once;
+  check_threads(cores(options_.threads) + 2 + at_once);
   renderers_ = at_once;
+  std::vector<std::thread> threads;
   simulating_ = true;
-  std::thread simulating([this] {
-    guard(&Executor::simulate_frames);
-    simulating_ = false;
-  });
-  std::thread meshing([this] { guard(&Executor::mesh_frames); });
-  std::vector<std::thread> rendering;
-  for (int k = 0; k < at_once; ++k)
-    rendering.emplace_back([this] { guard(&Executor::render_frames); });
+  start(threads, &Executor::simulate_frames);
+  start(threads, &Executor::mesh_frames);
+  for (int k = 0; k < at_once; ++k) start(threads, &Executor::render_frames);
   watch();
-  simulating.join();
-  meshing.join();
-  for (std::thread& thread : rendering) thread.join();
+  for (std::thread& thread : threads) thread.join();
   if (!stopping()) {
     make_dailies(Step::contact_sheet);
     if (!stopping()) make_dailies(Step::movie);
   }
   progress_.finish();
   if (error_) std::rethrow_exception(error_);
+  if (over_memory_ > 0) throw Error(memory_message());
   if (stopping()) throw Stopped("stopped on request; the same command continues");
+}
+
+std::string Executor::memory_message() const {
+  return fmt::format(
+      "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was stopped{}. Give "
+      "more, a larger spacing or smaller frames",
+      folder_.string(), over_memory_ / double(1 << 30), options_.memory_gib,
+      kept_work_ ? " with a checkpoint" : "");
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 #include <functional>
-#include <stdexcept>
 
+#include "pipeline/driver/inputs.h"
 #include "pipeline/driver/plan.h"
 #include "pipeline/driver/progress.h"
 #include "pipeline/driver/stages.h"
@@ -14,7 +14,7 @@ namespace drench {
 
 struct ExecuteOptions {
   int threads = 0;            // 0: all cores
-  double memory_gib = 0;      // 0: no limit; above it the run stops with a checkpoint
+  double memory_gib = 0;      // 0: no limit; above it the run stops
   int checkpoint_every = 10;  // frames
   int checkpoints_kept = 3;
   std::function<bool()> stop_requested;  // asked often; nothing: never
@@ -22,18 +22,10 @@ struct ExecuteOptions {
   std::function<void()> abandon;  // called when that is over; everything committed is safe
 };
 
-/// A file that should have been there is missing or damaged. Its record is dropped already: plan
-/// again.
-class PlanAgain : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// Brings the folder to what is wanted.
 /// @param manifest  open for append, the folder's lock held.
-/// @throws Stopped after a stop request, with a checkpoint written; PlanAgain; Error of a stage,
-/// after
-///         the simulation wrote a checkpoint so that none of its work is lost.
+/// @throws Stopped after a stop request; PlanAgain; Error of a stage or when memory or threads are
+///         short. The simulation wrote a checkpoint before if it had work to lose.
 void execute(const Wanted& wanted, const Plan& plan, const std::filesystem::path& folder,
              Manifest& manifest, Stages& stages, Progress& progress, const ExecuteOptions& options);
 

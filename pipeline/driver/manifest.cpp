@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "pipeline/contract/error.h"
 
@@ -43,23 +44,39 @@ std::optional<json> checked(std::string_view line) {
   return object;
 }
 
+/// A whole number that the type holds. @throws Error for anything else, which json would convert.
+template <class T>
+T whole_number(const json& value) {
+  if (value.is_number_unsigned() && std::in_range<T>(value.get<uint64_t>()))
+    return T(value.get<uint64_t>());
+  if (value.is_number_integer() && !value.is_number_unsigned() &&
+      std::in_range<T>(value.get<int64_t>()))
+    return T(value.get<int64_t>());
+  throw Error("a number of the record is none");
+}
+
+/// Whether it names a file below the folder, in the one way that the driver writes: a record must
+/// not lead a reader, or `clean`, elsewhere.
+bool is_name_inside(const std::string& file) {
+  constexpr size_t longest = 4095;
+  if (file.empty() || file.size() > longest || file.find('\0') != file.npos) return false;
+  const fs::path path(file);
+  if (path.is_absolute() || path.lexically_normal() != path) return false;
+  return path.has_filename() && *path.begin() != ".." && *path.begin() != ".";
+}
+
 std::optional<Record> record_of(const json& object) {
   try {
     Record record;
     record.file = object.at("file").get<std::string>();
     record.step = object.at("step").get<std::string>();
-    record.frame = object.at("frame").get<int>();
-    record.size = object.at("size").get<uint64_t>();
+    record.frame = whole_number<int>(object.at("frame"));
+    record.size = whole_number<uint64_t>(object.at("size"));
     record.digest = Digest::from_hex(object.at("digest").get<std::string>());
-    record.mtime_ns = object.at("mtime_ns").get<int64_t>();
+    record.mtime_ns = whole_number<int64_t>(object.at("mtime_ns"));
     record.key = Digest::from_hex(object.at("key").get<std::string>());
     record.parts = object.at("parts").get<KeyParts>();
-    // A record must not name a file outside its folder.
-    const fs::path path(record.file);
-    if (record.file.empty() || path.is_absolute()) return {};
-    for (const fs::path& part : path) {
-      if (part == "..") return {};
-    }
+    if (!is_name_inside(record.file)) return {};
     return record;
   } catch (const json::exception&) {
     return {};
@@ -88,7 +105,11 @@ std::optional<Record> parse_manifest_line(std::string_view line) {
 
 Manifest::Manifest(fs::path file) : file_(std::move(file)) {
   std::error_code code;
-  if (!fs::exists(file_, code)) return;
+  const bool there = fs::exists(file_, code);
+  if (code) {
+    throw Error(fmt::format("{}: cannot be read: {}", file_.string(), system_reason(code.value())));
+  }
+  if (!there) return;
   const std::string text = read_text(file_, uint64_t(1) << 32);
   for (size_t begin = 0; begin < text.size();) {
     const size_t end = text.find('\n', begin);
@@ -100,7 +121,8 @@ Manifest::Manifest(fs::path file) : file_(std::move(file)) {
     if (const std::optional<Record> record = parse_manifest_line(line)) {
       records_[record->file] = *record;
     } else if (const std::optional<json> object = checked(line);
-               object && object->contains("dropped") && object->at("file").is_string()) {
+               object && object->contains("dropped") && object->contains("file") &&
+               object->at("file").is_string()) {
       records_.erase(object->at("file").get<std::string>());
     } else {
       ++damaged_lines_;
@@ -124,23 +146,23 @@ void Manifest::open_for_append() {
 void Manifest::append(std::string line) {
   if (descriptor_ < 0) throw std::logic_error("manifest: append before open_for_append");
   line += '\n';
-  for (size_t done = 0; done < line.size();) {
+  int reason = 0;
+  for (size_t done = 0; reason == 0 && done < line.size();) {
     const ssize_t count = ::write(descriptor_, line.data() + done, line.size() - done);
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      const int reason = count < 0 ? errno : ENOSPC;
-      // The next record must not be glued to half a line.
-      if (::ftruncate(descriptor_, off_t(good_size_)) == 0) {
-        (void)::lseek(descriptor_, off_t(good_size_), SEEK_SET);
-      }
-      throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(reason)));
-    }
-    done += size_t(count);
+    if (count <= 0) reason = count < 0 ? errno : ENOSPC;
+    if (count > 0) done += size_t(count);
   }
-  if (::fdatasync(descriptor_) != 0) {
-    throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(errno)));
+  if (reason == 0 && ::fdatasync(descriptor_) != 0) reason = errno;
+  if (reason == 0) {
+    good_size_ += line.size();
+    return;
   }
-  good_size_ += line.size();
+  // The next record must not be glued to half a line, nor follow one that nobody counts.
+  if (::ftruncate(descriptor_, off_t(good_size_)) == 0) {
+    (void)::lseek(descriptor_, off_t(good_size_), SEEK_SET);
+  }
+  throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(reason)));
 }
 
 void Manifest::add(const Record& record) {

@@ -16,6 +16,7 @@
 #include <string_view>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/driver/mp4_check.h"
 
 namespace drench {
 
@@ -122,6 +123,7 @@ std::vector<std::string> encode_command(const fs::path& ffmpeg, const fs::path& 
   std::vector<std::string> command{
       ffmpeg.string(),
       "-nostdin",
+      "-xerror",
       "-hide_banner",
       "-loglevel",
       "error",
@@ -164,7 +166,8 @@ std::vector<std::string> encode_command(const fs::path& ffmpeg, const fs::path& 
   } else {
     command.insert(command.end(), {"-q:v", "3"});
   }
-  command.insert(command.end(), {"-movflags", "+faststart", "-f", "mp4", file.string()});
+  // "file:": a folder named like one of ffmpeg's protocols ("md5:x") is a folder all the same.
+  command.insert(command.end(), {"-movflags", "+faststart", "-f", "mp4", "file:" + file.string()});
   return command;
 }
 
@@ -194,8 +197,12 @@ std::string encode(const fs::path& file, const std::vector<NumberedImage>& image
     if (!child.send(rgb.data(), rgb.size())) break;
   }
   const int status = child.finish();
-  if (status == 0) return {};
-  return fmt::format("ffmpeg ended with status {}: {}", status, child.last_words());
+  if (status != 0)
+    return fmt::format("ffmpeg ended with status {}: {}", status, child.last_words());
+  const std::string fault = why_not_whole_mp4(file, images.size());
+  if (fault.empty()) return {};
+  return fmt::format("what ffmpeg wrote is not whole: {}; is the disk full? {}", fault,
+                     child.last_words());
 }
 
 }  // namespace
@@ -219,6 +226,9 @@ WrittenFile write_movie(const fs::path& path, const std::vector<NumberedImage>& 
   return write_file_whole(path, [&](const fs::path& temporary) {
     const std::string first = encode(temporary, images, fps, "libx264", keep_going, view);
     if (first.empty()) return;
+    // Whatever else failed would fail again, or make another movie of the same frames.
+    if (first.find("ncoder") == std::string::npos)
+      throw Error(fmt::format("{}: the movie was not made: {}", path.string(), first));
     const std::string second = encode(temporary, images, fps, "mpeg4", keep_going, view);
     if (second.empty()) return;
     throw Error(fmt::format("{}: the movie was not made: {}; with mpeg4: {}", path.string(), first,

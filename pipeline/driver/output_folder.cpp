@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <optional>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
@@ -46,6 +47,25 @@ void make_folder(const fs::path& folder) {
   }
 }
 
+[[noreturn]] void fail_to_read(const fs::path& path, int reason) {
+  throw Error(fmt::format("{}: cannot be read: {}", path.string(), system_reason(reason)));
+}
+
+/// Whether an errno is about this user and this process, and not about the file.
+bool says_nothing_of_the_file(int reason) {
+  return reason == EACCES || reason == EPERM || reason == EMFILE || reason == ENFILE ||
+         reason == ENOMEM;
+}
+
+/// Of the name itself, a link not followed; nothing if there is none. @throws Error if the folder
+/// may not be read.
+std::optional<struct stat> status_of(const fs::path& path) {
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) == 0) return status;
+  if (says_nothing_of_the_file(errno)) fail_to_read(path, errno);
+  return {};
+}
+
 }  // namespace
 
 FolderLock::FolderLock(const fs::path& folder) {
@@ -53,7 +73,7 @@ FolderLock::FolderLock(const fs::path& folder) {
   const fs::path file = folder / layout::lock;
   descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (descriptor_ < 0) {
-    throw Error(fmt::format("{}: the output folder cannot be written: {}", folder.string(),
+    throw Error(fmt::format("{}: the output folder cannot be written: {}", file.string(),
                             system_reason(errno)));
   }
   if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
@@ -78,13 +98,13 @@ FolderLock::~FolderLock() {
 }
 
 FileState state_of(const fs::path& folder, const Record& record) {
-  struct stat status {};
-  if (::lstat((folder / record.file).c_str(), &status) != 0) return FileState::missing;
-  if (!S_ISREG(status.st_mode) || uint64_t(status.st_size) != record.size) {
+  const std::optional<struct stat> status = status_of(folder / record.file);
+  if (!status) return FileState::missing;
+  if (!S_ISREG(status->st_mode) || uint64_t(status->st_size) != record.size) {
     return FileState::changed;
   }
-  if (mtime_of(status) == record.mtime_ns) return FileState::intact;
-  return has_recorded_digest(folder, record) ? FileState::intact : FileState::changed;
+  if (mtime_of(*status) == record.mtime_ns) return FileState::intact;
+  return state_by_digest(folder, record);
 }
 
 Snapshot take_snapshot(const fs::path& folder, const Manifest& manifest) {
@@ -95,17 +115,25 @@ Snapshot take_snapshot(const fs::path& folder, const Manifest& manifest) {
   return snapshot;
 }
 
-bool has_recorded_digest(const fs::path& folder, const Record& record) {
-  struct stat status {};
-  if (::lstat((folder / record.file).c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
-    return false;
+FileState state_by_digest(const fs::path& folder, const Record& record) {
+  const fs::path path = folder / record.file;
+  const std::optional<struct stat> status = status_of(path);
+  if (!status) return FileState::missing;
+  if (!S_ISREG(status->st_mode) || uint64_t(status->st_size) != record.size) {
+    return FileState::changed;
   }
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
+  if (descriptor < 0 && says_nothing_of_the_file(errno)) fail_to_read(path, errno);
+  if (descriptor >= 0) ::close(descriptor);
   try {
-    return uint64_t(status.st_size) == record.size &&
-           hash_file(folder / record.file) == record.digest;
+    return hash_file(path) == record.digest ? FileState::intact : FileState::changed;
   } catch (const Error&) {
-    return false;  // unreadable is as good as damaged: the file is made again
+    return FileState::changed;
   }
+}
+
+bool has_recorded_digest(const fs::path& folder, const Record& record) {
+  return state_by_digest(folder, record) == FileState::intact;
 }
 
 Record record_of_file(const fs::path& folder, const WrittenFile& written) {
@@ -135,6 +163,7 @@ std::vector<std::string> unlisted_files(const fs::path& folder, const Manifest& 
     if (file == layout::manifest || file == layout::stats || file == layout::lock) continue;
     if (!records.contains(file) && !layout::is_frame_samples(file)) files.push_back(file);
   }
+  if (code) fail_to_read(folder, code.value());
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -145,7 +174,13 @@ void remove_frame_samples(const fs::path& folder) {
   for (fs::directory_iterator entry(folder / "render", code), end; !code && entry != end;
        entry.increment(code))
     if (layout::is_frame_samples(entry->path().string())) files.push_back(entry->path());
-  for (const fs::path& file : files) fs::remove(file);
+  for (const fs::path& file : files) {
+    fs::remove(file, code);
+    if (code) {
+      throw Error(
+          fmt::format("{}: cannot be removed: {}", file.string(), system_reason(code.value())));
+    }
+  }
 }
 
 void remove_leftovers(const fs::path& folder) {

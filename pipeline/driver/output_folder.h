@@ -43,10 +43,15 @@ using Snapshot = std::map<std::string, KnownFile>;  // by file name
 
 /// What the record says against the file in `folder`: size and time first, the digest where they
 /// differ. Never writes.
+/// @throws Error as state_by_digest.
 FileState state_of(const std::filesystem::path& folder, const Record& record);
 Snapshot take_snapshot(const std::filesystem::path& folder, const Manifest& manifest);
 
-/// Hashes the whole file. @return false if it is missing, unreadable or has another digest.
+/// Hashes the whole file; bytes that the disk does not give are as good as damaged.
+/// @throws Error if this user may not read it, or the system lacks what reading takes: nothing is
+/// known of the file then, and making it again might cost a simulation.
+FileState state_by_digest(const std::filesystem::path& folder, const Record& record);
+/// Whether that is intact.
 bool has_recorded_digest(const std::filesystem::path& folder, const Record& record);
 
 /// The record of a file just written into `folder`.
@@ -54,6 +59,7 @@ Record record_of_file(const std::filesystem::path& folder, const WrittenFile& wr
 
 /// Files under `folder` that the manifest does not list, relative, sorted; the driver's own
 /// (manifest, stats, lock, samples of stopped frames) are left out.
+/// @throws Error if a folder may not be read.
 std::vector<std::string> unlisted_files(const std::filesystem::path& folder,
                                         const Manifest& manifest);
 

@@ -14,6 +14,7 @@ namespace drench {
 namespace {
 
 constexpr const char* unchanged = "key unchanged";
+constexpr int64_t longest_timeline = 1'000'000;  // frames, of any shot
 
 /// "camera changed", "device, fluid changed": the parts that differ between two keys.
 std::string difference(const KeyParts& wanted, const KeyParts& recorded) {
@@ -363,7 +364,10 @@ Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup) {
   Decision latest{false, {{}, wanted.simulate.parts}, unchanged};
   for (const std::string& file : probe_files(wanted)) {
     const std::optional<KnownFile> known = lookup(file);
-    const int until = known ? std::max(known->record.frame, frame) : frame;
+    // A record may say anything; keys are made for every frame up to the one it names.
+    const bool later = known && known->record.frame > frame &&
+                       int64_t(known->record.frame) - wanted.first < longest_timeline;
+    const int until = later ? known->record.frame : frame;
     latest = decide({file}, {simulation_keys(wanted, until).back(), wanted.simulate.parts}, lookup);
     if (!latest.make) continue;
     if (known && known->record.frame < frame) latest.reason = "ends before this frame";
@@ -506,25 +510,33 @@ std::string plan_text(const Plan& plan) {
   return text;
 }
 
-std::string plan_json(const Plan& plan) {
-  nlohmann::json tasks = nlohmann::json::array();
-  for (const Task& task : plan.tasks) {
-    tasks.push_back({{"step", step_name(task.step)},
-                     {"frame", task.frame},
-                     {"action", action_name(task.action)},
-                     {"reason", task.reason}});
-  }
+void write_plan_json(const Plan& plan, const std::string& scene,
+                     const std::function<void(std::string_view)>& write) {
+  const auto text_of = [](const nlohmann::json& value) {
+    return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  };
   const SimulationSpan& span = plan.simulation;
-  return nlohmann::json{{"tasks", tasks},
-                        {"simulation",
-                         {{"needed", span.needed},
-                          {"checkpoint", span.checkpoint},
-                          {"from", span.from},
-                          {"last", span.last}}},
-                        {"problems", plan.problems},
-                        {"warnings", plan.warnings},
-                        {"beyond", plan.beyond}}
-      .dump(2);
+  const nlohmann::json simulation{{"needed", span.needed},
+                                  {"checkpoint", span.checkpoint},
+                                  {"from", span.from},
+                                  {"last", span.last}};
+  std::string text = fmt::format(
+      "{{\n\"beyond\": {},\n\"problems\": {},\n\"simulation\": {},\n\"warnings\": "
+      "{},\n\"tasks\": [",
+      text_of(plan.beyond), text_of(plan.problems), text_of(simulation), text_of(plan.warnings));
+  if (!scene.empty()) text.insert(2, fmt::format("\"scene\": {},\n", scene));
+  constexpr size_t piece = 1 << 16;
+  std::string_view before = "\n";
+  for (const Task& task : plan.tasks) {
+    text += fmt::format(R"({}{{"action": "{}", "frame": {}, "reason": {}, "step": "{}"}})", before,
+                        action_name(task.action), task.frame, text_of(task.reason),
+                        step_name(task.step));
+    before = ",\n";
+    if (text.size() < piece) continue;
+    write(text);
+    text.clear();
+  }
+  write(text + "\n]\n}\n");
 }
 
 }  // namespace drench

@@ -64,13 +64,14 @@ struct NoisyFiles {
 /// Compares files with the key they should have. The first that does not match gives the reason.
 Decision decide(const std::vector<std::string>& files, const Key& key, const Lookup& lookup);
 
-/// Decisions of one frame. Empty if an input is missing or damaged.
-/// The step that the records of probes' files name.
+/// The steps that the records of probes' files and of checkpoints name.
 inline constexpr const char* probe_step = "probe";
+inline constexpr const char* checkpoint_step = "checkpoint";
 
 /// Whether the probes' files must be written when the simulation stands at `frame`: they hold every
 /// frame up to the one they are recorded with, which may be a later one.
 Decision decide_probes(const Wanted& wanted, int frame, const Lookup& lookup);
+/// Decisions of one frame. Empty if an input is missing or damaged.
 std::optional<Decision> decide_mesh(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_foam(const Wanted& wanted, int frame, const Lookup& lookup);
 std::optional<Decision> decide_render(const Wanted& wanted, int frame, const Lookup& lookup);
@@ -88,7 +89,10 @@ Plan make_plan(const Wanted& wanted, const Snapshot& snapshot, int timeline_last
 
 /// One line for each run of frames with the same action and reason.
 std::string plan_text(const Plan& plan);
-/// {"tasks": [{"step", "frame", "action", "reason"}], "simulation": {...}, ...}
-std::string plan_json(const Plan& plan);
+/// {"tasks": [{"step", "frame", "action", "reason"}], "simulation": {...}, ...}, a task a line,
+/// handed on piece by piece: a million frames are half a gigabyte.
+/// @param scene  a JSON object for "scene"; empty: none
+void write_plan_json(const Plan& plan, const std::string& scene,
+                     const std::function<void(std::string_view)>& write);
 
 }  // namespace drench

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <system_error>
 
 #include "pipeline/contract/log.h"
 
@@ -43,7 +44,11 @@ void Progress::start(const Plan& plan) {
   }
   start_ = std::chrono::steady_clock::now();
   finished_ = false;
-  if (style_ == ProgressStyle::bar) painter_ = std::thread([this] { draw_until_finished(); });
+  if (style_ != ProgressStyle::bar) return;
+  try {
+    painter_ = std::thread([this] { draw_until_finished(); });
+  } catch (const std::system_error&) {  // the work goes on without a bar, or says what is short
+  }
 }
 
 void Progress::done(Step step, int frame, double seconds, std::string_view line) {

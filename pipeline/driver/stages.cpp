@@ -13,6 +13,7 @@
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
+#include "pipeline/driver/readable.h"
 #include "render/kept_parts.h"
 #include "render/noisy_frame.h"
 #include "render/renderer.h"
@@ -114,17 +115,29 @@ class ShotSimulation final : public Simulation {
 class ShotStages final : public Stages {
  public:
   ShotStages(const Shot& shot, fs::path folder, const StageOptions& options)
-      : shot_(shot), folder_(std::move(folder)), options_(options) {
+      : shot_(shot),
+        folder_(std::move(folder)),
+        options_(options),
+        parts_(std::make_shared<KeptParts>(picture_memory(options))) {
     if (options.memory_gib > 0) {
       shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
     }
+  }
+
+  /// Level sets within --memory.
+  LevelSetMaker level_set_maker() const {
+    const double most = options_.memory_gib * (1 << 30);
+    return [most](const TriangleMesh& mesh, double voxel, double band, LevelSetBounds bounds) {
+      if (most > 0) bounds.most_bytes = most;
+      return make_level_set(mesh, voxel, band, bounds);
+    };
   }
 
   std::unique_ptr<Simulation> start_simulation() override {
     SimulatorOptions options;
     options.device = options_.device;
     options.checkpoint_dir = folder_ / "sim/checkpoint";
-    options.level_set = make_level_set;
+    options.level_set = level_set_maker();
     return std::make_unique<ShotSimulation>(shot_, options);
   }
 
@@ -164,9 +177,10 @@ class ShotStages final : public Stages {
     FoamStats stats;
     FoamFrame foam = no_foam(shot_);
     if (frame != shot_.timeline.first) {
-      foam = foam_frame(shot_, frame, read_foam(folder / layout::foam(frame - 1)),
-                        read_particles(folder / layout::particles(frame - 1)),
-                        read_particles(folder / layout::particles(frame)), make_level_set, &stats);
+      foam =
+          foam_frame(shot_, frame, read_foam(folder / layout::foam(frame - 1)),
+                     read_particles(folder / layout::particles(frame - 1)),
+                     read_particles(folder / layout::particles(frame)), level_set_maker(), &stats);
     }
     StageReport report;
     report.files.push_back(write_foam(folder / layout::foam(frame), foam));
@@ -263,7 +277,16 @@ class ShotStages final : public Stages {
     return report;
   }
 
+  std::string why_unreadable(const fs::path& file) const override {
+    return drench::why_unreadable(file);
+  }
+
  private:
+  static PictureMemory picture_memory(const StageOptions& options) {
+    if (options.memory_gib <= 0) return {};
+    return PictureMemory(uint64_t(options.memory_gib * double(1 << 30)));
+  }
+
   std::vector<NumberedImage> images(const fs::path& folder, const std::vector<int>& frames) const {
     std::vector<NumberedImage> result;
     for (const int frame : frames) {
@@ -275,7 +298,7 @@ class ShotStages final : public Stages {
   Shot shot_;
   fs::path folder_;
   StageOptions options_;
-  const std::shared_ptr<KeptParts> parts_ = std::make_shared<KeptParts>();
+  const std::shared_ptr<KeptParts> parts_;
 };
 
 }  // namespace

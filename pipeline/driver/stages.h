@@ -61,6 +61,8 @@ class Stages {
   /// @param keep_going  asked between frames; false throws Stopped.
   virtual StageReport movie(const std::filesystem::path& folder, const std::vector<int>& frames,
                             const std::function<bool()>& keep_going) = 0;
+  /// Why a file of the folder cannot be read as what its name says; empty if it can.
+  virtual std::string why_unreadable(const std::filesystem::path&) const { return {}; }
 };
 
 struct StageOptions {

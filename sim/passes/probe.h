@@ -7,7 +7,7 @@
 #include "sim/passes/cloth_springs.h"
 #include "sim/passes/measure_density.h"
 #include "sim/passes/probe_height.h"
-#include "sim/passes/probe_pressure.h"
+#include "sim/passes/probe_sensor.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -24,9 +24,8 @@ inline double held_pressure(const Parameters& p, const float (&place)[3]) {
 /// tenth of a spacing does (move.h) is not in it.
 inline std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
-  Totals<3> sum =
-      parallel_reduce("probe: wall force", state.fluid.count, Totals<3>{},
-                      WallForce{step_pressure_of(state), {query.axis, query.side}}, AddTotals<3>{});
+  Totals<3> sum = sum_by_particle<3>("probe: wall force", state,
+                                     WallForce{body_parts_of(state), {query.axis, query.side}});
   float centre[3];
   double area = query.side == 0 ? -1 : 1;  // along the axis
   for (int k = 0; k < 3; ++k) {
@@ -38,25 +37,10 @@ inline std::vector<double> wall_force(const State& state, const ProbeQuery& quer
   return to_vector(sum);
 }
 
-/// The same with the weights of a sensor, over their area, along the wall's normal, Pa.
-inline double wall_pressure(const State& state, const ProbeQuery& query) {
-  const Totals<1> sum =
-      parallel_reduce("probe: wall pressure", state.fluid.count, Totals<1>{},
-                      WallSensor{{step_pressure_of(state), {query.axis, query.side}},
-                                 soft_disc_of(query, state.parameters)},
-                      AddTotals<1>{});
-  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
-}
-
-/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
-inline double inner_pressure(const State& state, const ProbeQuery& query) {
-  const FluidState& f = state.fluid;
-  const Totals<1> sum = parallel_reduce("probe: pressure", f.count, Totals<1>{},
-                                        InnerSensor{step_pressure_of(state),
-                                                    soft_disc_of(query, state.parameters),
-                                                    {f.grid, f.cell_start.data()}},
-                                        AddTotals<1>{});
-  return sum.value[0] / query.extent + held_pressure(state.parameters, query.place);
+inline double pressure(State& state, const ProbeQuery& query) {
+  // What evens out a full box has had rows of its own since.
+  if (state.parameters.full && query.kind == ProbeKind::inner_pressure) correct_gradients(state);
+  return disc_pressure(state, query) + held_pressure(state.parameters, query.place);
 }
 
 struct VertexForce {
@@ -156,6 +140,55 @@ inline std::vector<double> volume(State& state) {
   return all;
 }
 
+struct VelocityInBall {
+  VecView position, velocity;
+  Vec3<float> centre, period;
+  float radius2;
+  DRENCH_HD Totals<4> operator()(int i) const {
+    if (!(length2(nearest(position[i] - centre, period)) <= radius2)) return {};
+    const Vec3<float> v = velocity[i];
+    return {{v.x, v.y, v.z, 1}};
+  }
+};
+
+/// Mean of the particles whose centres are in a ball, m/s.
+inline std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
+  const Totals<4> sum = parallel_reduce("probe: velocity", state.fluid.count, Totals<4>{},
+                                        VelocityInBall{state.fluid.position.view(),
+                                                       state.fluid.velocity.view(),
+                                                       {q.place[0], q.place[1], q.place[2]},
+                                                       periods_of(state.parameters),
+                                                       q.radius * q.radius},
+                                        AddTotals<4>{});
+  if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
+  return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
+}
+
+struct Farthest {
+  double value = -1e30;
+  DRENCH_HD Farthest operator()(const Farthest& a, const Farthest& b) const {
+    return b.value > a.value ? b : a;
+  }
+};
+struct PlaceAlong {
+  VecView position;
+  Vec3<float> normal;
+  DRENCH_HD Farthest operator()(int i) const {
+    return {dot(to_double(position[i]), to_double(normal))};
+  }
+};
+
+/// Half a spacing beyond the farthest particle, m local.
+inline double front(const State& state, const ProbeQuery& q) {
+  if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return 0.5 * state.parameters.spacing +
+         parallel_reduce(
+             "probe: front", state.fluid.count, Farthest{},
+             PlaceAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
+             Farthest{})
+             .value;
+}
+
 inline std::vector<double> vertex(const State& state, int v) {
   const VecColumn& x = state.cloth.position;
   return {value_at(x.x, v), value_at(x.y, v), value_at(x.z, v)};
@@ -166,11 +199,8 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
     case ProbeKind::height:
       return {surface_height(state, query)};
     case ProbeKind::wall_pressure:
-      return {wall_pressure(state, query)};
     case ProbeKind::inner_pressure:
-      // What evens out a full box has had rows of its own since.
-      if (state.parameters.full) correct_gradients(state);
-      return {inner_pressure(state, query)};
+      return {pressure(state, query)};
     case ProbeKind::wall_force:
       return wall_force(state, query);
     case ProbeKind::cloth_force:
@@ -181,6 +211,10 @@ inline std::vector<double> probe_state(State& state, const ProbeQuery& query) {
       return vertex(state, query.begin);
     case ProbeKind::energy:
       return energy(state, query);
+    case ProbeKind::velocity:
+      return mean_velocity(state, query);
+    case ProbeKind::front:
+      return {front(state, query)};
     case ProbeKind::volume:
       return volume(state);
   }

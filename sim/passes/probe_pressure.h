@@ -1,12 +1,17 @@
 #pragma once
-// Pressures of a step as forces: on walls what the solver itself gave to the particles, inside the
-// fluid the pair forces through a plane. Nothing here knows p but through q = p / rho^2, the
-// FluidState::pressure_term that pushed the particles.
+// Pressures of a step as forces: what the solver itself gave to the particles, by the body that
+// gave it. Nothing here knows p but through q = p / rho^2, the FluidState::pressure_term that
+// pushed the particles.
+//
+// Walls, obstacles and sheets each replace a share of a particle's density and leave the rest to
+// the others (image_walls.h, obstacle_share.h, sheet_pressure.h): S = 1 - prod (1 - S_b). The part
+// of body b in grad S is grad S_b times what the others leave. The parts sum to the whole, so that
+// every push is counted once, on the body that gave it, whatever else touches the fluid there.
 
 #include "sim/kernels.h"
 #include "sim/parallel.h"
 #include "sim/passes/density.h"
-#include "sim/passes/pressure_rows.h"
+#include "sim/passes/sheet_pressure.h"
 #include "sim/periodic.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"
@@ -33,7 +38,7 @@ std::vector<double> to_vector(const Totals<N>& sum) {
 struct StepPressure {
   VecView position, velocity, acceleration;  // the last one weakly compressible only
   const float *term, *inverse_density;       // q; 1 / rho, weakly compressible only
-  const Float4 *place, *wall;                // of the incompressible solver's solve, else null
+  const Float4* place;                       // of the incompressible solver's solve, else null
   const Float4 *correction, *correction_cross;
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
   Walls walls;
@@ -46,9 +51,8 @@ struct StepPressure {
   }
 
   /// rho_0 times the gradient of the walls' share of density, kg/m^4: -q of it is the acceleration
-  /// that walls give. See image_walls.h and PressureViscosity::wall_acceleration.
+  /// that walls give in the weakly compressible fluid. See PressureViscosity::wall_acceleration.
   DRENCH_HD Vec3<float> wall_gradient(int i) const {
-    if (wall) return {wall[i].x, wall[i].y, wall[i].z};
     const Vec3<float> p = at(i);
     const float x[3] = {p.x, p.y, p.z};
     float open[3], slope[3];
@@ -87,7 +91,6 @@ inline StepPressure step_pressure_of(const State& state) {
                  f.pressure_term.data(),
                  projected ? nullptr : f.inverse_density.data(),
                  projected ? state.pressure.place.data() : nullptr,
-                 projected ? state.pressure.wall.data() : nullptr,
                  projected ? state.pressure.correction.data() : nullptr,
                  projected ? state.pressure.correction_cross.data() : nullptr,
                  float(state.dt),
@@ -105,31 +108,158 @@ inline StepPressure step_pressure_of(const State& state) {
   return s;
 }
 
+/// What a particle sees of the sheet that it is beside, where it was pushed.
+struct Beside {
+  Vec3<float> x, normal;  // m; unit, or zero: none
+  float gap, open;        // m to the sheet's surface; share of the density that it leaves
+};
+
+/// A body's part in the gradient, kg/m^4, and the way from the particle to its surface, m.
+struct BodyPart {
+  Vec3<float> gradient{0.f, 0.f, 0.f}, way{0.f, 0.f, 0.f};
+};
+
+DRENCH_HD float component(Vec3<float> v, int axis) {
+  return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+DRENCH_HD Vec3<float> along_axis(int axis, float v) {
+  return {axis == 0 ? v : 0.f, axis == 1 ? v : 0.f, axis == 2 ? v : 0.f};
+}
+
+/// The parts of all bodies. Particles in the near list of sheets are asked for by their row, too
+/// (sum_by_particle), others with row -1.
+struct BodyParts {
+  StepPressure step;
+  ImageWalls image;
+  ObstacleShare law;
+  ObstacleViews obstacles;
+  SheetRows rows;
+  VecView normal;
+
+  DRENCH_HD Beside beside(int i, int row) const {
+    if (row < 0) return {step.at(i), {0.f, 0.f, 0.f}, 0.f, 1.f};
+    return {step.at(i), normal[i], rows.gap[row], rows.open[row]};
+  }
+  DRENCH_HD float to_wall(const Beside& b, int axis, int side) const {
+    const float x = component(b.x, axis);
+    return side == 0 ? x - image.low[axis] : image.high[axis] - x;
+  }
+  DRENCH_HD float wall_seen(const Beside& b, int axis, int side) const {
+    const float facing = side == 0 ? component(b.normal, axis) : -component(b.normal, axis);
+    return image.scale * image.seen(to_wall(b, axis, side) * facing - b.gap);
+  }
+  DRENCH_HD float open_axis(const Beside& b, int axis) const {
+    float open = 1.f;
+    for (int side = 0; side < 2; ++side)
+      open -= wall_seen(b, axis, side) *
+              WendlandC2::halfspace(image.image(to_wall(b, axis, side), image.on[axis]));
+    return open;
+  }
+  DRENCH_HD float open_walls(const Beside& b) const {
+    return open_axis(b, 0) * open_axis(b, 1) * open_axis(b, 2);
+  }
+  DRENCH_HD float open_obstacles(const Beside& b, int but) const {
+    float open = 1.f;
+    for (int k = 0; k < obstacles.count; ++k)
+      if (k != but)
+        open *= 1.f - law.seen(obstacles.obstacle[k], b.x, b.normal, b.gap, image).value;
+    return open;
+  }
+
+  /// Of one wall of the domain; what is stopped at a distance below zero counts as on it.
+  DRENCH_HD BodyPart wall(int i, const Beside& b, int axis, int side) const {
+    if (!image.on[axis]) return {};
+    const float distance = to_wall(b, axis, side);
+    if (!(distance < step.h)) return {};
+    const Vec3<float> way = along_axis(axis, side == 0 ? -max0(distance) : max0(distance));
+    if (!step.place) {
+      const bool near = (step.walls.sign(axis, component(b.x, axis)) > 0.f) == (side == 0);
+      if (!near) return {};
+      return {along_axis(axis, component(step.wall_gradient(i), axis)), way};
+    }
+    const float begins = image.image(distance, true);
+    if (!(begins < 1.f)) return {};
+    float slope = step.rest_density * 2.f * image.inverse_h * wall_seen(b, axis, side) *
+                  WendlandC2::plane(begins) * b.open * open_obstacles(b, -1);
+    for (int k = 0; k < 3; ++k)
+      if (k != axis) slope *= open_axis(b, k);
+    return {along_axis(axis, side == 0 ? -slope : slope), way};
+  }
+
+  /// Of one obstacle, or image of it.
+  DRENCH_HD BodyPart obstacle(const Beside& b, int which) const {
+    const ObstacleView& o = obstacles.obstacle[which];
+    const WallShare own = law.seen(o, b.x, b.normal, b.gap, image);
+    if (own.value == 0.f) return {};
+    const float others = step.rest_density * b.open * open_walls(b) * open_obstacles(b, which);
+    const Vec3<float> inside = o.to_own(1, b.x);
+    const float distance = max0(o.distance(inside, o.blend[1]));
+    return {own.gradient * others, o.turn(1, o.normal(inside, o.blend[1])) * -distance};
+  }
+
+  /// Of the sheet.
+  DRENCH_HD BodyPart sheet(const Beside& b, int row) const {
+    if (row < 0) return {};
+    return {rows.gradient[row], b.normal * -minimum(max0(b.gap), step.h)};
+  }
+};
+
+inline BodyParts body_parts_of(const State& state) {
+  return {step_pressure_of(state),
+          image_walls_of(state.parameters),
+          obstacle_share_of(state.parameters),
+          state.obstacles.views(),
+          sheet_rows(state),
+          state.fluid.normal.view()};
+}
+
+template <int N, class F>
+struct AwayFromSheets {
+  F f;
+  const int* triangle;
+  DRENCH_HD Totals<N> operator()(int i) const {
+    return triangle && triangle[i] >= 0 ? Totals<N>{} : f(i, -1);
+  }
+};
+template <int N, class F>
+struct BesideSheets {
+  F f;
+  const int* particle;
+  DRENCH_HD Totals<N> operator()(int row) const {
+    const int i = particle[row];
+    return i < 0 ? Totals<N>{} : f(i, row);
+  }
+};
+/// Sum of f(particle, row) over all particles, each once.
+template <int N, class F>
+Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
+  const bool near = state.parameters.incompressible && state.contact.near > 0;
+  const AddTotals<N> add;
+  const Totals<N> away =
+      parallel_reduce(name, state.fluid.count, Totals<N>{},
+                      AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
+  if (!near) return away;
+  const SheetRows rows = sheet_rows(state);
+  return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
+                                   BesideSheets<N, F>{f, rows.particle}, add));
+}
+
 struct Wall {
   int axis, side;  // 0 the low one, 1 the high one
 };
 
 /// Force of a particle on a wall, N: pressure along its normal, viscosity along the wall.
 struct WallForce {
-  StepPressure step;
+  BodyParts parts;
   Wall wall;
 
-  DRENCH_HD bool near(int i) const {
-    const Vec3<float> p = step.at(i);
-    const float x = wall.axis == 0 ? p.x : wall.axis == 1 ? p.y : p.z;
-    return (step.walls.sign(wall.axis, x) > 0.f) == (wall.side == 0);
-  }
-  DRENCH_HD float normal(int i) const {
-    if (!near(i)) return 0.f;
-    const Vec3<float> g = step.wall_gradient(i);
-    const float along = wall.axis == 0 ? g.x : wall.axis == 1 ? g.y : g.z;
-    return step.mass * step.term[i] * along;
-  }
   /// Of the weakly compressible fluid; what no-slip walls take from the other is not in it.
   DRENCH_HD float drag(int i) const {
-    if (step.wall || step.wall_viscosity == 0.f || !near(i)) return 0.f;
+    const StepPressure& step = parts.step;
+    if (step.place || step.wall_viscosity == 0.f) return 0.f;
     const Vec3<float> p = step.at(i);
     const float x[3] = {p.x, p.y, p.z};
+    if ((step.walls.sign(wall.axis, x[wall.axis]) > 0.f) != (wall.side == 0)) return 0.f;
     float share = step.rest_density;
     for (int k = 0; k < 3; ++k) {
       const float q = minimum(max0(step.walls.distance(k, x[k])) / step.h, 1.f);
@@ -139,85 +269,15 @@ struct WallForce {
     const float inverse_rho = step.inverse_density[i];
     return step.mass * step.wall_viscosity * share * inverse_rho * inverse_rho;
   }
-  DRENCH_HD Totals<3> operator()(int i) const {
-    const float push = normal(i), pull = drag(i);
+  DRENCH_HD Totals<3> operator()(int i, int row) const {
+    const StepPressure& step = parts.step;
+    const BodyPart part = parts.wall(i, parts.beside(i, row), wall.axis, wall.side);
+    const Vec3<float> push = part.gradient * (step.mass * step.term[i]);
+    const float pull = drag(i);
     Vec3<float> v{0.f, 0.f, 0.f};  // that the step started with
     if (pull > 0.f) v = step.velocity[i] - step.acceleration[i] * step.dt;
-    return {{wall.axis == 0 ? push : pull * v.x, wall.axis == 1 ? push : pull * v.y,
-             wall.axis == 2 ? push : pull * v.z}};
-  }
-};
-
-/// The weight of a sensor: 1 on its disc, falling to 0 over a rim, because a particle's force is
-/// spread over about a spacing.
-struct SoftDisc {
-  Vec3<float> centre, normal;
-  float radius, rim;   // m; the weight falls from radius - rim to radius + rim
-  Vec3<float> period;  // m; 0 where an axis is not periodic
-
-  DRENCH_HD float across(Vec3<float> p) const {
-    const Vec3<float> d = nearest(p - centre, period);
-    const Vec3<float> flat = d - normal * dot(d, normal);
-    return minimum(max0((radius + rim - length(flat)) / (2.f * rim)), 1.f);
-  }
-  DRENCH_HD float along(Vec3<float> p) const {
-    return max0(1.f - fabsf(dot(nearest(p - centre, period), normal)) / rim);
-  }
-};
-
-inline SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
-  return {{q.place[0], q.place[1], q.place[2]},
-          {q.normal[0], q.normal[1], q.normal[2]},
-          q.radius,
-          q.rim,
-          periods_of(p)};
-}
-
-struct WallSensor {
-  WallForce force;
-  SoftDisc disc;
-  DRENCH_HD Totals<1> operator()(int i) const {
-    const float weight = disc.across(force.step.at(i));
-    const float outward = force.wall.side == 0 ? -1.f : 1.f;
-    return {{weight > 0.f ? double(weight) * outward * force.normal(i) : 0.}};
-  }
-};
-
-/// The stress along the disc's normal n, times volumes: by virtual work a pressure p_i gives
-/// p_i (m / rho_0) sum_j m / rho_0 (-W'/r) (x_ij . L n) (x_ij . n), what particle i has of the pair
-/// forces through planes across n; 1 times p_i V_i in a continuum, 0.91 to 0.98 as packings are.
-struct InnerSensor {
-  StepPressure step;
-  SoftDisc disc;
-  GridView grid;
-
-  DRENCH_HD float response(int i) const {
-    const Vec3<float> x = step.at(i);
-    const Vec3<float> n = disc.normal, corrected = step.corrected(i, n);
-    const GridShape& g = grid.shape;
-    float sum = 0.f;
-    for_each_run(grid, g.cell_x(x.x), g.cell_y(x.y), g.cell_z(x.z),
-                 [&](int begin, int end, Vec3<float> shift) {
-                   const Vec3<float> seen = x - shift;
-                   for (int j = begin; j < end; ++j) {
-                     const Vec3<float> d = step.at(j) - seen;
-                     sum += step.pair_weight(length(d)) * dot(d, corrected) * dot(d, n);
-                   }
-                 });
-    const Vec3<float> s = step.wall_gradient(i);
-    const float slope[3] = {s.x, s.y, s.z}, at[3] = {x.x, x.y, x.z}, e[3] = {n.x, n.y, n.z};
-    for (int k = 0; k < 3; ++k) {
-      const float distance = step.walls.distance(k, at[k]);
-      if (distance < step.h)
-        sum -= slope[k] / step.rest_density * e[k] * e[k] * distance * step.walls.sign(k, at[k]);
-    }
-    return sum;
-  }
-  DRENCH_HD Totals<1> operator()(int i) const {
-    const Vec3<float> x = step.at(i);
-    const float weight = disc.across(x) * disc.along(x);
-    if (weight == 0.f) return {};
-    return {{double(weight) * step.mass * step.rest_density * step.term[i] * response(i)}};
+    return {{wall.axis == 0 ? push.x : pull * v.x, wall.axis == 1 ? push.y : pull * v.y,
+             wall.axis == 2 ? push.z : pull * v.z}};
   }
 };
 

@@ -31,7 +31,7 @@ struct SheetRows {
   VecView load;       // kg m, what the row gives to its vertices
   float* way;         // m, that the row may ask for in this step
   float* compliance;  // kg^2/m^8
-  float *gap, *open;  // m; share that the sheet leaves: kept for obstacles alone
+  float *gap, *open;  // m; share of the density that the sheet leaves
   int rows;
 
   /// The weighted mean of the vertices.
@@ -96,7 +96,7 @@ inline void add_sheets_to_walls(State& state) {
         const int i = c.particle[row];
         c.gradient.set(row, {0.f, 0.f, 0.f});
         c.compliance[row] = 0.f;
-        if (obstacles.count > 0) c.gap[row] = 1e30f, c.open[row] = 1.f;
+        c.gap[row] = 1e30f, c.open[row] = 1.f;
         if (i < 0 || edge[i] <= 0.f) return;
         const Vec3<float> n = normal[i], foot = c.at_foot(row, cloth_velocity) * dt;
         const float nearer = -dot(n, x[i] - start[i] - foot),
@@ -104,11 +104,9 @@ inline void add_sheets_to_walls(State& state) {
         SheetShare share = blank;
         share.at(gap, edge[i]);
         WallShare w = walls.share(x[i], n, gap);
-        if (obstacles.count > 0) {
-          c.gap[row] = gap, c.open[row] = max0(1.f - share.value);
-          for (int k = 0; k < obstacles.count; ++k)
-            w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));
-        }
+        c.gap[row] = gap, c.open[row] = max0(1.f - share.value);
+        for (int k = 0; k < obstacles.count; ++k)
+          w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));
         const float open = 1.f - w.value, left = max0(1.f - share.value);
         const Vec3<float> g = n * (rest * open * share.slope), all = w.gradient * (rest * left) + g;
         c.gradient.set(row, g);

@@ -19,6 +19,7 @@
 // is no larger than r. Not so where a solve was cut short: r may be larger than u.
 
 #include "sim/parallel.h"
+#include "sim/passes/turning_frame.h"
 #include "sim/passes/viscosity_rows.h"
 #include "sim/passes/viscosity_sheets.h"
 
@@ -39,7 +40,9 @@ struct ViscousIteration {
   Float4 *solution, *residual, *direction;
   ViscousControl* control;
   NoSlipWalls walls;
-  Vec3<float> kick;  // dt g, m/s
+  Vec3<float> kick;    // dt g, m/s
+  TurningFrame frame;  // what adds to it, ...
+  bool turns;          // ... if it does
   float inverse_dt;  // 1/s
   float tolerance;   // of the residual, over b
   double least;      // of the sum of squares, m^2/s^2
@@ -48,8 +51,13 @@ struct ViscousIteration {
   /// f, no longer than dt g.
   DRENCH_HD Vec3<float> coming(int i) const {
     const Float4 d = displacement[i];
-    const Vec3<float> f = kick + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
-    const float longest2 = length2(kick), length2_f = length2(f);
+    Vec3<float> push = kick;
+    if (turns) {
+      const Vec3<float> u = velocity[i], x{place[i].x, place[i].y, place[i].z};
+      push = push + (frame(x, u) - u);
+    }
+    const Vec3<float> f = push + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
+    const float longest2 = length2(push), length2_f = length2(f);
     return length2_f > longest2 ? f * sqrtf(longest2 / length2_f) : f;
   }
   DRENCH_HD Float4 preconditioned(const Float4& r, int i) const {
@@ -156,6 +164,8 @@ inline ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& wa
           s.control.data(),
           walls,
           {dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]},
+          turning_frame_of(state),
+          p.turns,
           float(1 / state.dt),
           p.viscous_tolerance,
           unseen * unseen * state.fluid.count,

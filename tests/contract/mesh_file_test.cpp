@@ -176,23 +176,12 @@ TEST(MeshFile, ReadsObjWithNegativeIndicesJoinedLinesAndTexture) {
                    "# a square\no thing\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\r\n"
                    "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 \\\n 3/3/1\n"
                    "f -4/1 -2/3 -1/4\n");
-  const TriangleMesh mesh = read_mesh(folder / "quad.obj");
+  const TriangleMesh mesh = read_mesh(folder / "quad.obj", CornerData::uv);
   ASSERT_EQ(mesh.triangle.size(), 2u);
   EXPECT_EQ(mesh.triangle[0], Imath::Vec3<uint32_t>(0, 1, 2));
   EXPECT_EQ(mesh.triangle[1], Imath::Vec3<uint32_t>(0, 2, 3));
   ASSERT_EQ(mesh.uv.size(), 4u);
   EXPECT_EQ(mesh.uv[3], Imath::V2f(0, 1));
-}
-
-// Splitting vertices at a texture seam would tear a sheet of cloth.
-TEST(MeshFile, KeepsObjVerticesWholeAtATextureSeam) {
-  const TemporaryFolder folder;
-  write_file_whole(folder / "seam.obj",
-                   "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\n"
-                   "f 1/1 2/2 3/3\nf 1/4 3/3 4/2\n");
-  const TriangleMesh mesh = read_mesh(folder / "seam.obj");
-  EXPECT_EQ(mesh.position.size(), 4u);
-  EXPECT_TRUE(mesh.uv.empty());
 }
 
 TEST(MeshFile, SaysWhatIsWrongWithABadFile) {
@@ -211,14 +200,14 @@ TEST(MeshFile, SaysWhatIsWrongWithABadFile) {
       {"g.ply", head + corners, "cut off"},
       {"h.ply", head + corners + "2 0 1\n", "2 vertices"},
       {"i.ply", head + corners + "3 0 1 2\n7\n", "more data"},
-      {"j.ply", "ply\nformat binary_big_endian 1.0\nend_header\n", "binary_big_endian"},
+      {"j.ply", "ply\nformat binary_middle_endian 1.0\nend_header\n", "binary_middle_endian"},
       {"k.ply",
        "ply\nformat ascii 1.0\nelement vertex 4000000000000\nproperty float x\nend_header\n0\n",
        "too short"},
       {"l.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n", "without its vertex"},
-      {"m.obj", "v 0 0 inf\n", "m.obj:1"},
+      {"m.obj", "v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 0 that is not finite"},
       {"n.obj", "v 0 0 0\nf 0 1 2\n", "n.obj:2"},
-      {"o.obj", "v 0 0\n", "finite number"},
+      {"o.obj", "v 0 0\n", "a number is expected"},
       {"p.obj", "", "no faces"},
       {"q.obj", "v 0 0 0\nf 1 1\n", "2 vertices"},
       {"r.stl", "solid", ".stl"},

@@ -76,6 +76,12 @@ std::map<std::string, std::string> TinyShot::digests() const {
   return digests;
 }
 
+std::string with_every_kind_of_file(std::string shot) {
+  const std::string samples = "samples = 1\n";
+  shot.replace(shot.find(samples), samples.size(), "samples = 16\n");  // the denoiser's least
+  return shot + "denoise = true\ndenoise_frames = 1\n[foam]\n";
+}
+
 const std::map<std::string, std::string>& undisturbed_digests(int frames) {
   static std::map<int, std::map<std::string, std::string>> made;
   if (!made.contains(frames)) {

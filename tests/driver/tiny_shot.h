@@ -33,6 +33,9 @@ class TinyShot {
   TemporaryFolder folder_;
 };
 
+/// The text of a shot that also makes foam and noisy frames.
+std::string with_every_kind_of_file(std::string shot);
+
 /// Digests after one undisturbed run of as many frames; made once in a process.
 const std::map<std::string, std::string>& undisturbed_digests(int frames = 12);
 

@@ -200,16 +200,18 @@ Plan make_toy(const ToySettings& settings, ToyStages& stages, const fs::path& fo
   manifest.open_for_append();
   Progress progress(ProgressStyle::quiet);
   std::optional<Plan> first;
-  for (int attempt = 0;; ++attempt) {
+  Again again(folder, manifest);
+  for (;;) {
     const Plan plan = make_plan(wanted, take_snapshot(folder, manifest), settings.last);
+    if (again.drops_inputs_of(wanted, plan)) continue;
     if (!first) first = plan;
     if (!plan.problems.empty()) throw Error(plan.problems.front());
     if (plan.nothing_to_do()) return *first;
     try {
       execute(wanted, plan, folder, manifest, stages, progress, options);
       return *first;
-    } catch (const PlanAgain&) {
-      if (attempt == 5) throw;
+    } catch (const PlanAgain& found) {
+      again.found(found);
     }
   }
 }

@@ -55,6 +55,10 @@ class ToyStages : public Stages {
   StageReport movie(const std::filesystem::path& folder, const std::vector<int>& frames,
                     const std::function<bool()>& keep_going) override;
 
+  std::string why_unreadable(const std::filesystem::path& file) const override {
+    return !unreadable.empty() && file.string().ends_with(unreadable) ? "it is torn" : "";
+  }
+
   void log(Step step, int frame, bool begin);
   std::vector<Event> events() const;
   int count(Step step) const;  // calls
@@ -62,6 +66,7 @@ class ToyStages : public Stages {
 
   /// Called at the beginning of a step; may wait or throw.
   std::function<void(Step, int)> hook;
+  std::string unreadable;  // a file that no stage can read, however often it is made
 
  private:
   const ToySettings settings_;

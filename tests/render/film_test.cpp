@@ -129,17 +129,17 @@ TEST_F(FilmFile, PngReturnsItsPixelsAsTexture) {
     for (int c = 0; c < 3; ++c) rgb.push_back(uint8_t(k * 30 + c));
   write_png(at("a.png"), 4, 2, rgb);
   const Texture texture = read_texture(at("a.png"));
-  ASSERT_EQ(texture.width, 4);
-  ASSERT_EQ(texture.height, 2);
+  ASSERT_EQ(texture.width(), 4);
+  ASSERT_EQ(texture.height(), 2);
   const ColorMatrix to_rec709 = color_conversion(acescg_chromaticities(), rec709_chromaticities());
   for (size_t p = 0; p < 8; ++p) {
-    const V3f linear = to_rec709(texture.texel[p]);
+    const V3f linear = to_rec709(texture.texel(p));
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(srgb_encode(linear[c]) * 255, rgb[3 * p + size_t(c)], 0.01);
   }
   // v runs upwards and pictures repeat.
-  EXPECT_EQ(texture.at({0.125f, 0.75f}), texture.texel[0]);
-  EXPECT_EQ(texture.at({1.125f, -0.25f}), texture.texel[0]);
+  EXPECT_EQ(texture.at({0.125f, 0.75f}), texture.texel(0));
+  EXPECT_EQ(texture.at({1.125f, -0.25f}), texture.texel(0));
 }
 
 /// Coordinates of a hostile mesh, divided by a small texture_size.

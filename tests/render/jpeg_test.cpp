@@ -15,9 +15,7 @@
 
 #include <jpeglib.h>
 
-#include "render/color.h"
-#include "render/texture.h"
-#include "tests/temporary_folder.h"
+#include "tests/render/picture_support.h"
 
 namespace drench::test {
 namespace {
@@ -61,11 +59,6 @@ Jpeg encode(int width, int height, int components, std::vector<uint8_t> pixels, 
   jpeg_destroy_compress(&jpeg);
   std::free(memory);
   return result;
-}
-
-Texture decode(const TemporaryFolder& folder, const std::string& bytes) {
-  write_quickly(folder / "picture.jpg", bytes);
-  return read_texture(folder / "picture.jpg");
 }
 
 /// Bounds of R, G and B from those of Y and of Cb and Cr: ITU-T T.871, R = Y + 1.402 Cr,
@@ -113,10 +106,7 @@ const Rgb& block_colour(int x, int y) {
   return y < 8 ? (x < 8 ? red : moss) : (x < 8 ? dusk : paper);
 }
 
-class JpegTexture : public testing::Test {
- protected:
-  TemporaryFolder folder_;
-};
+class JpegTexture : public PictureTest {};
 
 TEST_F(JpegTexture, ReturnsFlatBlocksWithinTheStepOfTheirMean) {
   std::vector<uint8_t> pixels;
@@ -125,13 +115,13 @@ TEST_F(JpegTexture, ReturnsFlatBlocksWithinTheStepOfTheirMean) {
       pixels.insert(pixels.end(), block_colour(x, y).begin(), block_colour(x, y).end());
   for (const Scans scans : {Scans::baseline, Scans::progressive}) {
     const Jpeg jpeg = encode(16, 16, 3, pixels, 90, scans);
-    const Texture texture = decode(folder_, jpeg.bytes);
-    ASSERT_EQ(texture.width, 16);
-    ASSERT_EQ(texture.height, 16);
+    const Texture texture = read(jpeg.bytes);
+    ASSERT_EQ(texture.width(), 16);
+    ASSERT_EQ(texture.height(), 16);
     const auto error = rgb_bounds(1 + jpeg.step[0][0] / 16, 1 + jpeg.step[1][0] / 16);
     for (int y = 0; y < 16; ++y)
       for (int x = 0; x < 16; ++x)
-        expect_within(texture.texel[size_t(16 * y + x)], block_colour(x, y), error);
+        expect_within(texture.texel(size_t(16 * y + x)), block_colour(x, y), error);
   }
 }
 
@@ -140,11 +130,11 @@ TEST_F(JpegTexture, ReturnsGreyPicturesAsGreys) {
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 24; ++x) pixels.push_back(uint8_t(40 + 80 * (x / 8)));
   const Jpeg jpeg = encode(24, 8, 1, pixels, 90);
-  const Texture texture = decode(folder_, jpeg.bytes);
-  ASSERT_EQ(texture.texel.size(), pixels.size());
+  const Texture texture = read(jpeg.bytes);
+  ASSERT_EQ(texture.texels(), pixels.size());
   const double error = 0.5 + jpeg.step[0][0] / 16;
   for (size_t p = 0; p < pixels.size(); ++p)
-    expect_within(texture.texel[p], {pixels[p], pixels[p], pixels[p]}, {error, error, error});
+    expect_within(texture.texel(p), {pixels[p], pixels[p], pixels[p]}, {error, error, error});
 }
 
 // Waves of different lengths in each channel, so that every coefficient is used.
@@ -157,8 +147,8 @@ TEST_F(JpegTexture, ReturnsWavesWithinTheQuantisation) {
            {std::sin(0.9 * x + 0.2 * y), std::cos(0.4 * x - 1.1 * y), std::sin(0.05 * x * y)})
         pixels.push_back(uint8_t(std::lround(128 + 60 * wave)));
   const Jpeg jpeg = encode(size, size, 3, pixels, 95);
-  const Texture texture = decode(folder_, jpeg.bytes);
-  ASSERT_EQ(texture.texel.size(), size_t(size * size));
+  const Texture texture = read(jpeg.bytes);
+  ASSERT_EQ(texture.texels(), size_t(size * size));
   const auto half_step = [&](int table) {
     double sum = 0;
     for (double q : jpeg.step[size_t(table)]) sum += q * q / 4;
@@ -167,8 +157,8 @@ TEST_F(JpegTexture, ReturnsWavesWithinTheQuantisation) {
   const auto bound = rgb_bounds(1 + half_step(0), 1 + half_step(1));
   const ColorMatrix to_rec709 = color_conversion(acescg_chromaticities(), rec709_chromaticities());
   std::array<double, 3> square{};
-  for (size_t p = 0; p < texture.texel.size(); ++p) {
-    const V3f linear = to_rec709(texture.texel[p]);
+  for (size_t p = 0; p < texture.texels(); ++p) {
+    const V3f linear = to_rec709(texture.texel(p));
     for (int c = 0; c < 3; ++c)
       square[size_t(c)] += std::pow(srgb_encode(linear[c]) * 255 - pixels[3 * p + size_t(c)], 2);
   }
@@ -180,13 +170,126 @@ TEST_F(JpegTexture, ReturnsWavesWithinTheQuantisation) {
 }
 
 // libjpeg fills what is missing with grey and only warns.
-TEST_F(JpegTexture, IsRefusedWhenCutOff) {
+TEST_F(JpegTexture, IsRefusedWhereAPixelIsMissing) {
   const std::string whole = encode(64, 64, 3, std::vector<uint8_t>(64 * 64 * 3, 90), 90).bytes;
-  EXPECT_EQ(decode(folder_, whole).width, 64);
-  for (size_t size = 3; size < whole.size(); ++size) {
-    const std::string text = error_of([&] { decode(folder_, whole.substr(0, size)); });
-    EXPECT_NE(text.find("picture.jpg"), std::string::npos) << size << ": " << text;
+  const Texture texture = read(whole);
+  EXPECT_EQ(texture.width(), 64);
+  for (size_t size = 3; size + 2 < whole.size(); ++size)
+    EXPECT_TRUE(tells(refused(whole.substr(0, size)), {"refused.", "JPEG"})) << size;
+  // Without the two bytes of the end marker every pixel is there.
+  for (const size_t size : {whole.size() - 2, whole.size() - 1}) {
+    std::string said;
+    const Texture same = read(whole.substr(0, size), &said);
+    EXPECT_TRUE(tells(said, {"all its pixels are there", "end is missing"}));
+    for (size_t p = 0; p < texture.texels(); ++p) EXPECT_EQ(same.texel(p), texture.texel(p));
   }
+}
+
+// A cut between scans leaves a coarser picture that decodes without a fault.
+TEST_F(JpegTexture, ProgressiveIsRefusedWithoutItsLastScans) {
+  std::vector<uint8_t> pixels;
+  for (int k = 0; k < 64 * 64 * 3; ++k) pixels.push_back(uint8_t(k * 37 % 251));
+  const std::string whole = encode(64, 64, 3, pixels, 90, Scans::progressive).bytes;
+  EXPECT_EQ(read(whole).width(), 64);
+  int scans = 0;
+  for (size_t at = whole.find("\xff\xda"); at != std::string::npos;
+       at = whole.find("\xff\xda", at + 2), ++scans)
+    EXPECT_TRUE(tells(refused(whole.substr(0, at)), {"JPEG"})) << scans;
+  EXPECT_GT(scans, 5);
+}
+
+TEST_F(JpegTexture, StrayBytesAreAWarning) {
+  const std::string whole = encode(64, 64, 3, std::vector<uint8_t>(64 * 64 * 3, 90), 90).bytes;
+  const Texture texture = read(whole);
+  std::string said;
+  const Texture after = read(whole + "some bytes", &said);
+  EXPECT_TRUE(tells(said, {"10 bytes after the picture's end"}));
+  std::string stray = whole;
+  stray.insert(whole.find("\xff\xda"), "abc");  // before the marker of the scan
+  const Texture between = read(stray, &said);
+  EXPECT_TRUE(tells(said, {"not quite right"}));
+  for (size_t p = 0; p < texture.texels(); ++p) {
+    EXPECT_EQ(after.texel(p), texture.texel(p));
+    EXPECT_EQ(between.texel(p), texture.texel(p));
+  }
+}
+
+enum class Marker { adobe, none };
+
+/// Four inks of one colour, as the samples are stored. @param inner  CMYK, or YCCK
+std::string encode_inks(const std::array<uint8_t, 4>& stored, J_COLOR_SPACE inner, Marker marker) {
+  jpeg_compress_struct jpeg;
+  jpeg_error_mgr errors;
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  unsigned char* memory = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&jpeg, &memory, &size);
+  jpeg.image_width = jpeg.image_height = 16;
+  jpeg.input_components = 4;
+  jpeg.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&jpeg);
+  jpeg_set_colorspace(&jpeg, inner);
+  jpeg.write_Adobe_marker = marker == Marker::adobe ? TRUE : FALSE;
+  jpeg_set_quality(&jpeg, 100, TRUE);
+  jpeg_start_compress(&jpeg, TRUE);
+  std::vector<uint8_t> row;
+  for (int x = 0; x < 16; ++x) row.insert(row.end(), stored.begin(), stored.end());
+  while (jpeg.next_scanline < jpeg.image_height) {
+    uint8_t* from = row.data();
+    jpeg_write_scanlines(&jpeg, &from, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  const std::string out(reinterpret_cast<char*>(memory), size);
+  jpeg_destroy_compress(&jpeg);
+  std::free(memory);
+  return out;
+}
+
+// Light is what each ink and black leave. Adobe's programs store 255 minus the ink, and say so by a
+// marker. Quality 100 has steps of 1: two levels for each of two factors, rounding and YCCK.
+TEST_F(JpegTexture, InksAreReadAsTheColourTheyLeave) {
+  const std::array<double, 4> ink{0.1, 0.6, 0.8, 0.1};  // cyan, magenta, yellow, black
+  for (const Marker marker : {Marker::adobe, Marker::none})
+    for (const J_COLOR_SPACE inner : {JCS_CMYK, JCS_YCCK}) {
+      if (marker == Marker::none && inner == JCS_YCCK) continue;  // only the marker tells it
+      std::array<uint8_t, 4> stored;
+      for (size_t c = 0; c < 4; ++c)
+        stored[c] = uint8_t(std::lround(255 * (marker == Marker::adobe ? 1 - ink[c] : ink[c])));
+      std::string said;
+      const Texture texture = read(encode_inks(stored, inner, marker), &said);
+      EXPECT_TRUE(tells(said, {"CMYK", "approximate"}));
+      const V3f linear = rec709_of(texture.texel(40));
+      for (int c = 0; c < 3; ++c) {
+        const double code = (1 - ink[size_t(c)]) * (1 - ink[3]);
+        EXPECT_NEAR(srgb_encode(linear[c]), code, 4. / 255) << c;
+      }
+    }
+}
+
+std::string with_segment(const std::string& jpeg, char marker, const std::string& content) {
+  const size_t size = content.size() + 2;
+  return jpeg.substr(0, 2) + '\xff' + marker + char(size >> 8) + char(size & 255) + content +
+         jpeg.substr(2);
+}
+
+TEST_F(JpegTexture, ProfilesAreHonouredForColoursAlone) {
+  const std::string whole = encode(16, 16, 3, std::vector<uint8_t>(16 * 16 * 3, 90), 90).bytes;
+  const std::string linear = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+  const std::string marked =
+      with_segment(whole, '\xe2', std::string("ICC_PROFILE\0\1\1", 14) + linear);
+  EXPECT_NEAR(read(whole).texel(0).x, linear_of_srgb(90 / 255.), 0.01);
+  EXPECT_NEAR(read(marked).texel(0).x, 90 / 255., 0.01);
+  EXPECT_NEAR(read_normals(marked).texel(0).x, (90 - 128) / 127., 0.02);
+  EXPECT_EQ(read_normals(marked).texel(0), read_normals(whole).texel(0));
+}
+
+TEST_F(JpegTexture, TurnedPicturesOfCamerasAreNamed) {
+  const std::string whole = encode(16, 8, 3, std::vector<uint8_t>(16 * 8 * 3, 90), 90).bytes;
+  const std::string exif("Exif\0\0MM\0\x2a\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0", 32);
+  std::string said;
+  EXPECT_EQ(read(with_segment(whole, '\xe1', exif), &said).width(), 16);
+  EXPECT_TRUE(tells(said, {"orientation 6"}));
 }
 
 }  // namespace

@@ -27,9 +27,9 @@ V3d direction_of(double column, double row, int width, int height) {
 V3f gradient(const V3d& d) { return V3f(0.4f, 0.5f, 0.8f) * float(d.y > 0 ? 1 - 0.5 * d.y : 0.2); }
 
 /// A sky with discs, each texel the mean over its area.
-Texture sky_map(int width, const std::vector<Disc>& discs) {
+SkyMap sky_map(int width, const std::vector<Disc>& discs) {
   const int height = width / 2;
-  Texture map{width, height, {}};
+  SkyMap map{width, height, {}};
   for (int r = 0; r < height; ++r)
     for (int c = 0; c < width; ++c) {
       const V3d middle = direction_of(c + 0.5, r + 0.5, width, height);
@@ -50,7 +50,7 @@ Texture sky_map(int width, const std::vector<Disc>& discs) {
   return map;
 }
 
-Light map_light(const Texture& map, const std::filesystem::path& path) {
+Light map_light(const SkyMap& map, const std::filesystem::path& path) {
   Film film{map.width, map.height, {}};
   for (const V3f& t : map.texel) film.rgba.insert(film.rgba.end(), {t.x, t.y, t.z, 1});
   write_exr(path, film, {});
@@ -132,7 +132,7 @@ TEST(MapSuns, KeepTheIrradianceAtPolesAndAtTheSeam) {
 TEST(MapSuns, KeepTheIrradianceOfOneLargeTexel) {
   const TemporaryFolder folder;
   constexpr int kWidth = 64;
-  Texture map = sky_map(kWidth, {});
+  SkyMap map = sky_map(kWidth, {});
   map.texel[8 * kWidth + 20] = V3f(500, 400, 300);
   expect_the_light_of(map_light(map, folder / "texel.exr"), kWidth,
                       {{0, 1, 0}, direction_of(20, 12, kWidth, kWidth / 2)});
@@ -140,7 +140,7 @@ TEST(MapSuns, KeepTheIrradianceOfOneLargeTexel) {
 
 TEST(MapSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
   for (const double diameter : {0.5, 2.}) {
-    Texture map = sky_map(2048, {{kToward, diameter, V3f(9000, 8000, 6000)}});
+    SkyMap map = sky_map(2048, {{kToward, diameter, V3f(9000, 8000, 6000)}});
     const std::vector<MapSun> suns = split_suns(map, 0);
     ASSERT_EQ(suns.size(), 1u);
     const double half = diameter * kPi64 / 360;
@@ -159,7 +159,7 @@ TEST(MapSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
 
 TEST(MapSuns, AreAsManyAsThereAre) {
   const V3d other = V3d(-0.8, 0.3, 0.2).normalized();
-  Texture map = sky_map(1024, {{kToward, 1, V3f(9000)}, {other, 2, V3f(3000, 100, 100)}});
+  SkyMap map = sky_map(1024, {{kToward, 1, V3f(9000)}, {other, 2, V3f(3000, 100, 100)}});
   const std::vector<MapSun> suns = split_suns(map, 0);
   ASSERT_EQ(suns.size(), 2u);
   const bool first = (V3d(suns[0].toward) - kToward).length() < 0.1;
@@ -169,8 +169,8 @@ TEST(MapSuns, AreAsManyAsThereAre) {
 
 // A glow of 12 degrees is no sun, but the disc in it is.
 TEST(MapSuns, StandInAGlowThatStays) {
-  Texture map = sky_map(1024, {{kToward, 12, V3f(150)}, {kToward, 1, V3f(40000)}});
-  const Texture before = map;
+  SkyMap map = sky_map(1024, {{kToward, 12, V3f(150)}, {kToward, 1, V3f(40000)}});
+  const SkyMap before = map;
   const std::vector<MapSun> suns = split_suns(map, 0);
   ASSERT_EQ(suns.size(), 1u);
   const double half = 0.5 * kPi64 / 180;
@@ -190,12 +190,12 @@ TEST(MapSuns, StandInAGlowThatStays) {
 TEST(MapSuns, AreNotInMapsOfLargeOrFaintLights) {
   for (const Disc& disc :
        {Disc{kToward, 20, V3f(500)}, Disc{kToward, 0.5, V3f(300)}, Disc{kToward, 3, V3f(5)}}) {
-    Texture map = sky_map(512, {disc});
-    const Texture before = map;
+    SkyMap map = sky_map(512, {disc});
+    const SkyMap before = map;
     EXPECT_TRUE(split_suns(map, 0).empty()) << disc.diameter_deg;
     EXPECT_EQ(map.texel, before.texel);
   }
-  Texture black{8, 4, std::vector<V3f>(32, V3f(0))};
+  SkyMap black{8, 4, std::vector<V3f>(32, V3f(0))};
   EXPECT_TRUE(split_suns(black, 0).empty());
 }
 

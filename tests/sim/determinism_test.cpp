@@ -167,7 +167,7 @@ TEST_P(Resume, RefusesADamagedCheckpoint) {
 TEST_P(Resume, RefusesTheCheckpointOfAnotherShot) {
   Simulator(shot(), {}).write_checkpoint(folder_ / "one");
   Shot other = shot();
-  other.gravity.y = -3;
+  other.gravity = V3d(0, -3, 0);
   Simulator simulator(other, {});
   EXPECT_THROW(simulator.read_checkpoint(folder_ / "one"), Error);
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
 #include "sim/simulator.h"
 #include "tests/sim/support.h"
 
@@ -62,10 +63,13 @@ TEST(Input, ANonManifoldEdgeIsNamed) {
   EXPECT_SAYS(error, "not manifold");
 }
 
-TEST(Input, AnUnusedVertexIsNamed) {
-  const std::string error = error_of_mesh("v 0 0 0\nv 0.1 0 0\nv 0 0 0.1\nv 1 1 1\nf 1 3 2\n");
-  EXPECT_SAYS(error, "flag");
-  EXPECT_SAYS(error, "vertex 3");
+TEST(Input, AnUnusedVertexIsLeftOutAndNamed) {
+  forget_warnings();
+  EXPECT_EQ(error_of_mesh("v 0 0 0\nv 0.1 0 0\nv 0 0 0.1\nv 1 2 3\nf 1 3 2\n"), "none");
+  ASSERT_EQ(logged_warnings().size(), 1u);
+  EXPECT_SAYS(logged_warnings()[0].text, "flag");
+  EXPECT_SAYS(logged_warnings()[0].text, "vertex 3 at (1, 2, 3) m");
+  forget_warnings();
 }
 
 TEST(Input, AMissingMeshFileIsNamed) {

@@ -62,6 +62,7 @@ void Stepper::step(double dt) {
   scene.obstacles.place(*solver, time, time + dt);
   scene.sinks.place(*solver, time, time + dt);
   if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(time + dt));
+  if (scene.motion.moves()) solver->drive(scene.motion.over(time, time + dt));
   limits = solver->step(dt, scene.cloth.vertices() > 0 ? std::max(1, int(parts)) : 1);
   time += dt, ++steps;
 }

@@ -1,0 +1,62 @@
+#include "sim/room.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/source_check.h"
+
+namespace drench::sim {
+
+double room_of(const Shot& shot, Scene& scene) {
+  const Domain& domain = shot.domain;
+  for (const Axis axis : domain.axis)
+    if (axis == Axis::open) return 1e30;
+  const double a = shot.fluid.spacing;
+  const V3d size = domain.max - domain.min;
+  const double cells = size.x * size.y * size.z / (a * a * a);
+  std::vector<int> standing;
+  for (int k = 0; k < scene.obstacles.count(); ++k)
+    if (!scene.obstacles.moves(k)) standing.push_back(k);
+  if (standing.empty()) return cells;
+  constexpr double most_places = 2e6;
+  const double step = a * std::max(1.0, std::cbrt(cells / most_places));
+  int n[3];
+  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int(std::lround(size[k] / step)));
+  double free = 0;
+  for (int z = 0; z < n[2]; ++z) {
+    for (int y = 0; y < n[1]; ++y) {
+      for (int x = 0; x < n[0]; ++x) {
+        const V3d p = domain.min + V3d((x + 0.5) * size.x / n[0], (y + 0.5) * size.y / n[1],
+                                       (z + 0.5) * size.z / n[2]);
+        bool taken = false;
+        for (size_t k = 0; k < standing.size() && !taken; ++k)
+          taken = scene.obstacles.distance_to(standing[k], p, -shot.preroll) < 0;
+        free += !taken;
+      }
+    }
+  }
+  return cells * free / (double(n[0]) * n[1] * n[2]);
+}
+
+double crowding_at(const Shot& shot, const Scene& scene, const FluidEmitter& emitter, double frame,
+                   const HostVec& position, const std::vector<float>& density) {
+  const Parameters& p = scene.parameters;
+  const V3d centre = inlet_at(emitter, shot.timeline, frame).center;
+  const double reach = std::sqrt(inlet_area(emitter) / std::numbers::pi) + double(p.support_radius);
+  const float local[3] = {scene.place(0, centre.x), scene.place(1, centre.y),
+                          scene.place(2, centre.z)};
+  double sum = 0;
+  size_t near = 0;
+  for (size_t i = 0; i < position.size(); ++i) {
+    V3d d(double(position.x[i]) - local[0], double(position.y[i]) - local[1],
+          double(position.z[i]) - local[2]);
+    for (int k = 0; k < 3; ++k) {
+      const double period = double(p.high[k]) - double(p.low[k]);
+      if (p.periodic[k]) d[k] -= period * std::round(d[k] / period);
+    }
+    if (d.length2() < reach * reach) sum += double(density[i]), ++near;
+  }
+  return near > 0 ? sum / double(near) / double(p.rest_density) : 0;
+}
+
+}  // namespace drench::sim

@@ -1,0 +1,88 @@
+// What `drench plan` says of a scene before anything runs, and what warnings become.
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/files.h"
+#include "tests/driver/tiny_shot.h"
+#include "tests/temporary_folder.h"
+
+namespace drench {
+namespace {
+
+using test::TinyShot;
+
+/// The tiny shot with more of a shot file behind it.
+test::Ended run_with(const TinyShot& shot, const std::string& command, const std::string& more,
+                     const std::vector<std::string>& words = {}) {
+  std::string text = read_text(shot.file());
+  write_file_whole(shot.file(), text + more);
+  test::Ended ended = shot.run(command, words);
+  write_file_whole(shot.file(), text);
+  return ended;
+}
+
+constexpr const char* dark_light =
+    "[[light]]\ntype = \"rectangle\"\nname = \"lamp\"\nradiance = [0, 0, 0]\n";
+
+TEST(PlanScene, CountsParticlesTrianglesMemoryAndSteps) {
+  const TinyShot shot;
+  const test::Ended ended = shot.run("plan", {"--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const nlohmann::json scene = nlohmann::json::parse(ended.out).at("scene");
+  EXPECT_GT(scene.at("particles").get<int>(), 0);
+  EXPECT_GT(scene.at("cloth_triangles").get<int>(), 0);
+  EXPECT_GT(scene.at("memory_bytes").get<double>(), 1e4);
+  EXPECT_GT(scene.at("steps_a_frame").get<double>(), 0);
+  // As many as the simulation then says it has.
+  ASSERT_EQ(shot.run("simulate", {"--frames", "1001"}).code, 0);
+  const test::Ended simulated = shot.run("simulate", {"--frames", "1002"});
+  EXPECT_NE((simulated.out + simulated.err)
+                .find("particles=" + std::to_string(scene.at("particles").get<int>())),
+            std::string::npos)
+      << simulated.err;
+}
+
+TEST(PlanScene, RefusesAFluidThatIsAllInAnObstacle) {
+  const TinyShot shot;
+  const std::string block = "[[obstacle]]\ntype = \"box\"\nname = \"block\"\nsize = [9, 9, 9]\n";
+  const test::Ended ended = run_with(shot, "plan", block);
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("block"), std::string::npos) << ended.err;
+}
+
+TEST(PlanScene, RefusesATipProbeOffItsSheet) {
+  const TinyShot shot;
+  const std::string tip = "[[probe]]\ntype = \"tip\"\nname = \"tip\"\ncloth = \"flag\"\n";
+  EXPECT_EQ(run_with(shot, "plan", tip + "vertex = 0\n").code, 0);
+  const test::Ended ended = run_with(shot, "plan", tip + "position = [0, 3, 0]\n");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("m off sheet"), std::string::npos) << ended.err;
+}
+
+TEST(Strict, MakesWarningsErrors) {
+  const TinyShot shot;
+  const test::Ended lenient = run_with(shot, "plan", dark_light, {"--json"});
+  EXPECT_EQ(lenient.code, 0) << lenient.err;
+  EXPECT_EQ(nlohmann::json::parse(lenient.out).at("warnings").size(), 1u);
+  const test::Ended strict = run_with(shot, "plan", dark_light, {"--strict"});
+  EXPECT_EQ(strict.code, 1);
+  EXPECT_NE(strict.err.find("lamp"), std::string::npos) << strict.err;
+}
+
+TEST(Strict, WarningsStandInTheLastLinesInStatsAndInJson) {
+  const TinyShot shot(2);
+  const test::Ended ended = run_with(shot, "simulate", dark_light, {"--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const size_t first = ended.err.find("is black"), last = ended.err.rfind("is black");
+  EXPECT_NE(first, last) << ended.err;
+  EXPECT_GT(last, ended.err.find("done:")) << ended.err;
+  const nlohmann::json object = nlohmann::json::parse(ended.out);
+  EXPECT_EQ(object.at("warnings"), 1);
+  EXPECT_NE(object.at("warning")[0].get<std::string>().find("lamp"), std::string::npos);
+  EXPECT_NE(read_text(shot.out() / "stats.jsonl").find("\"step\":\"warning\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace drench

@@ -1,0 +1,291 @@
+// TIFF written by libtiff in every layout that is read.
+
+#include <tiffio.h>
+
+#include <Imath/half.h>
+
+#include "tests/render/picture_support.h"
+
+namespace drench::test {
+namespace {
+
+/// One picture of a file, samples as numbers by pixel and channel.
+struct TiffOfTest {
+  int width = 21, height = 18, channels = 3, bits = 8;
+  int photometric = PHOTOMETRIC_RGB, format = SAMPLEFORMAT_UINT, orientation = 1;
+  int compression = COMPRESSION_NONE;
+  bool tiled = false, planar = false;
+  std::vector<uint16_t> extra{};
+  std::vector<std::array<uint16_t, 256>> palette{};
+  std::string icc{};
+
+  /// Of 0 to 2^bits - 1; of floats a number above 1, too.
+  double sample(int x, int y, int c) const {
+    if (format == SAMPLEFORMAT_IEEEFP) return 0.125 * x + 0.25 * y + 0.5 * c;
+    const int most = (1 << bits) - 1;
+    return (x * 997 + y * 331 + c * 71) % (most + 1);
+  }
+
+  void write(const std::filesystem::path& path, int pages = 1) const {
+    TIFF* tiff = TIFFOpen(path.c_str(), "w");
+    for (int page = 0; page < pages; ++page) write_page(tiff);
+    TIFFClose(tiff);
+  }
+
+ private:
+  void write_page(TIFF* tiff) const {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, width);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, height);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, channels);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, bits);
+    TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, format);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, photometric);
+    TIFFSetField(tiff, TIFFTAG_ORIENTATION, orientation);
+    TIFFSetField(tiff, TIFFTAG_COMPRESSION, compression);
+    TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, planar ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
+    if (!extra.empty()) TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, int(extra.size()), extra.data());
+    if (!palette.empty())
+      TIFFSetField(tiff, TIFFTAG_COLORMAP, palette[0].data(), palette[1].data(), palette[2].data());
+    if (!icc.empty()) TIFFSetField(tiff, TIFFTAG_ICCPROFILE, uint32_t(icc.size()), icc.data());
+    const int wide = tiled ? 16 : width, high = tiled ? 16 : 5;
+    if (tiled) {
+      TIFFSetField(tiff, TIFFTAG_TILEWIDTH, wide);
+      TIFFSetField(tiff, TIFFTAG_TILELENGTH, high);
+    } else {
+      TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, high);
+    }
+    for (int plane = 0; plane < (planar ? channels : 1); ++plane)
+      for (int y = 0; y < height; y += high)
+        for (int x = 0; x < width; x += wide) {
+          std::string block =
+              block_of(x, y, wide, tiled ? high : std::min(high, height - y), plane);
+          const auto size = tmsize_t(block.size());
+          if (tiled)
+            TIFFWriteEncodedTile(
+                tiff, TIFFComputeTile(tiff, uint32_t(x), uint32_t(y), 0, uint16_t(plane)),
+                block.data(), size);
+          else
+            TIFFWriteEncodedStrip(tiff, TIFFComputeStrip(tiff, uint32_t(y), uint16_t(plane)),
+                                  block.data(), size);
+        }
+    TIFFWriteDirectory(tiff);
+  }
+
+  std::string block_of(int x0, int y0, int wide, int high, int plane) const {
+    std::string out;
+    for (int y = y0; y < y0 + high; ++y) {
+      unsigned packed = 0;
+      int filled = 0;
+      for (int x = x0; x < x0 + wide; ++x)
+        for (int c = planar ? plane : 0; c < (planar ? plane + 1 : channels); ++c) {
+          const double value = sample(x, y, c);
+          if (bits < 8) {
+            packed = packed << bits | unsigned(value);
+            filled += bits;
+            if (filled == 8) out += char(packed), filled = 0, packed = 0;
+          } else if (format == SAMPLEFORMAT_IEEEFP && bits == 32) {
+            append(out, float(value));
+          } else if (format == SAMPLEFORMAT_IEEEFP) {
+            append(out, Imath::half(float(value)).bits());
+          } else if (bits == 16) {
+            append(out, uint16_t(value));
+          } else {
+            out += char(int(value));
+          }
+        }
+      if (filled > 0) out += char(packed << (8 - filled));
+    }
+    return out;
+  }
+  template <class T>
+  static void append(std::string& out, T value) {
+    out.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+};
+
+class Tiff : public PictureTest {
+ protected:
+  Texture read(const TiffOfTest& tiff, std::string* said = nullptr, int pages = 1) {
+    const auto path = next();
+    tiff.write(path, pages);
+    Texture out;
+    const std::string text = said_by([&] { out = read_texture(path); });
+    if (said)
+      *said = text;
+    else
+      EXPECT_EQ(text, "");
+    return out;
+  }
+  std::filesystem::path next() { return folder_ / (std::to_string(++count_) + ".tif"); }
+};
+
+/// Light of a sample: integers are sRGB, floats are linear.
+double light_of(const TiffOfTest& tiff, int x, int y, int c) {
+  const double value = tiff.sample(x, y, c);
+  if (tiff.format == SAMPLEFORMAT_IEEEFP) return value;
+  return linear_of_srgb(value / ((1 << tiff.bits) - 1));
+}
+
+void expect_pixels(const Texture& texture, const TiffOfTest& tiff, const std::string& what) {
+  ASSERT_EQ(texture.width(), tiff.width) << what;
+  ASSERT_EQ(texture.height(), tiff.height) << what;
+  for (int y = 0; y < tiff.height; ++y)
+    for (int x = 0; x < tiff.width; ++x) {
+      V3f light;
+      for (int c = 0; c < 3; ++c)
+        light[c] = float(light_of(tiff, x, y, tiff.channels >= 3 ? c : 0));
+      expect_near(rec709_of(texture.texel(size_t(y * tiff.width + x))), light,
+                  1e-5f * (1 + light.x), what);
+    }
+}
+
+TEST_F(Tiff, EverySampleAndLayoutIsRead) {
+  struct Kind {
+    int bits, format;
+  };
+  for (const Kind kind : {Kind{8, SAMPLEFORMAT_UINT}, Kind{16, SAMPLEFORMAT_UINT},
+                          Kind{16, SAMPLEFORMAT_IEEEFP}, Kind{32, SAMPLEFORMAT_IEEEFP}})
+    for (const int channels : {1, 3})
+      for (const bool tiled : {false, true})
+        for (const bool planar : {false, true})
+          for (const int compression :
+               {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE}) {
+            TiffOfTest tiff{.channels = channels, .bits = kind.bits};
+            tiff.format = kind.format;
+            tiff.photometric = channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB;
+            tiff.tiled = tiled;
+            tiff.planar = planar;
+            tiff.compression = compression;
+            expect_pixels(read(tiff), tiff,
+                          std::to_string(kind.bits) + " bits, " + std::to_string(channels) +
+                              " channels, tiled " + std::to_string(tiled) + ", planar " +
+                              std::to_string(planar));
+          }
+}
+
+TEST_F(Tiff, FewBitsOfGreyAreRead) {
+  for (const int bits : {1, 2, 4}) {
+    TiffOfTest tiff{.channels = 1, .bits = bits, .photometric = PHOTOMETRIC_MINISBLACK};
+    expect_pixels(read(tiff), tiff, std::to_string(bits));
+    const Texture black = read(tiff);
+    tiff.photometric = PHOTOMETRIC_MINISWHITE;
+    const Texture white = read(tiff);
+    for (int x = 0; x < tiff.width; ++x) {
+      const int most = (1 << bits) - 1;
+      EXPECT_NEAR(white.texel(size_t(x)).x, linear_of_srgb(1 - tiff.sample(x, 0, 0) / most), 1e-5);
+    }
+  }
+}
+
+TEST_F(Tiff, PaletteIsRead) {
+  TiffOfTest tiff{.channels = 1, .photometric = PHOTOMETRIC_PALETTE};
+  tiff.palette.resize(3);
+  for (size_t k = 0; k < 256; ++k) {
+    tiff.palette[0][k] = uint16_t(k * 257);
+    tiff.palette[1][k] = uint16_t((255 - k) * 257);
+    tiff.palette[2][k] = uint16_t(128 * 257);
+  }
+  const Texture texture = read(tiff);
+  for (int x = 0; x < tiff.width; ++x) {
+    const V3f found = rec709_of(texture.texel(size_t(x)));
+    EXPECT_NEAR(found.x, linear_of_srgb(tiff.sample(x, 0, 0) / 255), 1e-5);
+    EXPECT_NEAR(found.y, linear_of_srgb(1 - tiff.sample(x, 0, 0) / 255), 1e-5);
+  }
+}
+
+// TIFF 6.0, tag 274: where the first stored row and column stand.
+TEST_F(Tiff, OrientationIsTheOrderOfItsPixels) {
+  TiffOfTest tiff{.width = 5, .height = 3};
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    tiff.orientation = orientation;
+    const Texture texture = read(tiff);
+    const bool turned = orientation >= 5;
+    const int width = turned ? 3 : 5, height = turned ? 5 : 3;
+    ASSERT_EQ(texture.width(), width);
+    ASSERT_EQ(texture.height(), height);
+    // Of the pixel at the top left: row and column as stored.
+    const bool last_row =
+        orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+    const bool last_column =
+        orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+    const V3f found = rec709_of(texture.texel(0));
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(found[c], light_of(tiff, last_column ? 4 : 0, last_row ? 2 : 0, c), 1e-5)
+          << orientation;
+    // One pixel to the right.
+    const V3f right = rec709_of(texture.texel(1));
+    const int column = turned ? (last_column ? 4 : 0) : (last_column ? 3 : 1);
+    const int row = turned ? (last_row ? 1 : 1) : (last_row ? 2 : 0);
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(right[c], light_of(tiff, column, row, c), 1e-5) << orientation;
+  }
+}
+
+TEST_F(Tiff, InksAreReadAsTheColourTheyLeave) {
+  for (const int bits : {8, 16}) {
+    TiffOfTest tiff{.channels = 4, .bits = bits, .photometric = PHOTOMETRIC_SEPARATED};
+    std::string said;
+    const Texture texture = read(tiff, &said);
+    EXPECT_TRUE(tells(said, {"CMYK", "approximate"}));
+    const double most = (1 << bits) - 1;
+    for (int x = 0; x < tiff.width; ++x) {
+      const V3f found = rec709_of(texture.texel(size_t(x)));
+      for (int c = 0; c < 3; ++c) {
+        const double code = (1 - tiff.sample(x, 0, c) / most) * (1 - tiff.sample(x, 0, 3) / most);
+        EXPECT_NEAR(srgb_encode(found[c]), code, 0.6 / most + 1e-4);
+      }
+    }
+  }
+}
+
+TEST_F(Tiff, WhatIsLeftOutIsAWarning) {
+  std::string said;
+  TiffOfTest tiff{.channels = 4};
+  tiff.extra = {EXTRASAMPLE_UNASSALPHA};
+  const Texture alpha = read(tiff, &said);
+  EXPECT_TRUE(tells(said, {"alpha"}));
+  TiffOfTest plain;
+  const Texture first = read(plain, &said, 3);
+  EXPECT_TRUE(tells(said, {"first of its 3 pictures"}));
+  expect_pixels(first, plain, "pages");
+}
+
+TEST_F(Tiff, ProfileIsHonoured) {
+  TiffOfTest tiff;
+  tiff.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+  const Texture texture = read(tiff);
+  for (int x = 0; x < tiff.width; ++x)
+    EXPECT_NEAR(rec709_of(texture.texel(size_t(x))).x, tiff.sample(x, 0, 0) / 255, 1e-3);
+}
+
+TEST_F(Tiff, NormalsAreNotConverted) {
+  for (const int bits : {8, 16}) {
+    TiffOfTest tiff{.bits = bits};
+    tiff.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+    const auto path = next();
+    tiff.write(path);
+    const Texture normals = read_normal_map(path);
+    const double half = bits == 8 ? 128 : 32768;
+    for (int x = 0; x < tiff.width; ++x)
+      EXPECT_NEAR(normals.texel(size_t(x)).y, (tiff.sample(x, 0, 1) - half) / (half - 1), 1e-6);
+  }
+}
+
+TEST_F(Tiff, KindsThatAreNotReadAreNamed) {
+  TiffOfTest lab{.photometric = PHOTOMETRIC_CIELAB};
+  lab.write(next());
+  EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"CIE L*a*b*", "8 bits"}));
+}
+
+TEST_F(Tiff, WhatIsCutOffIsRefused) {
+  const TiffOfTest tiff;
+  const auto path = next();
+  tiff.write(path);
+  std::string whole(std::filesystem::file_size(path), '\0');
+  std::ifstream(path, std::ios::binary).read(whole.data(), std::streamsize(whole.size()));
+  for (size_t size = 4; size < whole.size(); size += 7)
+    EXPECT_TRUE(tells(refused(whole.substr(0, size)), {"TIFF"})) << size;
+}
+
+}  // namespace
+}  // namespace drench::test
