@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files.h"
@@ -92,6 +93,41 @@ TEST(Shots, SayWhatTheyShow) {
   for (const fs::path& file : shot_files()) {
     EXPECT_TRUE(read_text(file).starts_with("# ")) << file;
     EXPECT_NE(page.find(fmt::format("`{}`", file.stem().string())), std::string::npos) << file;
+  }
+}
+
+/// The picture in a shot's row of the folder's page; empty where there is none.
+std::string picture_in_row(const std::string& page, const std::string& shot) {
+  static const std::regex picture(R"re(src="\.\./docs/images/gallery/([a-z0-9_]+\.jpg)")re");
+  std::istringstream lines(page);
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch found;
+    if (line.find(fmt::format("`{}`", shot)) == std::string::npos) continue;
+    if (std::regex_search(line, found, picture)) return found[1];
+  }
+  return {};
+}
+
+// Each row of that page has a JPEG of at most 80 KB that shots/gallery knows how to make again, and
+// no picture lies there that none shows.
+TEST(Shots, HaveAPicture) {
+  const fs::path folder = DRENCH_SOURCE_DIR "/docs/images/gallery";
+  const std::string page = read_text(DRENCH_SOURCE_DIR "/shots/README.md");
+  const std::string script = read_text(DRENCH_SOURCE_DIR "/shots/gallery");
+  std::set<std::string> seen;
+  for (const fs::path& file : shot_files()) {
+    SCOPED_TRACE(file.filename().string());
+    const std::string name = picture_in_row(page, file.stem().string());
+    ASSERT_FALSE(name.empty());
+    ASSERT_TRUE(fs::is_regular_file(folder / name)) << name;
+    EXPECT_LE(fs::file_size(folder / name), 80000u) << name;
+    EXPECT_TRUE(read_text(folder / name).starts_with("\xff\xd8\xff")) << name;
+    const std::string frame = fmt::format("\"{}\": ", fs::path(name).stem().string());
+    EXPECT_NE(script.find(frame), std::string::npos) << frame;
+    seen.insert(name);
+  }
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    EXPECT_TRUE(seen.contains(entry.path().filename().string())) << entry.path();
   }
 }
 
