@@ -238,8 +238,8 @@ WrittenFile write_exr(const std::filesystem::path& path, const Film& film,
     }
   const Channels channels(header, film);
   if (channels.clamped() > 0)
-    log_warning("render", fmt::format("{} values beyond half clamped file={}", channels.clamped(),
-                                      path.filename().string()));
+    log_file_warning("render", path,
+                     fmt::format("{} values beyond half clamped", channels.clamped()));
   std::string bytes;
   try {
     bytes = exr_bytes(header, channels.buffer());

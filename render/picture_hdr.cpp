@@ -64,13 +64,14 @@ class HdrReader {
     file_.fail("its header has no end; write it again or give another");
   }
 
-  /// Numbers after the '='. Fewer than `count`, or such that are not finite: none.
-  std::vector<float> numbers(const std::string& line, size_t count) {
+  /// Numbers after the '='. Fewer than `count`, or such that are not finite, or not above 0 where
+  /// they must be: none.
+  std::vector<float> numbers(const std::string& line, size_t count, bool positive = false) {
     std::vector<float> out;
     const char* from = line.c_str() + line.find('=') + 1;
     for (char* to = nullptr; out.size() < count; from = to) {
       const float value = std::strtof(from, &to);
-      if (to == from || !std::isfinite(value)) break;
+      if (to == from || !std::isfinite(value) || (positive && value <= 0)) break;
       out.push_back(value);
     }
     if (out.size() == count) return out;
@@ -88,12 +89,11 @@ class HdrReader {
         if (!xyz_ && line.find("rgbe") == std::string::npos)
           file_.fail(fmt::format("its {} is not known; give 32-bit_rle_rgbe", line.substr(0, 60)));
       } else if (begins("EXPOSURE=")) {  // each multiplied the pixels by so much
-        const auto found = numbers(line, 1);
-        if (!found.empty() && found[0] > 0) scale_ *= 1 / found[0];
+        const auto found = numbers(line, 1, true);
+        if (!found.empty()) scale_ *= 1 / found[0];
       } else if (begins("COLORCORR=")) {
-        const auto found = numbers(line, 3);
-        if (!found.empty() && found[0] > 0 && found[1] > 0 && found[2] > 0)
-          scale_ *= V3f(1 / found[0], 1 / found[1], 1 / found[2]);
+        const auto found = numbers(line, 3, true);
+        if (!found.empty()) scale_ *= V3f(1 / found[0], 1 / found[1], 1 / found[2]);
       } else if (begins("PRIMARIES=")) {
         read_primaries(line);
       } else if (begins("GAMMA=")) {
@@ -105,6 +105,7 @@ class HdrReader {
                           line.substr(0, 60)));
       }
     }
+    if (xyz_) primaries_ = rec709_chromaticities();  // X, Y and Z have none of their own
     if (!finite(scale_)) file_.fail("the exposures in its header have no finite product; mend it");
   }
 

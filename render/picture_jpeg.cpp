@@ -55,7 +55,8 @@ void on_message(j_common_ptr info, int level) {
     state.lacks_end = true;
     return;
   }
-  if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR)
+  if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR &&
+      code != JWRN_BOGUS_ICC)
     on_error(info);
   if (state.warnings++ == 0) info->err->format_message(info, state.warning);
 }

@@ -27,11 +27,14 @@ std::string sources_that_overfill(const Shot& shot, Scene& scene, const HostStat
   std::string names;
   for (size_t e = 0; e < shot.fluid.emitter.size(); ++e) {
     const FluidEmitter& emitter = shot.fluid.emitter[e];
-    if (time < emitter.start - shot.preroll) continue;
+    const double since = time + shot.preroll;
+    if (since < emitter.start || since > emitter.stop) continue;
     const double frame = shot.timeline.first + time * shot.timeline.fps;
     const bool inlet = emitter.type != EmitterType::mesh && density.size() == state.id.size();
+    constexpr double too_dense = 1.01;
     if (!full &&
-        !(inlet && crowding_at(shot, scene, emitter, frame, state.position, density) > crowded))
+        !(inlet &&
+          near_inlet(shot, scene, emitter, frame, state.position, density, {}).density > too_dense))
       continue;
     names += fmt::format("{}fluid.emitter[{}]", names.empty() ? "" : ", ", e);
   }

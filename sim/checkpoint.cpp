@@ -8,13 +8,13 @@ namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '5'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '6'};
 
 /// The same list of members writes and reads: Archive is a Writer or a Reader.
 template <class Archive, class C>
 void transfer(Archive& archive, C& c) {
   archive(c.frame), archive(c.time), archive(c.steps), archive(c.next_id), archive(c.births);
-  archive(c.emitted);
+  archive(c.emitted), archive(c.shut);
   auto& s = c.state;
   for (auto* v : {&s.position, &s.velocity, &s.owed, &s.cloth_position, &s.cloth_velocity}) {
     archive(v->x), archive(v->y), archive(v->z);

@@ -17,6 +17,7 @@ struct Checkpoint {
   int next_id = 0;
   std::vector<Birth> births;
   std::vector<uint64_t> emitted;  // layers that left each emitter, particles of a mesh
+  std::vector<uint64_t> shut;     // by emitter: particles when it had no room left; 0: it sends
   HostState state;
   std::vector<double> probes;  // rows so far, ProbeSeries
   Digest layout;               // of the shot's settings and the file's layout

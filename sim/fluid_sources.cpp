@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <unordered_map>
 
@@ -18,14 +19,18 @@ namespace {
 struct Source {
   std::vector<V3d> position;
   V3d velocity;
-  std::string name;
+  double volume = 0;  // m^3 that are asked for; 0: not known
+  std::string name = {};
 };
 
+double ball_volume(double radius) { return 4. / 3 * std::numbers::pi * std::pow(radius, 3); }
+
 Source lattice_box(const FluidBox& box, double a) {
-  Source source{{}, box.velocity, {}};
+  const V3d size = box.max - box.min;
+  Source source{{}, box.velocity, size.x * size.y * size.z};
   int n[3];
   // Whole cells only: a layer that reached out of the box could stand in a wall.
-  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int((box.max[k] - box.min[k]) / a + 1e-6));
+  for (int k = 0; k < 3; ++k) n[k] = std::max(1, int(size[k] / a + 1e-6));
   for (int z = 0; z < n[2]; ++z) {
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x)
@@ -56,7 +61,7 @@ size_t points_within(const std::vector<V3d>& points, double radius) {
 }
 
 Source lattice_ball(const FluidSphere& sphere, double a) {
-  Source source{ball_points(sphere.radius, a), sphere.velocity, {}};
+  Source source{ball_points(sphere.radius, a), sphere.velocity, ball_volume(sphere.radius)};
   source.position.resize(std::max<size_t>(1, points_within(source.position, sphere.radius)));
   for (V3d& p : source.position) p += sphere.center;
   return source;
@@ -108,12 +113,13 @@ std::vector<V3d> drop_centres(const FluidDrops& drops, const Domain& domain, dou
 }
 
 Source lattice_drops(const FluidDrops& drops, const Domain& domain, double a, uint32_t seed) {
-  Source source{{}, drops.velocity, {}};
+  Source source{{}, drops.velocity, drops.count * ball_volume(drops.radius)};
   if (drops.count <= 0) return source;
   const std::vector<V3d> ball = ball_points(std::max(drops.radius, a), a);
   size_t each = std::max<size_t>(1, points_within(ball, drops.radius)), larger = 0;
   if (drops.particles > 0)
     each = size_t(drops.particles / drops.count), larger = drops.particles % drops.count;
+  if (drops.particles > 0) source.volume = 0;
   if (each + (larger > 0) > ball.size() || each == 0) {
     throw Error("fluid.drops: " + std::to_string(drops.particles) + " particles in " +
                 std::to_string(drops.count) + " drops do not fit a radius of " +
@@ -249,7 +255,8 @@ std::vector<Source> all_sources(const Shot& shot, const LevelSetMaker& make_leve
   for (size_t k = 0; k < fluid.volume.size(); ++k) {
     const FluidVolume& volume = fluid.volume[k];
     const std::string name = fmt::format("fluid.volume[{}]", k);
-    add({fill_volume(shot, volume, name, make_level_set), volume.velocity, {}}, "volume", k);
+    FilledVolume filled = fill_volume(shot, volume, name, make_level_set);
+    add({std::move(filled.place), volume.velocity, filled.volume}, "volume", k);
   }
   return sources;
 }
@@ -280,6 +287,7 @@ InitialFluid initial_fluid(const Shot& shot, const LevelSetMaker& make_level_set
           shot.file.string(), source.name));
     }
     fluid.report.push_back({.name = source.name,
+                            .volume = source.volume,
                             .asked = source.position.size(),
                             .overlapping = fluid.overlapping - overlapping,
                             .lost = {}});

@@ -33,11 +33,12 @@ void check_walls(const Shot& shot, const V3d& p, const std::string& name) {
 
 }  // namespace
 
-std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const std::string& name,
-                             const LevelSetMaker& make_level_set) {
+FilledVolume fill_volume(const Shot& shot, const FluidVolume& volume, const std::string& name,
+                         const LevelSetMaker& make_level_set) {
   const MeshInterior interior(shot, turned_mesh(volume), volume.inset, name, make_level_set);
   const Pose pose{volume.position, {V3d(1, 0, 0), V3d(0, 1, 0), V3d(0, 0, 1)}};
-  std::vector<V3d> points;
+  FilledVolume filled{{}, interior.volume()};
+  std::vector<V3d>& points = filled.place;
   for (const Cell& cell : interior.cells(shot, pose)) {
     points.push_back(place_of(shot, cell));
     check_walls(shot, points.back(), name);
@@ -48,7 +49,7 @@ std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const 
         "its surface. Use a smaller spacing, a larger scale, or a smaller inset",
         shot.file.string(), name, volume.mesh_file.string(), volume.inset, shot.fluid.spacing));
   }
-  return points;
+  return filled;
 }
 
 }  // namespace drench::sim

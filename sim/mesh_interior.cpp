@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/shells.h"
 #include "sim/obstacle_view.h"
 #include "sim/scene_report.h"
 
@@ -18,7 +19,7 @@ constexpr double voxel = 0.5, band = 2.0;  // of the level set, in spacings
 constexpr double rounding = 1e-3;          // spacings; a lattice may stand just as deep as asked
 constexpr double most_particles = 2e8;
 
-/// By the divergence theorem, whatever the orientation. m^3
+/// By the divergence theorem, of a mesh that faces away from its solid or into it all over. m^3
 double volume_of(const TriangleMesh& mesh) {
   double sum = 0;
   for (const auto& t : mesh.triangle) {
@@ -26,6 +27,11 @@ double volume_of(const TriangleMesh& mesh) {
     sum += a.dot(b.cross(c)) / 6;
   }
   return std::abs(sum);
+}
+
+bool shells_cross(const TriangleMesh& mesh) {
+  const Shells shells = find_shells(mesh);
+  return shells.bodies() < shells.count();
 }
 
 void check_size(const Shot& shot, const TriangleMesh& mesh, const V3d& size,
@@ -52,7 +58,8 @@ V3d place_of(const Shot& shot, const Cell& cell) {
 
 MeshInterior::MeshInterior(const Shot& shot, const TriangleMesh& mesh, double inset,
                            const std::string& name, const LevelSetMaker& make_level_set)
-    : depth_((inset - rounding) * shot.fluid.spacing) {
+    : depth_((inset - rounding) * shot.fluid.spacing),
+      volume_(shells_cross(mesh) ? 0 : volume_of(mesh)) {
   if (!make_level_set) throw std::logic_error("MeshInterior: no make_level_set");
   for (const V3f& p : mesh.position) {
     for (int k = 0; k < 3; ++k) {

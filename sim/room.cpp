@@ -1,5 +1,6 @@
 #include "sim/room.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -38,14 +39,15 @@ double room_of(const Shot& shot, Scene& scene) {
   return cells * free / (double(n[0]) * n[1] * n[2]);
 }
 
-double crowding_at(const Shot& shot, const Scene& scene, const FluidEmitter& emitter, double frame,
-                   const HostVec& position, const std::vector<float>& density) {
+NearInlet near_inlet(const Shot& shot, const Scene& scene, const FluidEmitter& emitter,
+                     double frame, const HostVec& position, const std::vector<float>& density,
+                     const std::vector<float>& pressure_term) {
   const Parameters& p = scene.parameters;
   const V3d centre = inlet_at(emitter, shot.timeline, frame).center;
   const double reach = std::sqrt(inlet_area(emitter) / std::numbers::pi) + double(p.support_radius);
   const float local[3] = {scene.place(0, centre.x), scene.place(1, centre.y),
                           scene.place(2, centre.z)};
-  double sum = 0;
+  NearInlet mean;
   size_t near = 0;
   for (size_t i = 0; i < position.size(); ++i) {
     V3d d(double(position.x[i]) - local[0], double(position.y[i]) - local[1],
@@ -54,9 +56,19 @@ double crowding_at(const Shot& shot, const Scene& scene, const FluidEmitter& emi
       const double period = double(p.high[k]) - double(p.low[k]);
       if (p.periodic[k]) d[k] -= period * std::round(d[k] / period);
     }
-    if (d.length2() < reach * reach) sum += double(density[i]), ++near;
+    if (d.length2() >= reach * reach) continue;
+    mean.density += double(density[i]), ++near;
+    if (!pressure_term.empty()) mean.pressure += double(pressure_term[i]);
   }
-  return near > 0 ? sum / double(near) / double(p.rest_density) : 0;
+  if (near == 0) return {};
+  const double rest = double(p.rest_density);
+  return {mean.density / (double(near) * rest), mean.pressure * rest / double(near)};
+}
+
+double pressure_without_room(const Scene& scene, const FluidEmitter& emitter) {
+  // A tenth of the sound speed is what is expected of the scene (sim/parameters.h).
+  const double expected = std::max(0.1 * double(scene.parameters.sound_speed), emitter.speed);
+  return 20 * expected * expected;
 }
 
 }  // namespace drench::sim

@@ -477,10 +477,11 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
   }
 }
 
-bool is_outside(const Domain& domain, const V3d& p) {
+/// Of sides that are open, which drop what is more than a spacing beyond.
+bool is_outside(const Domain& domain, const V3d& p, double spacing) {
   for (int k = 0; k < 3; ++k) {
     const bool open = domain.axis[size_t(k)] == Axis::open;
-    if (open && (p[k] < domain.min[k] || p[k] > domain.max[k])) return true;
+    if (open && (p[k] < domain.min[k] - spacing || p[k] > domain.max[k] + spacing)) return true;
   }
   return false;
 }
@@ -503,8 +504,8 @@ void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
     start.velocity.push(float(u.x), float(u.y), float(u.z));
     scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
     start.id.push_back(int(start.id.size()));
-    ++(is_outside(shot.domain, p) ? scene.report.source[source].outside
-                                  : scene.report.source[source].kept);
+    ++(is_outside(shot.domain, p, shot.fluid.spacing) ? scene.report.source[source].outside
+                                                      : scene.report.source[source].kept);
   }
   for (size_t s = 0; s < lost.size(); ++s) {
     for (size_t k = 0; k < lost[s].size(); ++k) {

@@ -104,11 +104,15 @@ struct Inlet {
 };
 Inlet inlet_at(const FluidEmitter& emitter, const Timeline& time, double frame);
 
-/// Lattice places in a closed mesh, world coordinates, on the lattice that begins at domain.min.
+struct FilledVolume {
+  std::vector<V3d> place;  // m, world
+  double volume = 0;       // m^3, of the mesh; 0: not known (MeshInterior::volume)
+};
+/// Places in a closed mesh on the lattice that begins at domain.min.
 /// @param name  of the volume, for errors. @throws Error if the mesh cannot be read, is not closed,
 /// holds no particle or more than a shot may have, or reaches beyond the domain's walls.
-std::vector<V3d> fill_volume(const Shot& shot, const FluidVolume& volume, const std::string& name,
-                             const LevelSetMaker& make_level_set);
+FilledVolume fill_volume(const Shot& shot, const FluidVolume& volume, const std::string& name,
+                         const LevelSetMaker& make_level_set);
 
 /// Particles of the sources that are there at the start: boxes, spheres, drops, then volumes, each
 /// in the order of the shot. A later source loses those closer than 0.9 spacings to an earlier one,

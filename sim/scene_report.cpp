@@ -14,6 +14,7 @@ namespace drench::sim {
 namespace {
 
 constexpr double worth_a_word = 0.05;  // share of a source or inlet
+constexpr double worth_a_word_of_rounding = 0.2;
 
 /// "2400 particles (0.3 litres)".
 std::string amount(double particles, double spacing) {
@@ -135,7 +136,13 @@ InletReport InletLook::of(size_t e) {
   if (!report.in_time) return report;
   constexpr int most_looks = 500;
   const double frames = std::ceil((end - begin) * t.fps);
-  const int looks = report.fixed ? 0 : int(std::clamp(frames, 1.0, double(most_looks)));
+  // One look is two level sets of each obstacle that deforms: too many for every frame.
+  const bool once =
+      report.fixed ||
+      std::any_of(shot_.obstacle.begin(), shot_.obstacle.end(), [](const Obstacle& o) {
+        return o.type == ObstacleType::mesh && is_sequence(o.mesh_file);
+      });
+  const int looks = once ? 0 : int(std::clamp(frames, 1.0, double(most_looks)));
   Blocked found{0, 0, std::vector<size_t>(shot_.obstacle.size(), 0)};
   for (int k = 0; k <= looks; ++k)
     look(e, begin + (looks > 0 ? (end - begin) * k / looks : 0), found);
@@ -198,6 +205,10 @@ size_t SourceReport::in_obstacles() const {
   size_t sum = 0;
   for (const ObstacleLoss& one : lost) sum += one.particles;
   return sum;
+}
+
+double SourceReport::rounding(double spacing) const {
+  return volume > 0 ? double(asked) * spacing * spacing * spacing / volume - 1 : 0;
 }
 
 std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high) {
@@ -288,6 +299,15 @@ void complete_report(const Shot& shot, Scene& scene) {
 std::vector<std::string> warnings_of(const SceneReport& report) {
   std::vector<std::string> all;
   for (const SourceReport& source : report.source) {
+    const double rounding = source.rounding(report.spacing);
+    if (std::abs(rounding) > worth_a_word_of_rounding) {
+      all.push_back(
+          fmt::format("{} asks for {:.3g} litres and its lattice holds {}, {:+.0f} %: sizes are "
+                      "rounded to fluid.spacing. Use a smaller spacing, or a size that is a "
+                      "multiple of it",
+                      source.name, 1000 * source.volume,
+                      amount(double(source.asked), report.spacing), 100 * rounding));
+    }
     const double gone = double(source.in_obstacles() + source.outside);
     if (gone < worth_a_word * double(source.asked)) continue;
     all.push_back(fmt::format(

@@ -21,6 +21,7 @@ struct ObstacleLoss {
 /// A box, sphere, volume or set of drops: particles it has at the start and those that it lost.
 struct SourceReport {
   std::string name;                // "fluid.box[0]", as in messages about the shot
+  double volume = 0;               // m^3 that the shot asks for; 0: not known, or particles
   size_t asked = 0;                // particles of its lattice
   size_t kept = 0;                 // particles in the first state
   size_t overlapping = 0;          // lost to sources before it
@@ -28,6 +29,9 @@ struct SourceReport {
   std::vector<ObstacleLoss> lost;  // in the order of the shot, those that took any
 
   size_t in_obstacles() const;
+  /// Share of the volume that rounding to the lattice adds, below 0 if it takes; 0: not known.
+  /// @param spacing  m.
+  double rounding(double spacing) const;
 };
 
 /// An emitter over the frames of the shot.

@@ -59,9 +59,9 @@ struct Simulator::Implementation {
   uint64_t steps = 0;
   int next_id = 0;
   sim::Births births;
-  std::vector<uint64_t> emitted;
-  std::vector<uint64_t> reported;  // HostState::removed of the last report
-  int reported_id = 0;             // next_id of the last report
+  std::vector<uint64_t> emitted, shut;  // as Checkpoint
+  std::vector<uint64_t> reported;       // HostState::removed of the last report
+  int reported_id = 0;                  // next_id of the last report
   sim::ProbeSeries probes;
   sim::Limits limits;
   std::optional<double> room;   // sim::room_of, once it is asked for
@@ -76,11 +76,11 @@ struct Simulator::Implementation {
         probes(shot, scene) {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
-    emitted.assign(layer.size(), 0);
+    emitted.assign(layer.size(), 0), shut.assign(layer.size(), 0);
     told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 5").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 6").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(scene.start.id.size());
     births = scene.births;
@@ -107,7 +107,7 @@ struct Simulator::Implementation {
 
   /// Layers due by `until`, each moved on from the moment it left; the next step knows their speed.
   void emit(double until) {
-    const std::vector<bool> crowded = crowded_inlets(until);
+    shut_crowded_inlets(until);
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& source = shot.fluid.emitter[e];
       if (source.type == EmitterType::mesh) continue;
@@ -117,7 +117,7 @@ struct Simulator::Implementation {
         if (leaves > until || leaves > source.stop - shot.preroll) break;
         check_room(e, layer[e].place.size(), until);
         if (that_fit(e, layer[e].place.size(), until) < layer[e].place.size()) continue;
-        if (crowded[e]) continue;
+        if (shut[e] > 0) continue;
         const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
         sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
         limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
@@ -165,28 +165,32 @@ struct Simulator::Implementation {
     return size_t(std::max(0.0, *room - there));
   }
 
-  /// Emitters before whose inlets fluid has nowhere to go, as in a vessel that is full: the last
-  /// step did not reach its tolerance, and it is too dense there.
-  std::vector<bool> crowded_inlets(double now) {
-    std::vector<bool> crowded(layer.size(), false);
-    if (layer.empty() || !(limits.residual > scene.parameters.tolerance)) return crowded;
-    const sim::HostVec position = solver->positions();
-    const std::vector<float> density = solver->density();
+  /// Shuts emitters before whose inlets fluid has nowhere to go, as in a vessel that is full, which
+  /// shows in its pressure; opens them once fluid has left the scene, or the inlet. Between,
+  /// pressure falls back to what rest has, and would tell nothing.
+  void shut_crowded_inlets(double now) {
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& emitter = shot.fluid.emitter[e];
-      const double since = now + shot.preroll;
-      if (emitter.type == EmitterType::mesh || since < emitter.start || since > emitter.stop)
-        continue;
-      const double crowding = sim::crowding_at(
-          shot, scene, emitter, shot.timeline.first + now * shot.timeline.fps, position, density);
-      if (crowding < sim::crowded) continue;
-      crowded[e] = true;
-      warn_full(e, now,
-                fmt::format("the fluid around it is {:.1f} % too dense, as in a vessel that "
-                            "is closed and full",
-                            100 * (crowding - 1)));
+      const double since = now + shot.preroll, most = sim::pressure_without_room(scene, emitter);
+      const bool sends = since >= emitter.start && since <= emitter.stop;
+      if (emitter.type == EmitterType::mesh || !sends) continue;
+      if (shut[e] == 0 && !(double(limits.pressure) > most)) continue;
+      solver->refresh();  // the density of these positions, whoever has looked or stopped since
+      const sim::NearInlet near =
+          sim::near_inlet(shot, scene, emitter, shot.timeline.first + now * shot.timeline.fps,
+                          solver->positions(), solver->density(), solver->pressure_term());
+      constexpr double dense = 0.97;  // all around the inlet is fluid
+      if (shut[e] > 0) {
+        if (uint64_t(solver->particles()) < shut[e] || near.density < dense) shut[e] = 0;
+      } else if (near.density > dense && near.pressure > most) {
+        shut[e] = uint64_t(solver->particles());
+        warn_full(
+            e, now,
+            fmt::format("the fluid around it has a pressure of {:.3g} Pa, as in a vessel that "
+                        "is closed and full",
+                        near.pressure * scene.parameters.rest_density));
+      }
     }
-    return crowded;
   }
 
   /// What a mesh that is kept full lacks, less what would appear inside an obstacle.
@@ -345,10 +349,11 @@ struct Simulator::Implementation {
                   "viscous solve unconverged");
     }
     if (report.sheets_cut_short > 0) {
-      log_warning("sim", fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
-                                     "they lack some of what pushed them. Shorter steps "
-                                     "(shot.time_step) or softer cloth ask for less",
-                                     frame, report.sheets_cut_short, report.steps),
+      log_warning("sim",
+                  fmt::format("frame {}: in {} of {} steps the sheets' solve was cut short; "
+                              "they lack some of what pushed them. Shorter steps "
+                              "(shot.time_step) or softer cloth ask for less",
+                              frame, report.sheets_cut_short, report.steps),
                   "sheets' solve cut short");
     }
     const std::vector<float> density = solver->density();
@@ -459,9 +464,8 @@ std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame,          s.time,          s.steps,
-                             s.next_id,        s.births.runs(), s.emitted,
-                             s.solver->save(), s.probes.rows(), s.layout};
+  sim::Checkpoint checkpoint{s.frame,   s.time, s.steps,          s.next_id,       s.births.runs(),
+                             s.emitted, s.shut, s.solver->save(), s.probes.rows(), s.layout};
   checkpoint.state.limits = s.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);
   s.last_checkpoint = path;
@@ -471,13 +475,13 @@ WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const
 void Simulator::read_checkpoint(const std::filesystem::path& path) {
   Implementation& s = *implementation_;
   sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
-  if (checkpoint.emitted.size() != s.emitted.size() ||
+  if (checkpoint.emitted.size() != s.emitted.size() || checkpoint.shut.size() != s.shut.size() ||
       checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices()) ||
       checkpoint.state.removed.size() != s.reported.size() || !s.probes.fits(checkpoint.probes)) {
     throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
   }
   s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
-  s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted;
+  s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted, s.shut = checkpoint.shut;
   s.births.resume(std::move(checkpoint.births));
   s.limits = checkpoint.state.limits;
   s.probes.resume(std::move(checkpoint.probes));

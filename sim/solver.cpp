@@ -93,6 +93,9 @@ class BackendSolver : public Solver {
   std::vector<float> density() const override {
     return to_host(state_.fluid.density, state_.fluid.count);
   }
+  std::vector<float> pressure_term() const override {
+    return to_host(state_.fluid.pressure_term, state_.fluid.count);
+  }
   std::vector<int> near_triangles() const override {
     if (!(allocated_ & column_sheet)) return std::vector<int>(state_.fluid.count, -1);
     return to_host(state_.fluid.triangle, state_.fluid.count);

@@ -103,6 +103,8 @@ class Solver {
   /// step().
   virtual std::vector<float> density() const = 0;
   virtual std::vector<int> near_triangles() const = 0;
+  /// p / rho^2 of every particle in the last step, m^5/(kg s^2).
+  virtual std::vector<float> pressure_term() const = 0;
   /// Adds particles with ids at the end of the columns.
   virtual void append(const HostVec& position, const HostVec& velocity,
                       const std::vector<int>& id) = 0;

@@ -120,7 +120,6 @@ void paper_move(State& state) {
   move_cloth(state);
 }
 
-bool turning(const Parameters& p, bool) { return p.turns; }
 bool fluid(const Parameters& p, bool) { return p.fluid; }
 bool projected(const Parameters& p, bool) { return p.fluid && p.incompressible; }
 bool free_of_obstacles(const Parameters& p, bool cloth) {
@@ -148,6 +147,11 @@ bool windy(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.air_density > 0 && p.fluid_drag > 0;
 }
 bool compressible(const Parameters& p, bool) { return p.fluid && !p.incompressible; }
+// Solver::refresh runs what stands before the compressible fluid's density once more.
+bool turning(const Parameters& p, bool cloth) { return p.turns && !compressible(p, cloth); }
+bool turning_compressible(const Parameters& p, bool cloth) {
+  return p.turns && compressible(p, cloth);
+}
 bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
 bool exact(const Parameters& p, bool cloth) { return coupled(p, cloth) && !p.incompressible; }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
@@ -206,6 +210,7 @@ const Pass all_passes[] = {
     {"pressure_viscosity", compressible, moving | column_density, column_acceleration,
      pressure_viscosity},
     {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
+    {"turn_frame", turning_compressible, column_position, column_velocity, turn_frame},
     {"integrate_velocity", compressible, column_acceleration, column_velocity, integrate_velocity},
     {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
     {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth,

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -61,15 +62,17 @@ Box bounds_of(const TriangleMesh& mesh) {
   return box;
 }
 
+double blocks_of(const LevelSet& set) {
+  return double(set.blocks[0]) * set.blocks[1] * set.blocks[2];
+}
+
 /// Blocks that a box of voxels touches, and a rim so that a sample beside them finds a block.
 void frame_blocks(const openvdb::CoordBBox& box, LevelSet& set) {
-  double total = 1;
   for (int k = 0; k < 3; ++k) {
     set.low[k] = int(std::floor(double(box.min()[k]) / LevelSet::side)) - 1;
     set.blocks[k] = int(std::floor(double(box.max()[k]) / LevelSet::side)) + 2 - set.low[k];
-    total *= set.blocks[k];
   }
-  if (total > 1e9) {
+  if (blocks_of(set) > 1e9) {
     throw Error(
         fmt::format("the mesh spans {} x {} x {} blocks of {} voxels of {:.4g} m; "
                     "use a larger fluid.spacing or a smaller mesh",
@@ -256,8 +259,19 @@ void for_each_sign(const LevelSet& set, const TriangleMesh& mesh, const Shells& 
   });
 }
 
+/// Whether a corner and all next to it are inside: no surface of the solid is near. Not told of
+/// corners on a side of the block.
+template <class IsInside>
+bool deep_inside(int corner, const IsInside& inside) {
+  for (const int k : {corner % 9, corner / 9 % 9, corner / 81})
+    if (k == 0 || k == LevelSet::side) return false;
+  for (int k = 0; k < 27; ++k)
+    if (!inside(corner + (k / 9 - 1) * 81 + (k / 3 % 3 - 1) * 9 + k % 3 - 1)) return false;
+  return true;
+}
+
 /// Whether what filling found inside is so. Within three quarters of a voxel of the surface either
-/// may be right: thin parts are rounded off.
+/// may be right: thin parts are rounded off. But faces that other shells hide are no surface.
 bool filled_right(const LevelSet& set, const TriangleMesh& mesh, const Shells& shells) {
   std::atomic<bool> right{true};
   for_each_sign(set, mesh, shells, [&](int b, const auto& inside) {
@@ -268,7 +282,11 @@ bool filled_right(const LevelSet& set, const TriangleMesh& mesh, const Shells& s
     }
     const float* value = set.value.data() + size_t(block) * LevelSet::corners;
     for (int k = 0; k < LevelSet::corners; ++k) {
-      if (std::abs(value[k]) > 0.75f * set.voxel && (value[k] < 0) != inside(k)) right = false;
+      if (std::abs(value[k]) > 0.75f * set.voxel) {
+        if ((value[k] < 0) != inside(k)) right = false;
+      } else if (deep_inside(k, inside)) {
+        right = false;
+      }
     }
   });
   return right;
@@ -286,6 +304,86 @@ void set_signs(LevelSet& set, const TriangleMesh& mesh, const Shells& shells) {
       value[k] = std::copysign(value[k], inside(k) ? -1.f : 1.f);
   });
 }
+
+// ---- faces within the solid ----
+
+/// Of a corner of a voxel.
+bool is_inside(const LevelSet& set, const openvdb::Coord& at) {
+  constexpr int side = LevelSet::side;
+  int block[3], corner[3];
+  for (int k = 0; k < 3; ++k) {
+    const int c = at[k] - side * set.low[k];
+    if (c < 0 || c >= side * set.blocks[k]) return false;
+    block[k] = c / side, corner[k] = c % side;
+  }
+  const int b = set.block[size_t((block[2] * set.blocks[1] + block[1]) * set.blocks[0] + block[0])];
+  if (b < 0) return b == LevelSet::inside;
+  // On a face it is 0 with the sign that set_signs gave it.
+  return std::signbit(set.value[size_t(b) * LevelSet::corners +
+                                size_t((corner[2] * 9 + corner[1]) * 9 + corner[0])]);
+}
+
+/// The triangles less what lies within the solid: faces that cross into another shell. What is left
+/// of a triangle ends about a voxel from where it goes in.
+class VisibleFaces {
+ public:
+  VisibleFaces(const LevelSet& set, const TriangleMesh& mesh) : set_(set) {
+    for (const auto& t : mesh.triangle) {
+      const std::array<V3f, 3> corners{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
+      if (keep(corners)) add(corners);
+    }
+  }
+  bool hides() const { return hides_; }
+  const TriangleMesh& mesh() const { return visible_; }
+
+ private:
+  /// @return whether all of it is to be kept; if not, what is has been added.
+  bool keep(const std::array<V3f, 3>& t) {
+    int longest = 0;
+    float length[3];
+    for (int k = 0; k < 3; ++k) {
+      length[k] = (t[size_t(k + 1) % 3] - t[size_t(k)]).length();
+      if (length[k] > length[longest]) longest = k;
+    }
+    const V3f middle = (t[size_t(longest)] + t[size_t(longest + 1) % 3]) * 0.5f;
+    const bool of_rounding = middle == t[size_t(longest)] || middle == t[size_t(longest + 1) % 3];
+    if (length[longest] <= set_.voxel || of_rounding) {
+      const bool hidden = within_solid((t[0] + t[1] + t[2]) / 3);
+      hides_ |= hidden;
+      return !hidden;
+    }
+    const V3f &a = t[size_t(longest)], &b = t[size_t(longest + 1) % 3],
+              &c = t[size_t(longest + 2) % 3];
+    const std::array<V3f, 3> halves[] = {{a, middle, c}, {middle, b, c}};
+    const bool first = keep(halves[0]), second = keep(halves[1]);
+    if (first && second) return true;
+    if (first) add(halves[0]);
+    if (second) add(halves[1]);
+    return false;
+  }
+  /// Whether all corners of voxels within a voxel along each axis are inside.
+  bool within_solid(const V3f& p) const {
+    int low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      const double at = std::clamp(double(p[k] / set_.voxel), -1e9, 1e9);
+      low[k] = int(std::ceil(at - 1)), high[k] = int(std::floor(at + 1));
+    }
+    for (int z = low[2]; z <= high[2]; ++z)
+      for (int y = low[1]; y <= high[1]; ++y)
+        for (int x = low[0]; x <= high[0]; ++x)
+          if (!is_inside(set_, {x, y, z})) return false;
+    return true;
+  }
+  void add(const std::array<V3f, 3>& t) {
+    const auto first = uint32_t(visible_.position.size());
+    visible_.position.insert(visible_.position.end(), t.begin(), t.end());
+    visible_.triangle.emplace_back(first, first + 1, first + 2);
+  }
+
+  const LevelSet& set_;
+  TriangleMesh visible_;
+  bool hides_ = false;
+};
 
 // ---- what is asked for, and what it takes ----
 
@@ -321,16 +419,18 @@ TriangleMesh part_within(const TriangleMesh& mesh, const Box& box) {
 }
 
 /// Bytes that a level set takes while it is made, from above: blocks in a band of about ten voxels
-/// on either side of the surface, OpenVDB's and its own, and copies and lists of the triangles.
-double bytes_of(const TriangleMesh& mesh, double voxel) {
+/// on either side of the surface, OpenVDB's and its own, copies and lists of the triangles, and
+/// what each block has in lists.
+/// @param total  blocks, empty ones too.
+double bytes_of(const TriangleMesh& mesh, double voxel, double total) {
   double area = 0;
   for (const auto& t : mesh.triangle) {
     const V3d a(mesh.position[t.x]), b(mesh.position[t.y]), c(mesh.position[t.z]);
     area += 0.5 * (b - a).cross(c - a).length();
   }
-  constexpr double layers = 3, a_block = 13000, a_triangle = 300;
+  constexpr double layers = 3, a_block = 13000, a_triangle = 300, a_place = 32;
   const double blocks = layers * area / (LevelSet::side * LevelSet::side * voxel * voxel);
-  return blocks * a_block + double(mesh.triangle.size()) * a_triangle;
+  return blocks * a_block + double(mesh.triangle.size()) * a_triangle + total * a_place;
 }
 
 /// A failing allocation within OpenVDB ends the program, since its trees allocate where they are
@@ -344,13 +444,21 @@ void check_memory(double bytes, double voxel, const LevelSetBounds& bounds) {
                     voxel, bytes / (1 << 30), why));
   };
   if (bounds.most_bytes > 0 && bytes > bounds.most_bytes)
-    refuse(fmt::format("more than the {:.3g} GiB that it may", bounds.most_bytes / (1 << 30)));
+    refuse(fmt::format("more than the {:.3g} GiB that it may (--memory)",
+                       bounds.most_bytes / (1 << 30)));
   void* const probe = bytes < 1e15 ? std::malloc(size_t(bytes)) : nullptr;
   if (!probe) refuse("which the system does not give");
   std::free(probe);
 }
 
 }  // namespace
+
+LevelSetMaker level_sets_within(double gib) {
+  return [gib](const TriangleMesh& mesh, double voxel, double band, LevelSetBounds bounds) {
+    if (gib > 0) bounds.most_bytes = gib * (1 << 30);
+    return make_level_set(mesh, voxel, band, bounds);
+  };
+}
 
 LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
                         const LevelSetBounds& bounds) {
@@ -364,25 +472,34 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
     reach.low[k] = bounds.low[k] - band - 4 * voxel;
     reach.high[k] = bounds.high[k] + band + 4 * voxel;
   }
-  const bool cut = beyond && bytes_of(mesh, voxel) > worth_cutting;
+  LevelSet set;
+  set.voxel = float(voxel), set.band = float(band);
+  const auto frame_within = [&](const LevelSetBounds& within) {
+    frame_blocks(voxels_of(whole, within, voxel, band), set);
+  };
+  const bool cut = beyond && bytes_of(mesh, voxel, 0) > worth_cutting;
   const TriangleMesh part = cut ? part_within(mesh, reach) : TriangleMesh{};
   const TriangleMesh& near = cut ? part : mesh;
-  check_memory(bytes_of(near, voxel), voxel, bounds);
+  check_memory(bytes_of(near, voxel, 0), voxel, bounds);
+  frame_within(cut ? bounds : LevelSetBounds{});
+  check_memory(bytes_of(near, voxel, blocks_of(set)), voxel, bounds);
   const Shells shells = find_shells(mesh);
   const bool cavities = std::any_of(shells.depth.begin(), shells.depth.end(),
                                     [](int depth) { return depth % 2 == 1; });
-  LevelSet set;
-  set.voxel = float(voxel), set.band = float(band);
   if (!cut && !cavities) {
     const FloatGrid::Ptr grid = narrow_band(mesh, voxel, band, Inside::filled);
     frame_blocks(grid->evalActiveVoxelBoundingBox(), set);
     take_values(*grid, mesh, set);
     if (filled_right(set, mesh, shells)) return set;
   }
-  const FloatGrid::Ptr grid = narrow_band(near, voxel, band, Inside::unknown);
-  frame_blocks(voxels_of(whole, cut ? bounds : LevelSetBounds{}, voxel, band), set);
-  take_values(*grid, near, set);
-  set_signs(set, mesh, shells);
+  frame_within(cut ? bounds : LevelSetBounds{});
+  const auto make = [&](const TriangleMesh& faces) {
+    take_values(*narrow_band(faces, voxel, band, Inside::unknown), faces, set);
+    set_signs(set, mesh, shells);
+  };
+  make(near);
+  const VisibleFaces visible(set, near);
+  if (visible.hides()) make(visible.mesh());
   return set;
 }
 

@@ -41,4 +41,7 @@ using LevelSetMaker = std::function<LevelSet(const TriangleMesh& mesh, double vo
 LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
                         const LevelSetBounds& bounds = {});
 
+/// make_level_set, each within so many GiB; 0: as LevelSetBounds has it.
+LevelSetMaker level_sets_within(double gib);
+
 }  // namespace drench

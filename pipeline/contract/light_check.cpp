@@ -12,18 +12,19 @@ namespace drench {
 
 namespace {
 
-/// Of all that may be drawn but the ground, m; what fluid and cloth do is not known beyond the
-/// domain's open sides, so these count as far away.
+/// Of all that may be drawn but the ground, m; what fluid does is not known beyond the domain's
+/// open sides, and where cloth goes, and what moves: these count as far away.
 Imath::Box3d reach_of(const Shot& shot) {
   constexpr double far = 1e6;
   Imath::Box3d box(shot.domain.min, shot.domain.max);
   for (int k = 0; k < 3; ++k) {
-    if (shot.domain.axis[size_t(k)] != Axis::open) continue;
+    if (shot.domain.axis[size_t(k)] != Axis::open && shot.cloth.empty()) continue;
     box.min[k] = -far, box.max[k] = far;
   }
   for (const Obstacle& obstacle : shot.obstacle) {
     const bool bounded =
-        obstacle.type == ObstacleType::box || obstacle.type == ObstacleType::sphere;
+        obstacle.position.keys.size() < 2 &&
+        (obstacle.type == ObstacleType::box || obstacle.type == ObstacleType::sphere);
     const double reach = !bounded                                ? far
                          : obstacle.type == ObstacleType::sphere ? obstacle.radius
                                                                  : obstacle.size.length() / 2;

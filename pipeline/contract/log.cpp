@@ -9,7 +9,6 @@
 #include <mutex>
 
 #include "pipeline/contract/error.h"
-
 #include "pipeline/contract/printable.h"
 
 namespace drench {
@@ -59,6 +58,18 @@ void log_verbose(std::string_view part, std::string_view text) {
 void log_warning(std::string_view part, std::string_view text, std::string_view cause) {
   if (on_warning == OnWarning::fail) throw Error(std::string(text));
   if (remember(part, text, cause.empty() ? text : cause)) write_line(part, "warning: ", text);
+}
+
+void log_file_warning(std::string_view part, const std::filesystem::path& file,
+                      std::string_view text) {
+  std::string cause = file.filename().string() + ": " + std::string(text);
+  std::replace_if(
+      cause.begin(), cause.end(), [](char c) { return c >= '0' && c <= '9'; }, '#');
+  cause.erase(
+      std::unique(cause.begin(), cause.end(), [](char a, char b) { return a == '#' && b == '#'; }),
+      cause.end());
+  log_warning(part, file.string() + ": " + std::string(text),
+              (file.parent_path() / cause).string());
 }
 
 void set_on_warning(OnWarning what) { on_warning = what; }

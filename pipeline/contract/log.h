@@ -3,6 +3,7 @@
 // 12.204 sim frame=37 particles=4.10M substeps=6 density_error=0.0008 ms=318
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,11 @@ void log_verbose(std::string_view part, std::string_view text);  // shown with -
 ///               names what they share.
 /// @throws Error with the text where warnings are errors.
 void log_warning(std::string_view part, std::string_view text, std::string_view cause = {});
+
+/// "FILE: text", of a file that may be one of a sequence: what differs in digits alone, of the text
+/// or the file's name, is one cause.
+void log_file_warning(std::string_view part, const std::filesystem::path& file,
+                      std::string_view text);
 
 enum class OnWarning { go_on, fail };
 void set_on_warning(OnWarning what);

@@ -196,9 +196,7 @@ void MeshBuilder::split_vertices() {
 }
 
 void MeshBuilder::warn() const {
-  const auto say = [&](const std::string& text) {
-    log_warning("mesh", path_.string() + ": " + text);
-  };
+  const auto say = [&](const std::string& text) { log_file_warning("mesh", path_, text); };
   if (short_faces_ > 0) {
     say(
         fmt::format("{} faces of fewer than three corners were left out, the first at {}; they "

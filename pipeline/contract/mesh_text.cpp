@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
 
 namespace drench {
 
@@ -57,6 +58,14 @@ std::optional<float> NumberReader::single(std::string_view word) {
   // What floats call out of range because it is next to nothing.
   if (const std::optional<double> wide = read<double>(word)) return float(*wide);
   return {};
+}
+
+void NumberReader::warn(const std::filesystem::path& path) const {
+  if (commas_ == 0) return;
+  log_file_warning("mesh", path,
+                   fmt::format("{} numbers have a decimal comma, which was taken for a point; "
+                               "export with points",
+                               commas_));
 }
 
 }  // namespace drench

@@ -23,6 +23,8 @@ class NumberReader {
   std::optional<double> real(std::string_view word);
   std::optional<float> single(std::string_view word);
   uint64_t commas() const { return commas_; }
+  /// Of the decimal commas there were.
+  void warn(const std::filesystem::path& path) const;
 
  private:
   template <class T>

@@ -111,7 +111,7 @@ class ObjReader {
                        word.substr(0, 40)));
     }
     index += index < 0 ? int64_t(count) : -1;
-    if (index < 0 || index >= int64_t(1) << 32) {
+    if (index < 0 || index >= int64_t(MeshBuilder::none)) {
       fail(fmt::format("has an index '{}' outside the file's vertices", word.substr(0, 40)));
     }
     return uint32_t(index);
@@ -129,6 +129,7 @@ class ObjReader {
       corner.uv = index_of(part, builder_.uv.size());
     if (const auto part = next_part(); !part.empty())
       corner.normal = index_of(part, builder_.normal.size());
+    if (!word.empty()) fail("has a corner of a face with more than three parts");
     return corner;
   }
 
@@ -141,15 +142,12 @@ class ObjReader {
   }
 
   void warn() const {
-    if (number_.commas() > 0) {
-      log_warning("mesh", fmt::format("{}: {} numbers have a decimal comma, which was taken for a "
-                                      "point; export with points",
-                                      path_.string(), number_.commas()));
-    }
+    number_.warn(path_);
     if (curved_ > 0) {
-      log_warning("mesh", fmt::format("{}: {} curves and curved surfaces were left out; export "
-                                      "them as polygons",
-                                      path_.string(), curved_));
+      log_file_warning("mesh", path_,
+                       fmt::format("{} curves and curved surfaces were left out; export them as "
+                                   "polygons",
+                                   curved_));
     }
   }
 

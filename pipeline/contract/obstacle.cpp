@@ -94,11 +94,41 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
     ++moved;
   }
   if (moved > 0) {
-    log_warning("mesh", fmt::format("{}: hairline gaps were closed: {} vertices moved by up to "
-                                    "{:.3g} of the file's unit onto their neighbours. Merge its "
-                                    "vertices by distance",
-                                    file.string(), moved, welded.widest));
+    log_file_warning("mesh", file,
+                     fmt::format("hairline gaps were closed: {} vertices moved by up to {:.3g} of "
+                                 "the file's unit onto their neighbours. Merge its vertices by "
+                                 "distance",
+                                 moved, welded.widest));
   }
+}
+
+/// Leaves out vertices that no triangle has: they are no places of a solid.
+void drop_unused_vertices(TriangleMesh& mesh, const std::filesystem::path& file) {
+  const size_t n = mesh.position.size();
+  constexpr auto unused = uint32_t(-1);
+  std::vector<uint32_t> number(n, unused);
+  for (const Triangle& t : mesh.triangle)
+    for (const uint32_t v : {t.x, t.y, t.z})
+      number[v] = number[mesh.point.empty() ? v : mesh.point[v]] = 0;
+  uint32_t kept = 0;
+  for (uint32_t& v : number)
+    if (v != unused) v = kept++;
+  if (kept == n) return;
+  const auto shrink = [&](auto& column) {
+    if (column.size() != n) return;
+    for (size_t v = 0; v < n; ++v)
+      if (number[v] != unused) column[number[v]] = column[v];
+    column.resize(kept);
+  };
+  shrink(mesh.position), shrink(mesh.velocity), shrink(mesh.normal), shrink(mesh.uv);
+  shrink(mesh.rest_position), shrink(mesh.source), shrink(mesh.age), shrink(mesh.wetness);
+  for (uint32_t& v : mesh.point) v = number[v];
+  shrink(mesh.point);
+  for (Triangle& t : mesh.triangle) t = {number[t.x], number[t.y], number[t.z]};
+  log_file_warning("mesh", file,
+                   fmt::format("{} vertices belong to no triangle and were left out; remove them "
+                               "where the mesh is modelled",
+                               n - kept));
 }
 
 /// Turns normals that point away from their faces.
@@ -248,6 +278,7 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
 
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
   TriangleMesh mesh = read_mesh(file, corners);
+  drop_unused_vertices(mesh, file);
   close_gaps(mesh, file);
   orient_shells(mesh);
   turn_normals(mesh);

@@ -31,15 +31,22 @@ std::vector<std::string> fit_periods(Shot& shot) {
     if (around.empty() || std::abs(length - multiple * a) < 1e-3 * a) continue;
     const double least = std::ceil(2 * support_ratio(shot) - 1e-9);
     const double fitted = std::max(multiple, least) * a;
+    const double end = shot.domain.min[k] + fitted;
+    for (FluidBox& box : shot.fluid.box) {
+      const bool ended_there = std::abs(box.max[k] - shot.domain.max[k]) < 1e-6 * length;
+      if (ended_there && box.min[k] < end) box.max[k] = end;
+    }
     for (FluidBox* box : around) box->max[k] = box->min[k] + fitted;
-    shot.domain.max[k] = shot.domain.min[k] + fitted;
+    shot.domain.max[k] = end;
     for (Probe& probe : shot.probe) {
       const double wide =
           probe.normal.length() > 0
               ? std::sqrt(std::max(0.0, 1 - std::pow(probe.normal.normalized()[k], 2)))
               : 1;
-      if (probe.type == ProbeType::pressure && wide > 0)
-        probe.radius = std::min(probe.radius, 0.5 * fitted / wide);
+      if (probe.type != ProbeType::pressure || wide == 0) continue;
+      const bool as_broad = std::abs(2 * probe.radius * wide - length) < 1e-6 * length;
+      const double widest = 0.5 * fitted / wide;
+      probe.radius = as_broad ? widest : std::min(probe.radius, widest);
     }
     changed.push_back(fmt::format(
         "the period of the {} axis, {:.9g} m, is {:.6g} times fluid.spacing = {:.9g} m; it is now "

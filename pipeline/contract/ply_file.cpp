@@ -11,7 +11,6 @@
 #include <optional>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/log.h"
 #include "pipeline/contract/mesh_builder.h"
 #include "pipeline/contract/mesh_text.h"
 
@@ -90,11 +89,7 @@ class PlyReader {
     }
     if (!vertices || !faces) fail("has no vertex or no face element; a triangle mesh is expected");
     check_end();
-    if (number_.commas() > 0) {
-      log_warning("mesh", fmt::format("{}: {} numbers have a decimal comma, which was taken for a "
-                                      "point; export with points",
-                                      path_.string(), number_.commas()));
-    }
+    number_.warn(path_);
     TriangleMesh mesh = builder_.finish();
     keep_contact(mesh);
     keep_points(mesh);
@@ -412,9 +407,11 @@ class PlyReader {
 
   void keep_points(TriangleMesh& mesh) const {
     if (point_.empty() || point_.size() != mesh.position.size()) return;
-    for (const double point : point_) {
-      const bool is_vertex = point >= 0 && point < double(point_.size());
-      if (!is_vertex) return mesh.point.clear();  // of a program that means something else
+    for (size_t v = 0; v < point_.size(); ++v) {
+      const double point = point_[v];
+      const bool is_same_place = point >= 0 && point < double(point_.size()) &&
+                                 mesh.position[size_t(point)] == mesh.position[v];
+      if (!is_same_place) return mesh.point.clear();  // of a program that means something else
       mesh.point.push_back(uint32_t(point));
     }
   }

@@ -91,11 +91,18 @@ inline size_t checked_count(const points::PointDataGrid& grid) {
 
 using Leaf = points::PointDataTree::LeafNodeType;
 
+/// @throws std::runtime_error if it has none of that name.
+inline const points::AttributeArray& column_of(const Leaf& leaf, const char* name) {
+  if (leaf.attributeSet().find(name) == points::AttributeSet::INVALID_POS)
+    throw std::runtime_error(fmt::format("it lacks the column '{}'", name));
+  return leaf.constAttributeArray(name);
+}
+
 /// Appends places and velocities of a leaf's points, m and m/s.
 inline void append_motion(const points::PointDataGrid& grid, const Leaf& leaf,
                           std::vector<Imath::V3f>& position, std::vector<Imath::V3f>& velocity) {
-  const points::AttributeHandle<openvdb::Vec3f> own_place(leaf.constAttributeArray("P"));
-  const points::AttributeHandle<openvdb::Vec3f> own_velocity(leaf.constAttributeArray("v"));
+  const points::AttributeHandle<openvdb::Vec3f> own_place(column_of(leaf, "P"));
+  const points::AttributeHandle<openvdb::Vec3f> own_velocity(column_of(leaf, "v"));
   for (auto point = leaf.beginIndexOn(); point; ++point) {
     const openvdb::Vec3d cell = point.getCoord().asVec3d();
     const openvdb::Vec3d x = grid.indexToWorld(cell + openvdb::Vec3d(own_place.get(*point)));

@@ -17,7 +17,8 @@ namespace drench {
 /// (Newell's normal: Tampieri 1992). Corners may coincide, so that a hole can be joined to the rim
 /// by a slit. A polygon without area becomes a fan.
 /// @param corner  n >= 3 positions, m, in order; every one finite.
-/// @return n - 2 triangles; none if the polygon crosses itself.
+/// @return n - 2 triangles; none if the polygon crosses itself, or is not convex and has more than
+/// most_corners.
 std::optional<std::vector<std::array<uint32_t, 3>>> triangulate(std::span<const Imath::V3f> corner);
 
 /// Of a polygon that is not convex: its edges are tried against one another.

@@ -50,9 +50,8 @@ class ProbeChecker {
     for (const int k : axes) {
       if (domain.axis[size_t(k)] == Axis::open) continue;
       // Its images are seen across a seam, but each particle once.
-      const bool periodic = domain.axis[size_t(k)] == Axis::periodic;
-      if (periodic && 2 * reach[k] <= domain.max[k] - domain.min[k]) continue;
-      if (periodic && 2 * reach[k] > domain.max[k] - domain.min[k]) {
+      if (domain.axis[size_t(k)] == Axis::periodic) {
+        if (2 * reach[k] <= domain.max[k] - domain.min[k] + 1e-9) continue;
         fail("radius",
              fmt::format("{} \"{}\" is {:.6g} m wide in {}, more than the period of {:.6g} m: it "
                          "would see its fluid twice. Use a radius of at most {:.6g} m",

@@ -295,17 +295,6 @@ std::vector<double> volumes_of(const TriangleMesh& mesh, const Shells& shells) {
   return volume;
 }
 
-void turn_normals(TriangleMesh& mesh, const std::vector<char>& turned) {
-  std::vector<V3d> faces(mesh.position.size(), V3d(0));
-  for (size_t t = 0; t < mesh.triangle.size(); ++t) {
-    const Triangle& c = mesh.triangle[t];
-    const V3d a(mesh.position[c.x]), b(mesh.position[c.y]), d(mesh.position[c.z]);
-    for (int k = 0; turned[t] && k < 3; ++k) faces[c[k]] += (b - a).cross(d - a);
-  }
-  for (size_t v = 0; v < mesh.normal.size(); ++v)
-    if (V3d(mesh.normal[v]).dot(faces[v]) < 0) mesh.normal[v] = -mesh.normal[v];
-}
-
 // ---- rays ----
 
 __extension__ typedef __int128 Wide;
@@ -424,16 +413,12 @@ Shells find_shells(const TriangleMesh& mesh) {
 void orient_shells(TriangleMesh& mesh) {
   const Shells shells = find_shells(mesh);
   const std::vector<double> volume = volumes_of(mesh, shells);
-  std::vector<char> turned(mesh.triangle.size(), 0);
-  bool any = false;
   for (size_t t = 0; t < mesh.triangle.size(); ++t) {
     const int s = shells.shell[t];
     if (volume[size_t(s)] == 0) continue;  // a sheet folded onto itself: neither way is outward
     if ((volume[size_t(s)] < 0) == shells.is_cavity(s)) continue;
     std::swap(mesh.triangle[t].y, mesh.triangle[t].z);
-    turned[t] = 1, any = true;
   }
-  if (any && !mesh.normal.empty()) turn_normals(mesh, turned);
 }
 
 }  // namespace drench

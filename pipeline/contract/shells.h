@@ -30,7 +30,7 @@ struct Shells {
 Shells find_shells(const TriangleMesh& mesh);
 
 /// Turns triangles so that they face away from the solid: each shell outward by itself, cavities
-/// inward. Normals of vertices whose triangles were turned follow where they point the other way.
+/// inward. Normals stay as they are.
 void orient_shells(TriangleMesh& mesh);
 
 /// Where rays along x meet the shells of a mesh. Rays go through the places (j, k) of a grid in y

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "pipeline/contract/check_base.h"
-#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/light_check.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/picture_check.h"
 #include "pipeline/contract/printable.h"
 #include "pipeline/contract/probe_check.h"
@@ -372,6 +372,11 @@ class Checker : CheckBase {
                          "are allowed. Use fewer cells",
                          path, cloth.cells.x, cloth.cells.y, vertices, most_vertices));
       }
+    }
+    if (cloth.weld < 0 && cloth.weld != -1) {
+      fail(path + ".weld", fmt::format("{}.weld is {} m; give a distance, 0 for none, or -1 for "
+                                       "1e-5 of the mesh's diagonal",
+                                       path, cloth.weld));
     }
     if (!(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
       fail(

@@ -70,7 +70,7 @@ std::vector<Parameter> light_rows() {
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
           .only(sun),
       row<&Light::map>("light", "map", "", none, render,
-                       "latitude-longitude EXR or HDR; none: constant")
+                       "latitude-longitude picture, best EXR or HDR; none: constant")
           .only(environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
           .only(environment),

@@ -233,6 +233,7 @@ Shot one_of_everything(const std::string& name) {
     Probe probe;
     probe.type = type;
     probe.name += std::to_string(shot.probe.size() + 1);
+    if (type == ProbeType::tip) probe.position = sheet.corner;
     shot.probe.push_back(probe);
   }
   for (const LightType type : {LightType::rectangle, LightType::sphere, LightType::sun,

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <streambuf>
 
+#include "pipeline/contract/allocation_limit.h"
 #include "pipeline/contract/hash.h"
 
 namespace drench {
@@ -112,10 +113,16 @@ openvdb::GridBase::Ptr vdb_grid(std::string_view bytes) {
   BytesBuffer buffer(bytes);
   std::istream stream(&buffer);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
-  openvdb::io::Stream archive(stream, /*delayLoad=*/false);
-  const openvdb::GridPtrVecPtr grids = archive.getGrids();
-  if (!stream || !grids || grids->empty()) throw std::runtime_error("it holds no grid");
-  return grids->front();
+  constexpr size_t most_compression = 256;
+  const AllocationLimit limit(most_compression * bytes.size() + (1 << 20));
+  try {
+    openvdb::io::Stream archive(stream, /*delayLoad=*/false);
+    const openvdb::GridPtrVecPtr grids = archive.getGrids();
+    if (!stream || !grids || grids->empty()) throw std::runtime_error("it holds no grid");
+    return grids->front();
+  } catch (const BeyondAllocationLimit&) {
+    throw std::runtime_error("it asks for more memory than its size explains");
+  }
 }
 
 }  // namespace drench

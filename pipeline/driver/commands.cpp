@@ -216,15 +216,16 @@ void plan_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   const Manifest manifest(job.folder / layout::manifest);
   Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  for (const std::string& warning : plan.warnings) log_warning("driver", warning);
   std::string text = plan_text(plan), scene_object;
   if (plan.simulation.needed) {
-    const sim::Scene scene = sim::build_scene(job.shot, make_level_set);
+    const sim::Scene scene = sim::build_scene(job.shot, level_sets_within(arguments.memory_gib));
     const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
     for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
     text += scene_text(scene.report);
     scene_object = json_line(scene_json(scene.report));
   }
-  for (const std::string& warning : warning_texts()) plan.warnings.push_back(warning);
+  plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
   print(printable(text, Lines::many));
 }

@@ -560,6 +560,7 @@ void Executor::run() {
   check_threads(cores(options_.threads) + 2 + at_once);
   renderers_ = at_once;
   std::vector<std::thread> threads;
+  threads.reserve(size_t(at_once) + 2);
   simulating_ = true;
   start(threads, &Executor::simulate_frames);
   start(threads, &Executor::mesh_frames);

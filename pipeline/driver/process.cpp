@@ -111,6 +111,7 @@ void explain_missing_threads() { terminate_before = std::set_terminate(on_termin
 
 void check_threads(int count) {
   std::vector<std::thread> threads;
+  threads.reserve(size_t(count));
   std::latch all(1);
   try {
     for (int k = 0; k < count; ++k) threads.emplace_back([&all] { all.wait(); });

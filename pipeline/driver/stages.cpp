@@ -124,20 +124,11 @@ class ShotStages final : public Stages {
     }
   }
 
-  /// Level sets within --memory.
-  LevelSetMaker level_set_maker() const {
-    const double most = options_.memory_gib * (1 << 30);
-    return [most](const TriangleMesh& mesh, double voxel, double band, LevelSetBounds bounds) {
-      if (most > 0) bounds.most_bytes = most;
-      return make_level_set(mesh, voxel, band, bounds);
-    };
-  }
-
   std::unique_ptr<Simulation> start_simulation() override {
     SimulatorOptions options;
     options.device = options_.device;
     options.checkpoint_dir = folder_ / "sim/checkpoint";
-    options.level_set = level_set_maker();
+    options.level_set = level_sets_within(options_.memory_gib);
     return std::make_unique<ShotSimulation>(shot_, options);
   }
 
@@ -177,10 +168,10 @@ class ShotStages final : public Stages {
     FoamStats stats;
     FoamFrame foam = no_foam(shot_);
     if (frame != shot_.timeline.first) {
-      foam =
-          foam_frame(shot_, frame, read_foam(folder / layout::foam(frame - 1)),
-                     read_particles(folder / layout::particles(frame - 1)),
-                     read_particles(folder / layout::particles(frame)), level_set_maker(), &stats);
+      foam = foam_frame(shot_, frame, read_foam(folder / layout::foam(frame - 1)),
+                        read_particles(folder / layout::particles(frame - 1)),
+                        read_particles(folder / layout::particles(frame)),
+                        level_sets_within(options_.memory_gib), &stats);
     }
     StageReport report;
     report.files.push_back(write_foam(folder / layout::foam(frame), foam));

@@ -40,5 +40,19 @@ TEST_F(Warnings, AreErrorsOnRequest) {
             "a.obj: 3 faces left out");
 }
 
+// The frames of a sequence share a cause, other files do not.
+TEST_F(Warnings, OfASequenceAreOne) {
+  testing::internal::CaptureStderr();
+  log_file_warning("mesh", "a/wave.0009.obj", "9 faces left out");
+  log_file_warning("mesh", "a/wave.0010.obj", "12 faces left out");
+  log_file_warning("mesh", "a/wave.0010.obj", "12 corners left out");
+  log_file_warning("mesh", "b/wave.0010.obj", "12 faces left out");
+  testing::internal::GetCapturedStderr();
+  const std::vector<LoggedWarning> warnings = logged_warnings();
+  ASSERT_EQ(warnings.size(), 3u);
+  EXPECT_EQ(warnings[0].times, 2u);
+  EXPECT_EQ(warnings[0].text, "a/wave.0009.obj: 9 faces left out");
+}
+
 }  // namespace
 }  // namespace drench

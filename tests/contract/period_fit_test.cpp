@@ -23,9 +23,12 @@ max = [0.4, 0.5, 0.7]
 [[fluid.box]]
 min = [0.6, 0, 0.55]
 max = [0.8, 0.5, 0.65]
+[[fluid.box]]
+min = [0.9, 0, 0.6]
+max = [1, 0.5, 0.7]
 [[probe]]
 type = "pressure"
-position = [0, 0.1, 0.6]
+position = [0, 0.25, 0.6]
 normal = [1, 0, 0]
 radius = 0.1
 [quality.coarse.fluid]
@@ -41,7 +44,8 @@ TEST(PeriodFit, MakesThePeriodAMultipleOfAnotherSpacing) {
   EXPECT_NEAR(shot.domain.max.z, 0.5 + 7 * 0.03, 1e-12);
   EXPECT_NEAR(shot.fluid.box[0].max.z, shot.domain.max.z, 1e-12);
   EXPECT_EQ(shot.fluid.box[1].max.z, 0.65);  // ends in the fluid, not at a seam
-  EXPECT_EQ(shot.probe[0].radius, 0.1);
+  EXPECT_NEAR(shot.fluid.box[2].max.z, shot.domain.max.z, 1e-12);
+  EXPECT_NEAR(shot.probe[0].radius, 0.5 * 7 * 0.03, 1e-12);  // was as broad as the period
   EXPECT_EQ(shot.domain.max.x, 1);
   // The lock file holds what was made of it.
   EXPECT_EQ(parse_shot(shot_lock(shot), "lock.toml").domain.max.z, shot.domain.max.z);

@@ -31,18 +31,16 @@ TriangleMesh oriented(TriangleMesh mesh) {
   return mesh;
 }
 
-/// Inside at a place by the level set: from its sign, sampled at the nearest voxel.
-bool inside(const LevelSet& set, const V3d& place) {
-  int at[3], corner[3];
-  for (int k = 0; k < 3; ++k) {
+/// At the voxel's corner that is nearest to a place; infinite, with its sign, beyond the band.
+float value_at(const LevelSet& set, const V3d& place) {
+  size_t b = 0, c = 0;
+  for (int k = 2; k >= 0; --k) {
     const int voxel = int(std::lround(place[k] / double(set.voxel))) - 8 * set.low[k];
-    if (voxel < 0 || voxel >= 8 * set.blocks[k]) return false;
-    at[k] = voxel / 8, corner[k] = voxel % 8;
+    if (voxel < 0 || voxel >= 8 * set.blocks[k]) return INFINITY;
+    b = b * size_t(set.blocks[k]) + size_t(voxel / 8), c = c * 9 + size_t(voxel % 8);
   }
-  const int b = set.block[size_t((at[2] * set.blocks[1] + at[1]) * set.blocks[0] + at[0])];
-  if (b < 0) return b == LevelSet::inside;
-  return set.value[size_t(b) * LevelSet::corners +
-                   size_t((corner[2] * 9 + corner[1]) * 9 + corner[0])] < 0;
+  if (set.block[b] < 0) return set.block[b] == LevelSet::inside ? -INFINITY : INFINITY;
+  return set.value[size_t(set.block[b]) * LevelSet::corners + c];
 }
 
 using Holds = std::function<bool(const V3d&)>;
@@ -68,7 +66,7 @@ int wrong_places(const TriangleMesh& mesh, double voxel, const Holds& holds) {
         bool near = false;
         for (int k = 0; k < 27; ++k)
           near |= holds(p + V3d(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1) * (0.75 * voxel)) != expected;
-        wrong += !near && inside(set, p) != expected;
+        wrong += !near && std::signbit(value_at(set, p)) != expected;
       }
     }
   }
@@ -140,6 +138,27 @@ TEST(Shells, CrossingOnesAreUnited) {
       EXPECT_EQ(wrong_places(mesh, 0.03, [&](const V3d& p) { return a(p) || b(p); }), 0)
           << other.low;
       EXPECT_NEAR(volume_of(oriented(mesh)), volume_of(one) + volume_of(two), 1e-5);
+    }
+  }
+}
+
+// What the solid hides of a shell is no surface: distances within are to what can be seen.
+TEST(Shells, HiddenFacesAreAtNoDistance) {
+  const TriangleMesh mesh =
+      joined(box_mesh(V3f(-1, -0.4f, -0.4f), V3f(0.3f, 0.4f, 0.4f)),
+             reversed(box_mesh(V3f(-0.3f, -0.4f, -0.4f), V3f(1, 0.4f, 0.4f))));
+  constexpr double voxel = 0.05;
+  const LevelSet set = make_level_set(mesh, voxel, 4 * voxel);
+  for (int x = -18; x <= 18; ++x) {
+    for (int y = -7; y <= 7; ++y) {
+      for (int z = -7; z <= 7; ++z) {
+        const double depth = voxel * std::min({20 - std::abs(x), 8 - std::abs(y), 8 - std::abs(z)});
+        // What is left of hidden faces ends within a voxel and a half of the surface.
+        const V3d p = V3d(x, y, z) * voxel;
+        const double value = std::max(value_at(set, p), -set.band);
+        EXPECT_GT(value, -depth - 1e-4) << p;
+        EXPECT_LT(value, std::max(-depth + 1.5 * voxel, -4 * voxel) + 1e-4) << p;
+      }
     }
   }
 }
@@ -239,17 +258,6 @@ TEST(Shells, NormalsOfACanFaceItsAir) {
   EXPECT_NEAR(volume_of(read), ball_volume(0.5) - ball_volume(0.4), 1e-5);
 }
 
-/// Of a value of the level set at a voxel's corner, NaN where it has none.
-float value_at(const LevelSet& set, const V3d& place) {
-  size_t b = 0, c = 0;
-  for (int k = 2; k >= 0; --k) {
-    const int voxel = int(std::lround(place[k] / double(set.voxel))) - 8 * set.low[k];
-    if (voxel < 0 || voxel >= 8 * set.blocks[k]) return NAN;
-    b = b * size_t(set.blocks[k]) + size_t(voxel / 8), c = c * 9 + size_t(voxel % 8);
-  }
-  return set.block[b] < 0 ? NAN : set.value[size_t(set.block[b]) * LevelSet::corners + c];
-}
-
 // A block of 100 m in voxels of 5 mm, of which 0.6 m are asked for beside a face, an edge and deep
 // within: 2.4 billion voxels of surface, and a second.
 TEST(LevelSetBounds, TakeOnlyWhatIsAskedOfAHugeMesh) {
@@ -269,7 +277,7 @@ TEST(LevelSetBounds, TakeOnlyWhatIsAskedOfAHugeMesh) {
       bounds.low[k] = look.middle[k] - 0.3, bounds.high[k] = look.middle[k] + 0.3;
     bounds.most_bytes = 1 << 29;
     const LevelSet set = make_level_set(block, voxel, 4 * voxel, bounds);
-    EXPECT_EQ(inside(set, look.middle), look.inside) << look.middle;
+    EXPECT_EQ(value_at(set, look.middle) < 0, look.inside) << look.middle;
     EXPECT_EQ(set.value.empty(), look.near == 0) << look.middle;
     EXPECT_LT(set.value.size(), 12'000'000u) << look.middle;
     for (int k = 0; k < 50 && look.near > 0; ++k) {

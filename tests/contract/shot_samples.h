@@ -113,6 +113,9 @@ target = "sheet"
 type = "tip"
 cloth = "sheet"
 
+[[probe]]
+type = "front"
+
 [foam]
 lifetime = 2
 

@@ -35,7 +35,7 @@ struct BlowUp {
 BlowUp read_message(const std::string& text) {
   static const std::regex form(
       R"(blew up after frame (\d+), t = ([\d.]+) s, step \d+: (particle|cloth vertex) \d+ at )"
-      R"(\([^)]*\) m has speed \S+ m/s\. [^;]*; last good checkpoint: (\S+)\. Try)");
+      R"(\([^)]*\) m has speed \S+ m/s\. [^;]*; last good checkpoint: (\S+)\. (?:Try|Cloth))");
   std::smatch part;
   if (!std::regex_search(text, part, form)) {
     ADD_FAILURE() << text;

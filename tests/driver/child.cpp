@@ -35,8 +35,9 @@ Child::Child(const std::string& program, const std::vector<std::string>& argumen
   for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
   std::vector<char*> variables;
-  for (char** variable = environ; *variable; ++variable) variables.push_back(*variable);
+  // The first of a name counts.
   for (const std::string& text : environment) variables.push_back(const_cast<char*>(text.c_str()));
+  for (char** variable = environ; *variable; ++variable) variables.push_back(*variable);
   variables.push_back(nullptr);
   const int reason =
       ::posix_spawn(&pid_, words[0], &actions, nullptr, words.data(), variables.data());

@@ -44,6 +44,38 @@ TEST(PlanScene, CountsParticlesTrianglesMemoryAndSteps) {
       << simulated.err;
 }
 
+// A box of 4.5 x 4 x 4 spacings of 0.05 m, of which a block keeps a layer: 9 litres asked for, 8 on
+// the lattice, 2 in the block.
+TEST(PlanScene, SaysInLitresWhatRoundingAndObstaclesTake) {
+  const test::TemporaryFolder folder;
+  write_file_whole(folder / "box.toml", R"(
+[domain]
+min = [-1, -1, -1]
+max = [1, 1, 1]
+[fluid]
+spacing = 0.05
+[[fluid.box]]
+min = [0, 0, 0]
+max = [0.225, 0.2, 0.2]
+[[obstacle]]
+type = "box"
+name = "block"
+position = [0, -0.05, 0]
+size = [1.9, 0.15, 1.9]
+)");
+  const test::Ended json = test::run_program(
+      DRENCH_PROGRAM, {"plan", (folder / "box.toml").string(), "--json"}, folder.path());
+  ASSERT_EQ(json.code, 0) << json.err;
+  const nlohmann::json source = nlohmann::json::parse(json.out).at("scene").at("source").at(0);
+  EXPECT_NEAR(source.at("asked_litres").get<double>(), 9, 1e-9);
+  EXPECT_NEAR(source.at("litres").get<double>(), 6, 1e-9);
+  const test::Ended ended =
+      test::run_program(DRENCH_PROGRAM, {"plan", (folder / "box.toml").string()}, folder.path());
+  EXPECT_NE(ended.out.find("48 particles, 6 of 9 litres: rounding -11.1 %, obstacles -22.2 %"),
+            std::string::npos)
+      << ended.out;
+}
+
 TEST(PlanScene, RefusesAFluidThatIsAllInAnObstacle) {
   const TinyShot shot;
   const std::string block = "[[obstacle]]\ntype = \"box\"\nname = \"block\"\nsize = [9, 9, 9]\n";

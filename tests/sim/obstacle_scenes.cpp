@@ -124,7 +124,7 @@ Settled settle_in_tilted_tank(double degrees, double seconds) {
     add_plane(shot, tank.to_world(V3d(0)), tank.axis[k]);
     add_plane(shot, tank.to_world(size), -tank.axis[k]);
   }
-  add_box(shot, V3d(0), {1, 1, 1});
+  add_box(shot, tank.to_world(0.5 * size), {1, 1, 1});
   sim::Scene scene = sim::build_scene(shot);
   // The same lattice, turned: no source is.
   sim::HostState& start = scene.start;
