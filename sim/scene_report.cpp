@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/source_check.h"
+#include "sim/room.h"
 #include "sim/scene.h"
 
 namespace drench::sim {
@@ -180,13 +181,6 @@ double bytes_a_particle(const Parameters& p, const Scene& scene) {
 /// Springs, rows and the implicit step of a sheet, of a triangle.
 constexpr double bytes_a_triangle = 700;
 
-double most_in_domain(const Shot& shot) {
-  for (const Axis axis : shot.domain.axis)
-    if (axis == Axis::open) return 1e30;
-  const V3d cells = (shot.domain.max - shot.domain.min) / shot.fluid.spacing;
-  return cells.x * cells.y * cells.z;
-}
-
 double steps_a_frame(const Shot& shot, Scene& scene) {
   const double frame = 1 / shot.timeline.fps;
   if (shot.time_step > 0) return std::ceil(frame / shot.time_step);
@@ -285,7 +279,8 @@ void complete_report(const Shot& shot, Scene& scene) {
     check_inlet(shot, report.inlet.back());
     report.particles_at_end += report.inlet.back().emitted;
   }
-  report.particles_at_end = std::min(report.particles_at_end, most_in_domain(shot));
+  if (!report.inlet.empty())
+    report.particles_at_end = std::min(report.particles_at_end, room_of(shot, scene));
   report.particles_at_end = std::max(report.particles_at_end, double(report.particles));
   report.cloth_triangles = size_t(scene.cloth.triangles());
   report.obstacle_triangles = scene.obstacles.triangles() + scene.sinks.triangles();

@@ -109,7 +109,10 @@ bool Again::drops_inputs_of(const Wanted& wanted, const Plan& plan) {
     const std::optional<Record> record = manifest_.find(file);
     if (!record || state_by_digest(folder_, *record) != FileState::changed) continue;
     manifest_.drop(file);
-    log_warning("driver", fmt::format("{} is damaged; it is made again", file));
+    log_warning("driver",
+                fmt::format("{} is damaged; {}", file,
+                            record && record->step == checkpoint_step ? "the run does without"
+                                                                      : "it is made again"));
     any = true;
   }
   return any;

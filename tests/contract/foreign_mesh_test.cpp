@@ -125,7 +125,7 @@ TEST_F(ForeignMesh, TextureCoordinatesOfVerticesHaveThreeNames) {
   }
 }
 
-// The point in the middle of a square of four triangles has a texture coordinate in each of them.
+// The ends of the line between two triangles have a texture coordinate in each of them.
 constexpr const char* seam =
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0.5 0.5\nvn 0 0 1\n"
     "f 1/1/1 2/2/1 3/3/1\nf 1/4/1 3/3/1 4/2/1\n";
@@ -253,8 +253,7 @@ TEST_F(ForeignMesh, NamesOfWindowsAndPercentSignsAreFound) {
 }
 
 TEST_F(ForeignMesh, VerticesOnFreeEdgesAreWelded) {
-  // Two squares that share the line x = 1, each with vertices of its own there; a third sheet lies
-  // over the first, closer than the distance, with nothing free but its own rim.
+  // Two squares that share the line x = 1, each with vertices of its own there.
   const TriangleMesh mesh = read("two.obj",
                                  "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
                                  "v 1 0 1e-6\nv 2 0 0\nv 2 1 0\nv 1 1 0\n"

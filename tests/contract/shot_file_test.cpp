@@ -184,6 +184,7 @@ TEST_F(ShotFile, ReferenceIsAValidShotAtItsDefaults) {
           const bool given = p->required || p->fixed || p->key == "name" || !p->field;
           if (given || section.name == "cloth.pin") continue;
           if (!shot_table::applies(*p, section, object)) continue;
+          if (path == "probe[3]" && p->key == "position") continue;  // a tip is on its sheet
           EXPECT_EQ(shot_table::value_text(*p, p->field(object)),
                     shot_table::value_text(*p, p->field(objects.at(section.name))))
               << path << '.' << p->key;

@@ -136,7 +136,8 @@ TEST_F(Hdr, WhatIsCutOffOrDamagedIsRefused) {
   const std::string before = head("", "-Y 3 +X 20"), data = with_runs(20, 3);
   for (size_t size = 0; size < data.size(); ++size)
     EXPECT_TRUE(tells(refused(before + data.substr(0, size)), {"cut off", "scanline"})) << size;
-  for (size_t size = 10; size < before.size(); ++size) refused(before.substr(0, size));
+  for (size_t size = 10; size < before.size(); ++size)
+    EXPECT_NE(refused(before.substr(0, size)), "") << size;
   std::string damaged = data;
   damaged[4] = char(255);  // a run of 127 in a line of 20
   EXPECT_TRUE(tells(refused(before + damaged), {"scanline 1", "damaged"}));

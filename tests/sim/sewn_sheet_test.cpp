@@ -99,8 +99,8 @@ TEST(SewnSheet, PinsNameVerticesOfTheFile) {
   forget_warnings();
 }
 
-// Held at one edge and let go for 5 frames, the far edge of a sewn sheet is where that of a whole
-// one is, bit for bit: the same nodes in the same order.
+// Held at one edge and let go for 5 frames, the lowest point of a sewn sheet is that of a whole
+// one, to the bit: the same nodes in the same order.
 TEST(SewnSheet, FallsAsAWholeOne) {
   const TemporaryFolder folder;
   std::vector<float> lowest;
