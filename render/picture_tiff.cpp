@@ -19,6 +19,9 @@ namespace {
 
 /// Of one strip or tile, and of what libtiff takes for itself at once.
 constexpr uint64_t kLargestBlock = uint64_t(1) << 30;
+/// Neither deflate (1032 to 1) nor LZW, of whose codes of 12 bits none stands for more than 3838
+/// bytes, packs tighter.
+constexpr double kLargestPacking = 4096;
 
 struct Source {
   const std::byte* data = nullptr;
@@ -101,6 +104,12 @@ class TiffReader {
           fmt::format("its strips or tiles have {} bytes each; write it again with smaller "
                       "ones",
                       block));
+    if (double(width_) * height_ * samples_ * bits_ / 8 >
+        kLargestPacking * double(file_.bytes().size()))
+      file_.fail(
+          fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
+                      "forged. Write it again or give another",
+                      width_, height_, file_.bytes().size()));
     file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()), 2 * block);
     read_blocks(picture, place, block);
     if (inks_) to_rgb(picture);

@@ -277,6 +277,25 @@ TEST_F(Tiff, KindsThatAreNotReadAreNamed) {
   EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"CIE L*a*b*", "8 bits"}));
 }
 
+// 4 GiB of samples of which the file holds a strip: refused before room is made.
+TEST_F(Tiff, PixelsThatCannotBeInTheFileAreRefused) {
+  const auto path = next();
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  for (const int tag : {TIFFTAG_IMAGEWIDTH, TIFFTAG_IMAGELENGTH}) TIFFSetField(tiff, tag, 16384);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 4);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 32);
+  TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_RGB);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, 64);
+  std::string strip(size_t(64) * 16384 * 16, '\0');
+  TIFFWriteEncodedStrip(tiff, 0, strip.data(), tmsize_t(strip.size()));
+  TIFFWriteDirectory(tiff);
+  TIFFClose(tiff);
+  EXPECT_TRUE(tells(error_of([&] { read_texture(path); }), {"16384 x 16384", "cannot come from"}));
+}
+
 TEST_F(Tiff, WhatIsCutOffIsRefused) {
   const TiffOfTest tiff;
   const auto path = next();
