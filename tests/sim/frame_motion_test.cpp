@@ -44,7 +44,7 @@ max = [0.3, 0.12, 0.06]
   const double slope =
       (run.mean("left", "height [m]", 2) - run.mean("right", "height [m]", 2)) / 0.18;
   RecordProperty("figures", fmt::format("slope {:.4f} of {:.4f}", slope, push / g));
-  EXPECT_NEAR(slope / (push / g), 1, 0.03);
+  EXPECT_NEAR(slope / (push / g), 1, 0.02);
 }
 
 // What is keyed but constant is what is not keyed, to the bit.

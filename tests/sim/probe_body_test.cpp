@@ -105,8 +105,8 @@ INSTANTIATE_TEST_SUITE_P(Probes, Layers, testing::Values(10, 20, 40),
                          [](const auto& p) { return fmt::format("{}Layers", p.param); });
 
 // The side, the top and the bottom of a ball, 5 spacings in radius: rho g times their depths below
-// the level, within 4.5 % of what its middle has. The level is that of the volume of water and ball,
-// as the weight above any depth is. The solver bears 3 % more on it than the weight that it
+// the level, within 4.5 % of what its middle has. The level is that of the volume of water and
+// ball, as the weight above any depth is. The solver bears 3 % more on it than the weight that it
 // displaces; the rest is how few particles stand around it.
 TEST(DiscOnABall, ReadsThePressureOfItsDepth) {
   const double a = depth / 20, side = 16 * a, radius = 5 * a;
@@ -164,7 +164,9 @@ std::vector<sim::ProbeQuery> all_bodies(int obstacles) {
 // A dam breaks over a box beside a ball: what the momentum of the fluid lacks of gravity's impulse
 // is the sum over all bodies, however many touch one particle. What is stopped at walls by the last
 // tenth of a spacing (move.h) is not in it.
-TEST(BookKeeping, CountsEachForceOnceOnOneBody) {
+class BookKeeping : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Sheet, BookKeeping, testing::Bool());
+TEST_P(BookKeeping, CountsEachForceOnceOnOneBody) {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -g, 0);
   shot.domain.min = V3d(0), shot.domain.max = V3d(0.24, 0.3, 0.08);
@@ -180,14 +182,29 @@ TEST(BookKeeping, CountsEachForceOnceOnOneBody) {
   ball.type = ObstacleType::sphere, ball.position = V3d(0.13, 0.02, 0.04), ball.radius = 0.018;
   ball.name = "ball";
   shot.obstacle.push_back(ball);
+  if (GetParam()) {  // across the front, above both, held at its sides
+    Cloth sheet;
+    sheet.corner = V3d(0.11, 0.075, 0.004), sheet.u = V3d(0, 0.07, 0), sheet.v = V3d(0, 0, 0.072);
+    sheet.cells = V2i(14, 14), sheet.areal_density = 0.3;
+    ClothPin pin;
+    for (uint32_t i = 0; i < 15; ++i) pin.vertices.insert(pin.vertices.end(), {i, 14 * 15 + i});
+    sheet.pin.push_back(pin);
+    shot.cloth.push_back(sheet);
+  }
   Stepper run(shot);
   const double mass = run.scene.parameters.particle_mass * run.solver->particles();
-  const std::vector<sim::ProbeQuery> bodies = all_bodies(2);
+  std::vector<sim::ProbeQuery> bodies = all_bodies(2);
+  if (GetParam()) {
+    bodies.emplace_back().kind = sim::ProbeKind::cloth_force;
+    bodies.back().end = run.scene.cloth.vertices();
+  }
   const auto momentum = [&] {
     const sim::HostState state = run.solver->save();
     V3d sum(0);
-    for (size_t i = 0; i < state.id.size(); ++i)
+    for (size_t i = 0; i < state.id.size(); ++i) {
       sum += at(state.velocity, i) * double(run.scene.parameters.particle_mass);
+      if (GetParam()) sum -= at(state.owed, i);  // the sheet's, from the next step on
+    }
     return sum;
   };
   V3d before = momentum(), missing(0), impulse(0);
@@ -208,7 +225,7 @@ TEST(BookKeeping, CountsEachForceOnceOnOneBody) {
   }
   RecordProperty("figures", fmt::format("{:.2e}", missing.length() / impulse.length()));
   EXPECT_LT(missing.length(), 0.02 * impulse.length());
-  for (const size_t k : {size_t(0), size_t(2), size_t(6), size_t(7)})
+  for (const size_t k : {size_t(0), size_t(2), size_t(6), size_t(7), bodies.size() - 1})
     EXPECT_GT(each[k], 0.01 * impulse.length()) << k;
 }
 
