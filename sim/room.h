@@ -23,8 +23,9 @@ NearInlet near_inlet(const Shot& shot, const Scene& scene, const FluidEmitter& e
                      const std::vector<float>& pressure_term);
 
 /// The pressure over rest density that fluid has where it has nowhere to go, m^2/s^2: twenty times
-/// what all of the scene's fall and this inlet's speed bring about. A vessel with one layer too
-/// many came to 70 to 6000 times that (tests/sim/overfill_test.cpp), a submerged inlet to twice.
+/// the square of the speed that all of the scene's fall or this inlet brings about. The peak in a
+/// vessel was nine times that square with room left, with one layer too many 48 times it a step
+/// later and 4600 times it ten steps later (tests/sim/overfill_test.cpp).
 double pressure_without_room(const Scene& scene, const FluidEmitter& emitter);
 
 }  // namespace drench::sim

@@ -486,11 +486,14 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
   const Shells shells = find_shells(mesh);
   const bool cavities = std::any_of(shells.depth.begin(), shells.depth.end(),
                                     [](int depth) { return depth % 2 == 1; });
+  // Asked of every mesh, grooves narrower than a voxel would be taken for hidden.
+  bool hidden = shells.bodies() < shells.count();
   if (!cut && !cavities) {
     const FloatGrid::Ptr grid = narrow_band(mesh, voxel, band, Inside::filled);
     frame_blocks(grid->evalActiveVoxelBoundingBox(), set);
     take_values(*grid, mesh, set);
     if (filled_right(set, mesh, shells)) return set;
+    hidden = true;
   }
   frame_within(cut ? bounds : LevelSetBounds{});
   const auto make = [&](const TriangleMesh& faces) {
@@ -498,6 +501,7 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
     set_signs(set, mesh, shells);
   };
   make(near);
+  if (!hidden) return set;
   const VisibleFaces visible(set, near);
   if (visible.hides()) make(visible.mesh());
   return set;

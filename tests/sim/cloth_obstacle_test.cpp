@@ -143,9 +143,16 @@ TEST_P(Incline, IsSlidDownAsCoulombSays) {
     EXPECT_NEAR(slid.speed, rate * 0.3, 5e-3 * rate * 0.3) << friction;
     EXPECT_NEAR(slid.way, 0.5 * rate * 0.3 * 0.301, 5e-3 * rate * 0.045) << friction;
   }
-  const Slid stuck = slide(30, 0.6, GetParam());
-  EXPECT_LT(std::abs(stuck.speed), 2e-4);  // of 1.5 m/s without friction
-  EXPECT_LT(std::abs(stuck.way), 1e-4);
+  // What the solve leaves of a speed scatters by a third of it with the last bits of the angle.
+  const double angles[] = {29.9, 29.99, 30, 30.00001, 30.001};
+  Slid stuck{0, 0};
+  for (const double angle : angles) {
+    const Slid one = slide(angle, 0.6, GetParam());
+    stuck.speed += std::abs(one.speed) / std::size(angles);
+    stuck.way = std::max(stuck.way, std::abs(one.way));
+  }
+  EXPECT_LT(stuck.speed, 1e-4);
+  EXPECT_LT(stuck.way, 1e-4);
 }
 
 /// Eight times eight columns of water, six high, on a loose sheet that ends at the walls, on a
