@@ -11,6 +11,7 @@ namespace drench::sim {
 
 FrameMotion::FrameMotion(const Shot& shot, const LocalFrame& frame)
     : angle_(shot.frame_rotation_deg), timeline_(shot.timeline) {
+  shot_.timeline = shot.timeline;
   shot_.gravity = shot.gravity, shot_.frame_rotation_deg = shot.frame_rotation_deg;
   shot_.frame_axis = shot.frame_axis;
   turns_ = angle_.keys.size() > 1;
@@ -28,16 +29,7 @@ FrameMotion::FrameMotion(const Shot& shot, const LocalFrame& frame)
 
 V3d FrameMotion::gravity(double time) const { return gravity_at(shot_, frame_at(time)); }
 
-double FrameMotion::rate(double time) const {
-  const double frame = frame_at(time);
-  const auto& keys = angle_.keys;
-  for (size_t k = 1; k < keys.size(); ++k) {
-    if (frame < keys[k - 1].first || frame >= keys[k].first) continue;
-    return (keys[k].second - keys[k - 1].second) / (keys[k].first - keys[k - 1].first) *
-           timeline_.fps;
-  }
-  return 0;
-}
+double FrameMotion::rate(double time) const { return frame_turn_at(shot_, frame_at(time)).rate; }
 
 FrameNow FrameMotion::over(double start, double end) const {
   FrameNow now;

@@ -100,16 +100,9 @@ class FoamMotion {
       : shot_(shot),
         fluid_(fluid),
         walls_(shot, frame, level_set),
+        before_(frame - 1),
         dt_(float(1 / shot.timeline.fps)),
-        gravity_(gravity_at(shot, frame + 0.5)) {
-    const float g = gravity_.length();
-    if (g > 0) {
-      // A sphere without weight in water has half its mass of water to move: 2 g.
-      up_ = gravity_ / -g;
-      rise_ = up_ * float(shot.foam.rise_speed);
-      drag_time_ = float(shot.foam.rise_speed) / (2 * g);
-    }
-  }
+        turns_(shot.frame_rotation_deg.keys.size() > 1) {}
 
   int substeps(const std::vector<Particle>& particles) const {
     float speed = fluid_.largest_speed();
@@ -131,43 +124,87 @@ class FoamMotion {
     const FluidMoment now =
         fluid_at(fluid_, 0.5f * (from + to), shot_.domain, float(shot_.fluid.spacing), middle);
     const std::vector<Around> around = fluid_around(now, middle);
+    const Pull everywhere = pull_of(gravity_at(shot_, before_ + 0.5 * (from + to)));
     tbb::parallel_for(tbb::blocked_range<size_t>(0, moving.size(), 1024), [&](const auto& range) {
       for (size_t m = range.begin(); m < range.end(); ++m) {
         Particle& p = particles[moving[m]];
         const V3f start = p.place;
-        move(p, around[m], time(p));
+        const Flight flight{std::max(from, p.birth), to, time(p)};
+        move(p, around[m], flight, turns_ ? pull_at(middle[m], flight) : everywhere);
         meet_walls(p, start, time(p), to);
       }
     });
   }
 
  private:
-  void move(Particle& p, const Around& around, float dt) const {
+  /// Shares of the time between the frames, and s.
+  struct Flight {
+    float from, to, dt;
+    float middle() const { return 0.5f * (from + to); }
+  };
+  /// Gravity, m/s^2; upwards; m/s and s that a bubble rises by and takes to.
+  struct Pull {
+    V3f gravity{0, 0, 0}, up{0, 0, 0}, rise{0, 0, 0};
+    float drag_time = 0;
+  };
+  Pull pull_of(const V3d& gravity) const {
+    Pull pull{V3f(gravity)};
+    const float g = pull.gravity.length(), speed = float(shot_.foam.rise_speed);
+    if (!(g > 0)) return pull;
+    // A sphere without weight in water has half its mass of water to move: 2 g.
+    pull.up = pull.gravity / -g;
+    pull.rise = pull.up * speed;
+    pull.drag_time = speed / (2 * g);
+    return pull;
+  }
+  /// In a turning frame: with what the centrifuge adds there.
+  Pull pull_at(const V3f& place, const Flight& flight) const {
+    const double frame = before_ + double(flight.middle());
+    return pull_of(gravity_at(shot_, frame) + frame_turn_at(shot_, frame).centrifugal(V3d(place)));
+  }
+
+  /// A parabola of the world, however the frame turns meanwhile.
+  void fly(Particle& p, const Flight& flight, const Pull& pull) const {
+    if (!turns_) {
+      const V3f velocity = p.velocity + pull.gravity * flight.dt;
+      p.place += (p.velocity + velocity) * (0.5f * flight.dt);
+      p.velocity = velocity;
+      return;
+    }
+    const FrameTurn start = frame_turn_at(shot_, before_ + double(flight.from)),
+                    end = frame_turn_at(shot_, before_ + double(flight.to));
+    const V3d before = start.velocity_in_world(V3d(p.place), V3d(p.velocity)),
+              after = before + shot_.gravity.at(before_ + double(flight.middle())) * flight.dt,
+              place = start.position_in_world(V3d(p.place)) + (before + after) * (0.5 * flight.dt);
+    const V3d own = end.position_from_world(place);
+    p.place = V3f(own), p.velocity = V3f(end.velocity_from_world(own, after));
+  }
+
+  void move(Particle& p, const Around& around, const Flight& flight, const Pull& pull) const {
+    const float dt = flight.dt;
     p.kind = around.count < least_foam  ? FoamKind::spray
              : around.count > most_foam ? FoamKind::bubble
                                         : FoamKind::foam;
     if (p.kind == FoamKind::spray) {
-      const V3f velocity = p.velocity + gravity_ * dt;
-      p.place += (p.velocity + velocity) * (0.5f * dt);
-      p.velocity = velocity;
+      fly(p, flight, pull);
     } else if (p.kind == FoamKind::foam) {
-      p.velocity = around.velocity + float_up(around.count, dt);
+      p.velocity = around.velocity + pull.up * float_up(around.count, dt);
       p.place += p.velocity * dt;
       p.age += dt;
     } else {
-      const V3f aim = around.velocity + rise_, off = p.velocity - aim;
-      const float left = drag_time_ > 0 ? std::exp(-dt / drag_time_) : 0;
-      p.place += aim * dt + off * (drag_time_ * (1 - left));
+      const V3f aim = around.velocity + pull.rise, off = p.velocity - aim;
+      const float left = pull.drag_time > 0 ? std::exp(-dt / pull.drag_time) : 0;
+      p.place += aim * dt + off * (pull.drag_time * (1 - left));
       p.velocity = aim + off * left;
     }
   }
 
-  /// Velocity that takes foam to the surface it floats on, never past it.
-  V3f float_up(uint32_t count, float dt) const {
+  /// Speed upwards that takes foam to the surface it floats on, never past it, m/s.
+  float float_up(uint32_t count, float dt) const {
     const float spacing = float(shot_.fluid.spacing);
     const float depth = spacing * (float(count) - floating_count) / count_by_depth;
     const float share = 1 - std::exp(-dt * float(shot_.foam.rise_speed) / (0.5f * spacing));
-    return dt > 0 ? up_ * (depth * share / dt) : V3f(0);
+    return dt > 0 ? depth * share / dt : 0;
   }
 
   void meet_walls(Particle& p, const V3f& start, float dt, float s) const {
@@ -186,8 +223,9 @@ class FoamMotion {
   const Shot& shot_;
   const FluidMotion& fluid_;
   const FoamWalls walls_;
-  float dt_, drag_time_ = 0;  // s
-  V3f gravity_, up_{0, 0, 0}, rise_{0, 0, 0};
+  int before_;  // film frame at the start of the motion
+  float dt_;    // s
+  bool turns_;  // the frame of the domain
 };
 
 std::vector<Particle> particles_of(const FoamFrame& frame) {
