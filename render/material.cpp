@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot_table.h"
 
@@ -131,6 +133,16 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name, Picture
   out.inverse_checker_size = float(1 / found->checker_size);
   out.inverse_texture_size = float(1 / found->texture_size);
   return out;
+}
+
+void check_pictures(const Shot& shot, PictureMemory memory) {
+  std::set<std::string> used{shot.fluid.material};
+  if (shot.ground.present) used.insert(shot.ground.material);
+  for (const Obstacle& obstacle : shot.obstacle) used.insert(obstacle.material);
+  for (const Cloth& cloth : shot.cloth) used.insert(cloth.material);
+  for (const std::string& name : used) find_material(shot, name, memory);
+  for (const Light& light : shot.light)
+    if (!light.map.empty()) read_sky(light.map, memory);
 }
 
 }  // namespace drench

@@ -71,4 +71,9 @@ struct ShadingMaterial {
 ShadingMaterial find_material(const Shot& shot, const std::string& name,
                               PictureMemory& memory = PictureMemory::without_limit());
 
+/// Reads the pictures of all materials and lights that a shot uses, for their warnings.
+/// @param memory  what they may take together
+/// @throws Error as find_material and read_sky.
+void check_pictures(const Shot& shot, PictureMemory memory);
+
 }  // namespace drench

@@ -22,6 +22,10 @@ class PictureMemory {
  public:
   PictureMemory() = default;  // as much as there is
   explicit PictureMemory(uint64_t most_bytes) : most_(most_bytes) {}
+  /// @param gib  0: as much as there is
+  static PictureMemory within(double gib) {
+    return gib > 0 ? PictureMemory(uint64_t(gib * double(1 << 30))) : PictureMemory();
+  }
 
   /// @param what  of the picture, for the message: "16384 x 16384 pixels of 3 x 8 bits"
   /// @throws Error naming the picture, its size and what is left.

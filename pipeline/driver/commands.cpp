@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -22,6 +23,7 @@
 #include "pipeline/driver/scene_text.h"
 #include "pipeline/driver/standard_output.h"
 #include "pipeline/driver/stats_file.h"
+#include "render/material.h"
 #include "sim/probe_series.h"
 #include "sim/scene.h"
 
@@ -225,6 +227,11 @@ void plan_command(const ShotArguments& arguments) {
     text += scene_text(scene.report);
     scene_object = json_line(scene_json(scene.report));
   }
+  const auto renders = [](const Task& task) {
+    return task.step == Step::render && task.action != Action::skip;
+  };
+  if (std::any_of(plan.tasks.begin(), plan.tasks.end(), renders))
+    check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
   print(printable(text, Lines::many));

@@ -118,7 +118,7 @@ class ShotStages final : public Stages {
       : shot_(shot),
         folder_(std::move(folder)),
         options_(options),
-        parts_(std::make_shared<KeptParts>(picture_memory(options))) {
+        parts_(std::make_shared<KeptParts>(PictureMemory::within(options.memory_gib))) {
     if (options.memory_gib > 0) {
       shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
     }
@@ -273,11 +273,6 @@ class ShotStages final : public Stages {
   }
 
  private:
-  static PictureMemory picture_memory(const StageOptions& options) {
-    if (options.memory_gib <= 0) return {};
-    return PictureMemory(uint64_t(options.memory_gib * double(1 << 30)));
-  }
-
   std::vector<NumberedImage> images(const fs::path& folder, const std::vector<int>& frames) const {
     std::vector<NumberedImage> result;
     for (const int frame : frames) {

@@ -76,6 +76,26 @@ size = [1.9, 0.15, 1.9]
       << ended.out;
 }
 
+// A picture that cannot be read, or is read with a warning, is known before hours of simulation.
+TEST(PlanScene, ReadsThePicturesThatAreUsed) {
+  const TinyShot shot;
+  const auto planned = [&](const std::string& used, const std::string& header) {
+    write_file_whole(shot.folder() / "dark.hdr",
+                     header + "\n\n-Y 1 +X 1\n" + std::string("\x10\x20\x30\x80", 4));
+    return run_with(shot, "plan",
+                    "[[material]]\nname = \"paint\"\ntype = \"diffuse\"\ntexture = \"dark.hdr\"\n",
+                    {"--strict", "--set", "ground.material=\"" + used + "\""});
+  };
+  EXPECT_EQ(planned("paint", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe").code, 0);
+  const test::Ended warned = planned("paint", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nGAMMA=2");
+  EXPECT_EQ(warned.code, 1);
+  EXPECT_NE(warned.err.find("GAMMA"), std::string::npos) << warned.err;
+  const test::Ended refused = planned("paint", "no picture");
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("dark.hdr"), std::string::npos) << refused.err;
+  EXPECT_EQ(planned("ground", "no picture").code, 0);
+}
+
 TEST(PlanScene, RefusesAFluidThatIsAllInAnObstacle) {
   const TinyShot shot;
   const std::string block = "[[obstacle]]\ntype = \"box\"\nname = \"block\"\nsize = [9, 9, 9]\n";
