@@ -101,7 +101,80 @@ TEST_P(Layers, OfWaterPushTheBodiesThatTheyTouchAndNoOther) {
   }
 }
 
+std::string held_sheet_text(const std::string& name, const std::string& corner,
+                            const std::string& u, const std::string& v) {
+  return fmt::format(R"([[cloth]]
+name = "{}"
+corner = {}
+u = {}
+v = {}
+cells = [16, 16]
+[[cloth.pin]]
+box = {{min = [-1, -1, -1], max = [1, 1, 1]}}
+)",
+                     name, corner, u, v);
+}
+
+// A sheet that is held everywhere is a floor and a wall: water stands on a lying one and before a
+// standing one, both dry behind. Discs on the wet sides and before them read rho g times the depth,
+// on the dry ones nothing. Together the sheets bear the weight and the thrust: in their corner a
+// particle is pushed by the nearer one alone, along its normal there.
+class LayersOnSheets : public Layers {};
+
+TEST_P(LayersOnSheets, PushTheWetSides) {
+  const double a = depth / GetParam(), breadth = 8 * a, under = 4 * a, wet = 12 * a,
+               height = 1.5 * depth, middle = under + depth / 2;
+  std::string text =
+      tank_text(a, wet + 4 * a, breadth, height) +
+      water_text(0, under, wet, under + depth, breadth) +
+      held_sheet_text("lying", fmt::format("[0, {}, 0]", under), fmt::format("[{}, 0, 0]", wet),
+                      fmt::format("[0, 0, {}]", breadth)) +
+      held_sheet_text("standing", fmt::format("[{}, {}, 0]", wet, under),
+                      fmt::format("[0, {}, 0]", height - under),
+                      fmt::format("[0, 0, {}]", breadth)) +
+      force_text("lying") + force_text("standing");
+  const double away[] = {0, 0.5, 1, 1.5};
+  for (const double off : away) {
+    const int name = int(100 * off);
+    text += disc_text(fmt::format("lying{}", name), wet / 2, under + off * a, breadth / 2,
+                      "[0, 1, 0]", 2 * a) +
+            disc_text(fmt::format("standing{}", name), wet - off * a, middle, breadth / 2,
+                      "[-1, 0, 0]", 2 * a);
+  }
+  text += disc_text("behind", wet, middle, breadth / 2, "[1, 0, 0]", 2 * a) +
+          disc_text("below", wet / 2, under, breadth / 2, "[0, -1, 0]", 2 * a);
+  Probed run(text);
+  run.run_to(31);
+  const double weight = rho * g * depth * breadth * wet,
+               thrust = rho * g * depth * depth * breadth / 2;
+  const auto force = [&](const std::string& axis) {
+    const std::string column = "force " + axis + " [N]";
+    return run.mean("lying", column, 0.75) + run.mean("standing", column, 0.75);
+  };
+  EXPECT_NEAR(force("y") / weight, -1, 0.01);
+  EXPECT_NEAR(force("x") / thrust, 1, tolerance());
+  const auto pressure = [&](const std::string& name) {
+    return run.mean(name, "pressure [Pa]", 0.75);
+  };
+  EXPECT_EQ(pressure("behind"), 0);
+  EXPECT_EQ(pressure("below"), 0);
+  std::string figures;
+  for (const double off : away) {
+    const int name = int(100 * off);
+    const double on = off > 0.5 ? off * a : 0;  // nearer than half a spacing it is on the sheet
+    const double lying = pressure(fmt::format("lying{}", name)) / (rho * g * (depth - on)),
+                 standing = pressure(fmt::format("standing{}", name)) / (rho * g * depth / 2);
+    figures += fmt::format("{}: {:.3f} {:.3f}  ", off, lying, standing);
+    EXPECT_NEAR(lying, 1, tolerance()) << off;
+    EXPECT_NEAR(standing, 1, tolerance()) << off;
+  }
+  RecordProperty("figures", figures);
+}
+
 INSTANTIATE_TEST_SUITE_P(Probes, Layers, testing::Values(10, 20, 40),
+                         [](const auto& p) { return fmt::format("{}Layers", p.param); });
+
+INSTANTIATE_TEST_SUITE_P(Probes, LayersOnSheets, testing::Values(10, 20),
                          [](const auto& p) { return fmt::format("{}Layers", p.param); });
 
 // The side, the top and the bottom of a ball, 5 spacings in radius: rho g times their depths below
