@@ -21,10 +21,15 @@
 
 namespace drench::test {
 
-/// What `f` writes to stderr.
+/// What `f` writes to stderr, which is free again even where it throws.
 inline std::string said_by(const std::function<void()>& f) {
   testing::internal::CaptureStderr();
-  f();
+  try {
+    f();
+  } catch (...) {
+    testing::internal::GetCapturedStderr();
+    throw;
+  }
   return testing::internal::GetCapturedStderr();
 }
 
