@@ -133,6 +133,10 @@ class ExrReader {
              {std::min(data_.max.x, display_.max.x), std::min(data_.max.y, display_.max.y)}};
     check_windows();
     check_channels(header);
+    if (file_.is_sky() && Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE)
+      file_.fail(
+          "its header says that it is a cube map; convert it to latitude and longitude "
+          "(exrenvmap -l)");
     Raster picture;
     picture.code = ColourCode::linear(Imf::hasChromaticities(header) ? Imf::chromaticities(header)
                                                                      : rec709_chromaticities());

@@ -19,6 +19,7 @@ class PictureFile {
   const std::filesystem::path& path() const { return path_; }
   const std::vector<std::byte>& bytes() const { return bytes_; }
   bool is_data() const { return use_ == PictureUse::data; }
+  bool is_sky() const { return use_ == PictureUse::sky; }
 
   [[noreturn]] void fail(const std::string& why) const;
   void warn(const std::string& text) const;

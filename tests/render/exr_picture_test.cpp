@@ -7,6 +7,7 @@
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRgbaFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
 
 #include <deque>
@@ -218,6 +219,23 @@ TEST_F(ExrPicture, ChromaOfAnotherSizeIsNamed) {
   const std::string said = error_of([&] { read_texture(path); });
   EXPECT_TRUE(tells(said, {"channel RY", "1 x 1", "2 x 2", "R, G and B"}));
   EXPECT_EQ(said.find("damaged"), std::string::npos) << said;
+}
+
+TEST_F(ExrPicture, CubeMapsAreRefusedAsSkiesAlone) {
+  const auto path = next();
+  {
+    Written w({{"R", "G", "B"}, {{0, 0}, {7, 47}}, {{0, 0}, {7, 47}}, Imf::FLOAT, {}});
+    Imf::addEnvmap(w.header, Imf::ENVMAP_CUBE);
+    Imf::OutputFile file(path.c_str(), w.header);
+    file.setFrameBuffer(w.buffer);
+    file.writePixels(48);
+  }
+  Light light;
+  light.type = LightType::environment;
+  light.map = path;
+  EXPECT_TRUE(tells(error_of([&] { Environment(light, Environment::Sampling::off); }),
+                    {"cube map", "latitude"}));
+  EXPECT_EQ(read_path(path).height(), 48);
 }
 
 TEST_F(ExrPicture, LuminanceAndChromaGiveColours) {
