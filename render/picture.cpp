@@ -24,6 +24,8 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kLargestFile = uint64_t(1) << 32;
 constexpr uint64_t kLargestPixels = uint64_t(1) << 28;  // 16384 x 16384
+/// Beyond this a conversion of primaries may leave float's range.
+constexpr float kLargestSample = 1e37f;
 constexpr double kGib = double(1 << 30);
 
 using Reader = Raster (*)(const PictureFile&);
@@ -111,13 +113,14 @@ void check_finite(const PictureFile& file, const Raster& picture, const Finite& 
                   picture.bytes.data() + (p * size_t(picture.stride) + size_t(c)) * sizeof(Value),
                   sizeof value);
       if (!finite(value))
-        file.fail(fmt::format("pixel {}, {} is not finite ({}); repair it",
-                              p % size_t(picture.width), p / size_t(picture.width), float(value)));
+        file.fail(fmt::format("pixel {}, {} is {} ({}); repair it", p % size_t(picture.width),
+                              p / size_t(picture.width),
+                              std::isfinite(float(value))
+                                  ? fmt::format("above {} in size", kLargestSample)
+                                  : "not finite",
+                              float(value)));
     }
 }
-
-/// Beyond this a conversion of primaries may leave float's range.
-constexpr float kLargestSample = 1e37f;
 
 void check_finite(const PictureFile& file, const Raster& picture) {
   if (picture.sample == Raster::Sample::f16)
