@@ -195,6 +195,11 @@ void PictureFile::make_room(Raster& picture, uint64_t width, uint64_t height,
   picture.bytes.resize(own);
 }
 
+void PictureFile::check_room(const std::string& what, uint64_t bytes) const {
+  memory_.take(path_, what, bytes);
+  memory_.give_back(bytes);
+}
+
 ColourCode PictureFile::code_of_profile(const unsigned char* profile, size_t size) const {
   const IccProfile icc(std::span(profile, size));
   if (icc.code()) return *icc.code();

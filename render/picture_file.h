@@ -29,6 +29,9 @@ class PictureFile {
   /// @param beside  bytes that reading takes besides, for a while
   void make_room(Raster& picture, uint64_t width, uint64_t height, uint64_t beside = 0) const;
 
+  /// @throws Error if there is no room for what is taken for a while. @param what  "its tile"
+  void check_room(const std::string& what, uint64_t bytes) const;
+
   /// What an ICC profile says of 8- or 16-bit samples; one that cannot be used is a warning, and
   /// the code is sRGB.
   ColourCode code_of_profile(const unsigned char* profile, size_t size) const;

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include "render/color.h"
 #include "render/picture_file.h"
@@ -19,9 +20,29 @@ namespace {
 
 /// Of one strip or tile, and of what libtiff takes for itself at once.
 constexpr uint64_t kLargestBlock = uint64_t(1) << 30;
-/// Neither deflate (1032 to 1) nor LZW, of whose codes of 12 bits none stands for more than 3838
-/// bytes, packs tighter.
-constexpr double kLargestPacking = 4096;
+/// The most bytes that one of a codec's stands for; none where only decoding tells.
+std::optional<double> largest_packing(int compression, uint32_t width) {
+  switch (compression) {
+    case COMPRESSION_NONE:
+    case COMPRESSION_PACKBITS:
+    case COMPRESSION_JPEG:  // a block of 64 samples takes 2 bits
+    case COMPRESSION_DEFLATE:
+    case COMPRESSION_ADOBE_DEFLATE:  // 1032
+    case COMPRESSION_LZW:            // 3838 a code of 12 bits
+      return 4096;
+    case COMPRESSION_LZMA:  // 273 bytes by 14 decisions of at least 0.022 bits: 7090
+      return 8192;
+    case COMPRESSION_ZSTD:  // a block of 128 KiB of one byte takes 4
+      return 32768;
+    case COMPRESSION_CCITTRLE:
+    case COMPRESSION_CCITTRLEW:
+    case COMPRESSION_CCITTFAX3:
+    case COMPRESSION_CCITTFAX4:  // a row like the one above takes a bit
+      return width + 8.0;
+    default:
+      return {};
+  }
+}
 
 struct Source {
   const std::byte* data = nullptr;
@@ -104,12 +125,7 @@ class TiffReader {
           fmt::format("its strips or tiles have {} bytes each; write it again with smaller "
                       "ones",
                       block));
-    if (double(width_) * height_ * samples_ * bits_ / 8 >
-        kLargestPacking * double(file_.bytes().size()))
-      file_.fail(
-          fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
-                      "forged. Write it again or give another",
-                      width_, height_, file_.bytes().size()));
+    check_size(place, block);
     file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()), 2 * block);
     read_blocks(picture, place, block);
     if (inks_) to_rgb(picture);
@@ -157,6 +173,22 @@ class TiffReader {
     if (orientation_ < 1 || orientation_ > 8) orientation_ = 1;
   }
 
+  /// Before room is made: whether the file can hold what its header says.
+  void check_size(const Orientation& place, uint64_t block) {
+    const auto packing = largest_packing(tag(TIFFTAG_COMPRESSION), width_);
+    if (!packing) {
+      file_.check_room("a strip or tile of it", 2 * block);
+      Raster none;
+      return read_blocks(none, place, block);
+    }
+    const uint64_t size = file_.bytes().size();
+    if (double(width_) * height_ * samples_ * bits_ / 8 > *packing * double(size))
+      file_.fail(
+          fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
+                      "forged. Write it again or give another",
+                      width_, height_, size));
+  }
+
   std::string described() const {
     const char* names[] = {"grey, white at 0", "grey", "RGB", "palette", "mask", "CMYK", "YCbCr"};
     const std::string colours = size_t(photometric_) < std::size(names) ? names[photometric_]
@@ -201,7 +233,7 @@ class TiffReader {
     return std::min(TIFFStripSize64(tiff()), TIFFVStripSize64(tiff(), height_));
   }
 
-  /// Reads each strip or tile and puts its samples where they belong.
+  /// Reads each strip or tile and puts its samples where they belong, if `picture` has room.
   void read_blocks(Raster& picture, const Orientation& place, uint64_t size) {
     uint32_t wide = width_, high = height_;
     if (tiled_) {
@@ -223,7 +255,7 @@ class TiffReader {
           const auto rows = std::min<uint64_t>(high, height_ - y);
           const auto columns = std::min<uint64_t>(wide, width_ - x);
           read_block(block, uint32_t(x), uint32_t(y), uint16_t(plane), rows * row_bytes);
-          for (uint64_t r = 0; r < rows; ++r)
+          for (uint64_t r = 0; r < rows && !picture.bytes.empty(); ++r)
             for (uint64_t c = 0; c < columns; ++c)
               put(picture, place.pixel(int(x + c), int(y + r)), plane, block.data() + r * row_bytes,
                   c);

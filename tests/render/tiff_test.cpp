@@ -277,6 +277,65 @@ TEST_F(Tiff, KindsThatAreNotReadAreNamed) {
   EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"CIE L*a*b*", "8 bits"}));
 }
 
+/// Black, or the first strip of it, in strips of `rows`.
+void write_black(const std::filesystem::path& path, int size, int channels, int bits,
+                 int compression, int rows, int strips) {
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  for (const int tag : {TIFFTAG_IMAGEWIDTH, TIFFTAG_IMAGELENGTH}) TIFFSetField(tiff, tag, size);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, channels);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, bits);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, compression);
+  if (compression == COMPRESSION_WEBP) TIFFSetField(tiff, TIFFTAG_WEBP_LOSSLESS, 1);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows);
+  std::string strip(size_t(rows) * size_t(size) * size_t(channels) * size_t(bits) / 8, '\0');
+  for (int k = 0; k < strips; ++k)
+    TIFFWriteEncodedStrip(tiff, uint32_t(k), strip.data(), tmsize_t(strip.size()));
+  TIFFWriteDirectory(tiff);
+  TIFFClose(tiff);
+}
+
+// Some codecs pack what is even far tighter than deflate, whose 1032 to 1 is the most.
+TEST_F(Tiff, EvenPicturesAreReadHoweverTheyArePacked) {
+  struct Even {
+    int size, channels, bits, compression;
+  };
+  for (const Even& even :
+       {Even{2048, 3, 8, COMPRESSION_ZSTD}, Even{2048, 3, 8, COMPRESSION_LZMA},
+        Even{2048, 3, 8, COMPRESSION_WEBP}, Even{8192, 1, 1, COMPRESSION_CCITTFAX4},
+        Even{2048, 3, 8, COMPRESSION_ADOBE_DEFLATE}}) {
+    if (!TIFFIsCODECConfigured(uint16_t(even.compression))) continue;
+    const auto path = next();
+    write_black(path, even.size, even.channels, even.bits, even.compression, even.size, 1);
+    const uint64_t samples = uint64_t(even.size) * uint64_t(even.size) * uint64_t(even.channels);
+    const double packing =
+        double(samples) * even.bits / 8 / double(std::filesystem::file_size(path));
+    EXPECT_GT(packing, even.compression == COMPRESSION_ADOBE_DEFLATE ? 500 : 4096)
+        << even.compression;
+    const Texture texture = [&] {
+      Texture out;
+      EXPECT_EQ(said_by([&] { out = read_texture(path); }), "");
+      return out;
+    }();
+    EXPECT_EQ(texture.texels(), size_t(even.size) * size_t(even.size)) << even.compression;
+    EXPECT_EQ(texture.texel(texture.texels() - 1), V3f(0)) << even.compression;
+  }
+}
+
+// Of 768 MiB of samples the file holds a strip: whatever the codec, no room is asked for.
+TEST_F(Tiff, StripsThatAreMissingAreSeenBeforeRoomIsMade) {
+  for (const int compression : {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_WEBP, COMPRESSION_ZSTD}) {
+    if (!TIFFIsCODECConfigured(uint16_t(compression))) continue;
+    const auto path = next();
+    write_black(path, 16384 - 64, 3, 8, compression, 16, 1);
+    PictureMemory little(64 << 20);
+    const std::string said = error_of([&] { read_texture(path, little); });
+    EXPECT_TRUE(tells(said, {"cut off"})) << compression;
+    EXPECT_EQ(said.find("--memory"), std::string::npos) << said;
+  }
+}
+
 // 4 GiB of samples of which the file holds a strip: refused before room is made.
 TEST_F(Tiff, PixelsThatCannotBeInTheFileAreRefused) {
   const auto path = next();
