@@ -191,11 +191,13 @@ class TiffReader {
 
   std::string described() const {
     const char* names[] = {"grey, white at 0", "grey", "RGB", "palette", "mask", "CMYK", "YCbCr"};
-    const std::string colours = size_t(photometric_) < std::size(names) ? names[photometric_]
-                                : photometric_ == PHOTOMETRIC_CIELAB    ? "CIE L*a*b*"
-                                : photometric_ == PHOTOMETRIC_LOGL      ? "LogL"
-                                : photometric_ == PHOTOMETRIC_LOGLUV    ? "LogLuv"
-                                : photometric_ == 0xffff                ? "no colours named"
+    const bool other_inks = photometric_ == PHOTOMETRIC_SEPARATED && !is_cmyk();
+    const std::string colours = other_inks                                ? "inks other than CMYK"
+                                : size_t(photometric_) < std::size(names) ? names[photometric_]
+                                : photometric_ == PHOTOMETRIC_CIELAB      ? "CIE L*a*b*"
+                                : photometric_ == PHOTOMETRIC_LOGL        ? "LogL"
+                                : photometric_ == PHOTOMETRIC_LOGLUV      ? "LogLuv"
+                                : photometric_ == 0xffff                  ? "no colours named"
                                                          : fmt::format("colours {}", photometric_);
     return fmt::format("{}, {} x {} bits{}", colours, samples_, bits_,
                        format_ == SAMPLEFORMAT_IEEEFP ? " of floats"
@@ -203,15 +205,19 @@ class TiffReader {
                                                       : "");
   }
 
+  bool is_cmyk() const { return tag(TIFFTAG_INKSET) == INKSET_CMYK; }
+
   Raster kind() {
     const bool grey =
         photometric_ == PHOTOMETRIC_MINISBLACK || photometric_ == PHOTOMETRIC_MINISWHITE;
-    inks_ = photometric_ == PHOTOMETRIC_SEPARATED && samples_ >= 4;
+    inks_ = photometric_ == PHOTOMETRIC_SEPARATED && samples_ >= 4 && is_cmyk();
     const bool integer = format_ == SAMPLEFORMAT_UINT || format_ == SAMPLEFORMAT_VOID;
     const bool real = format_ == SAMPLEFORMAT_IEEEFP && (bits_ == 16 || bits_ == 32);
     const bool packed = integer && samples_ == 1 && (bits_ == 1 || bits_ == 2 || bits_ == 4);
     const bool palette = photometric_ == PHOTOMETRIC_PALETTE && integer && bits_ <= 8;
-    const bool known = (grey && samples_ >= 1) ||
+    // White at 0 has black at the maximum, which floats do not have.
+    const bool inverse = photometric_ == PHOTOMETRIC_MINISWHITE;
+    const bool known = (grey && samples_ >= 1 && !(real && inverse)) ||
                        (photometric_ == PHOTOMETRIC_RGB && samples_ >= 3) || (inks_ && integer) ||
                        (palette && samples_ >= 1);
     if (!known || samples_ > 16 || !(real || packed || (integer && (bits_ == 8 || bits_ == 16))))
@@ -286,7 +292,7 @@ class TiffReader {
       const size_t count = planar_ ? 1 : size_t(samples_);
       std::memcpy(to, row + column * count * sample, count * sample);
     }
-    if (photometric_ == PHOTOMETRIC_MINISWHITE && plane == 0 && is_integer())
+    if (photometric_ == PHOTOMETRIC_MINISWHITE && plane == 0)
       for (size_t k = 0; k < sample; ++k) to[k] = ~to[k];
   }
   bool is_integer() const { return format_ != SAMPLEFORMAT_IEEEFP; }

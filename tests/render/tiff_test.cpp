@@ -18,6 +18,9 @@ struct TiffOfTest {
   std::vector<uint16_t> extra{};
   std::vector<std::array<uint16_t, 256>> palette{};
   std::string icc{};
+  std::vector<float> primaries{}, white{};  // x, y of each
+  bool transfer = false;                    // a TransferFunction
+  int ink_set = 0;                          // 0: no tag
 
   /// Of 0 to 2^bits - 1; of floats a number above 1, too.
   double sample(int x, int y, int c) const {
@@ -47,6 +50,12 @@ struct TiffOfTest {
     if (!palette.empty())
       TIFFSetField(tiff, TIFFTAG_COLORMAP, palette[0].data(), palette[1].data(), palette[2].data());
     if (!icc.empty()) TIFFSetField(tiff, TIFFTAG_ICCPROFILE, uint32_t(icc.size()), icc.data());
+    if (!primaries.empty()) TIFFSetField(tiff, TIFFTAG_PRIMARYCHROMATICITIES, primaries.data());
+    if (!white.empty()) TIFFSetField(tiff, TIFFTAG_WHITEPOINT, white.data());
+    if (ink_set > 0) TIFFSetField(tiff, TIFFTAG_INKSET, ink_set);
+    std::vector<uint16_t> curve(transfer ? size_t(1) << bits : 0);
+    if (transfer)
+      TIFFSetField(tiff, TIFFTAG_TRANSFERFUNCTION, curve.data(), curve.data(), curve.data());
     const int wide = tiled ? 16 : width, high = tiled ? 16 : 5;
     if (tiled) {
       TIFFSetField(tiff, TIFFTAG_TILEWIDTH, wide);
@@ -275,6 +284,28 @@ TEST_F(Tiff, KindsThatAreNotReadAreNamed) {
   TiffOfTest lab{.photometric = PHOTOMETRIC_CIELAB};
   lab.write(next());
   EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"CIE L*a*b*", "8 bits"}));
+}
+
+TEST_F(Tiff, InksOtherThanCmykAreRefused) {
+  TiffOfTest tiff{.channels = 4, .photometric = PHOTOMETRIC_SEPARATED, .ink_set = INKSET_MULTIINK};
+  tiff.write(next());
+  EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"inks other than CMYK"}));
+  tiff.ink_set = INKSET_CMYK;
+  std::string said;
+  EXPECT_EQ(read(tiff, &said).width(), tiff.width);
+}
+
+// TIFF 6.0 has the maximum black then, and floats have none.
+TEST_F(Tiff, FloatsWithWhiteAtZeroAreRefused) {
+  for (const int bits : {16, 32}) {
+    const TiffOfTest tiff{.channels = 1,
+                          .bits = bits,
+                          .photometric = PHOTOMETRIC_MINISWHITE,
+                          .format = SAMPLEFORMAT_IEEEFP};
+    const auto path = next();
+    tiff.write(path);
+    EXPECT_TRUE(tells(error_of([&] { read_texture(path); }), {"white at 0", "floats"}));
+  }
 }
 
 /// Black, or the first strip of it, in strips of `rows`.
