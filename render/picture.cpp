@@ -129,6 +129,17 @@ void check_finite(const PictureFile& file, const Raster& picture) {
     check_finite<float>(file, picture, [](float f) { return std::abs(f) <= kLargestSample; });
 }
 
+bool is_real(Raster::Sample sample) {
+  return sample == Raster::Sample::f16 || sample == Raster::Sample::f32;
+}
+
+bool is_curved(const ColourCode& code) {
+  for (const auto& curve : code.to_linear)
+    for (int k = 0; k <= 255; ++k)
+      if (std::abs(curve(float(k) / 255) - float(k) / 255) > 1e-3f) return true;
+  return false;
+}
+
 std::string described(const Raster& picture, uint64_t width, uint64_t height) {
   return fmt::format("{} x {} pixels of {} x {} bits", width, height, picture.stride,
                      8 * bytes_of(picture.sample));
@@ -200,15 +211,37 @@ void PictureFile::check_room(const std::string& what, uint64_t bytes) const {
   memory_.give_back(bytes);
 }
 
-ColourCode PictureFile::code_of_profile(const unsigned char* profile, size_t size) const {
+ColourCode PictureFile::code_of_profile(const unsigned char* profile, size_t size,
+                                        Raster::Sample sample) const {
   const IccProfile icc(std::span(profile, size));
-  if (icc.code()) return *icc.code();
+  const bool real = is_real(sample);
+  if (icc.code() && !(real && is_curved(*icc.code()))) return *icc.code();
   if (!is_data())
     warn(
-        fmt::format("its ICC profile '{}' is not applied, {}; its values are taken as sRGB. "
-                    "Convert it to sRGB in the program that made it",
-                    icc.name(), icc.why_not()));
-  return ColourCode::srgb();
+        fmt::format("its ICC profile '{}' is not applied, {}; its values are taken as {}sRGB. "
+                    "Convert it to that in the program that made it",
+                    icc.name(), icc.code() ? "its curves do not reach above 1" : icc.why_not(),
+                    real ? "linear " : ""));
+  return real ? ColourCode::linear(rec709_chromaticities()) : ColourCode::srgb();
+}
+
+std::optional<Imf::Chromaticities> PictureFile::other_primaries(const Imf::Chromaticities& found,
+                                                                const char* where) const {
+  const Imf::Chromaticities same = rec709_chromaticities();
+  const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
+    return a.equalWithAbsError(b, 0.002f);
+  };
+  if (near(found.red, same.red) && near(found.green, same.green) && near(found.blue, same.blue) &&
+      near(found.white, same.white))
+    return {};
+  try {
+    color_conversion(found, acescg_chromaticities());
+    return found;
+  } catch (const Error&) {
+    warn(fmt::format("the chromaticities in {} span no colour space; those of sRGB are taken",
+                     where));
+    return {};
+  }
 }
 
 Raster read_picture(const fs::path& path, PictureUse use, PictureMemory& memory) {

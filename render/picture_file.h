@@ -2,6 +2,7 @@
 // For the readers of the formats: the file that is read, its messages, and the memory it may take.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,9 +33,16 @@ class PictureFile {
   /// @throws Error if there is no room for what is taken for a while. @param what  "its tile"
   void check_room(const std::string& what, uint64_t bytes) const;
 
-  /// What an ICC profile says of 8- or 16-bit samples; one that cannot be used is a warning, and
-  /// the code is sRGB.
-  ColourCode code_of_profile(const unsigned char* profile, size_t size) const;
+  /// What an ICC profile says of samples; one that cannot be used, as are curves of floats, is a
+  /// warning, and the code is that of samples without a profile.
+  ColourCode code_of_profile(const unsigned char* profile, size_t size,
+                             Raster::Sample sample) const;
+
+  /// Primaries that a file names besides; none if they are those of sRGB within rounding or, with a
+  /// warning, span no colour space.
+  /// @param where  "its cHRM chunk"
+  std::optional<Imf::Chromaticities> other_primaries(const Imf::Chromaticities& found,
+                                                     const char* where) const;
 
  private:
   std::filesystem::path path_;

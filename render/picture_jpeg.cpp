@@ -233,7 +233,7 @@ class JpegReader {
                           ? ""
                           : " and, since it lacks Adobe's marker, with 0 for no ink"));
     if (inks_ || !state_.profile) return ColourCode::srgb();
-    return file_.code_of_profile(state_.profile, state_.profile_size);
+    return file_.code_of_profile(state_.profile, state_.profile_size, Raster::Sample::u8);
   }
 
   void warn_of_orientation() const {

@@ -7,8 +7,6 @@
 #include <cstring>
 #include <optional>
 
-#include "pipeline/contract/error.h"
-#include "render/color.h"
 #include "render/picture_file.h"
 
 namespace drench {
@@ -110,7 +108,7 @@ class PngReader {
     picture.stride = int(png_get_channels(state_.png, state_.info));
     read_samples(picture);
     if (type == PNG_COLOR_TYPE_PALETTE) picture.palette = palette();
-    picture.code = file_.is_data() ? ColourCode::srgb() : code();
+    picture.code = file_.is_data() ? ColourCode::srgb() : code(picture.sample);
     file_.warn_of_alpha(transparent(picture));
     for (int k = 0; k < state_.warnings; ++k)
       if (!std::strstr(state_.warning[k], "known incorrect sRGB profile"))
@@ -201,14 +199,14 @@ class PngReader {
     return found;
   }
 
-  ColourCode code() {
+  ColourCode code(Raster::Sample sample) {
     if (const auto code = code_of_cicp()) return *code;
     png_charp name = nullptr;
     int compression = 0;
     png_bytep profile = nullptr;
     png_uint_32 size = 0;
     if (png_get_iCCP(state_.png, state_.info, &name, &compression, &profile, &size))
-      return file_.code_of_profile(profile, size);
+      return file_.code_of_profile(profile, size, sample);
     if (png_get_valid(state_.png, state_.info, PNG_INFO_sRGB)) return ColourCode::srgb();
     ColourCode out = ColourCode::srgb();
     double gamma = 0;
@@ -222,29 +220,13 @@ class PngReader {
     return out;
   }
 
-  /// None if they are those of sRGB within rounding, or not there.
   std::optional<Imf::Chromaticities> primaries_of_chrm() {
     double c[8];
     if (!png_get_cHRM(state_.png, state_.info, &c[0], &c[1], &c[2], &c[3], &c[4], &c[5], &c[6],
                       &c[7]))
       return {};
     const auto at = [&](int k) { return Imath::V2f(float(c[k]), float(c[k + 1])); };
-    const Imf::Chromaticities found(at(2), at(4), at(6), at(0)), same = rec709_chromaticities();
-    const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
-      return a.equalWithAbsError(b, 0.002f);
-    };
-    if (near(found.red, same.red) && near(found.green, same.green) && near(found.blue, same.blue) &&
-        near(found.white, same.white))
-      return {};
-    try {
-      color_conversion(found, acescg_chromaticities());
-    } catch (const Error&) {
-      file_.warn(
-          "the chromaticities in its cHRM chunk span no colour space; those of sRGB are "
-          "taken");
-      return {};
-    }
-    return found;
+    return file_.other_primaries({at(2), at(4), at(6), at(0)}, "its cHRM chunk");
   }
 
   /// Of a cICP chunk, ITU-T H.273 code points; none if there is none or they are not known here.

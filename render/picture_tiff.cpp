@@ -130,7 +130,7 @@ class TiffReader {
     read_blocks(picture, place, block);
     if (inks_) to_rgb(picture);
     if (photometric_ == PHOTOMETRIC_PALETTE) picture.palette = palette();
-    picture.code = code();
+    picture.code = code(picture.sample);
     warn(picture);
     return picture;
   }
@@ -335,13 +335,35 @@ class TiffReader {
     return out;
   }
 
-  ColourCode code() const {
-    if (!is_integer()) return ColourCode::linear(rec709_chromaticities());
+  ColourCode code(Raster::Sample sample) const {
+    ColourCode out =
+        is_integer() ? ColourCode::srgb() : ColourCode::linear(rec709_chromaticities());
+    if (file_.is_data() || inks_) return out;
     uint32_t size = 0;
     void* profile = nullptr;
-    if (file_.is_data() || inks_ || !TIFFGetField(tiff(), TIFFTAG_ICCPROFILE, &size, &profile))
-      return ColourCode::srgb();
-    return file_.code_of_profile(static_cast<const unsigned char*>(profile), size);
+    if (TIFFGetField(tiff(), TIFFTAG_ICCPROFILE, &size, &profile))
+      return file_.code_of_profile(static_cast<const unsigned char*>(profile), size, sample);
+    if (const auto primaries = primaries_of_tags()) out.primaries = *primaries;
+    uint16_t* curve[3] = {};
+    if (TIFFGetField(tiff(), TIFFTAG_TRANSFERFUNCTION, &curve[0], &curve[1], &curve[2]))
+      file_.warn(
+          "its TransferFunction is not applied. Convert it to sRGB in the program that made it");
+    return out;
+  }
+
+  std::optional<Imf::Chromaticities> primaries_of_tags() const {
+    Imf::Chromaticities found = rec709_chromaticities();
+    float *rgb = nullptr, *white = nullptr;
+    const bool has_rgb = TIFFGetField(tiff(), TIFFTAG_PRIMARYCHROMATICITIES, &rgb) != 0;
+    const bool has_white = TIFFGetField(tiff(), TIFFTAG_WHITEPOINT, &white) != 0;
+    if (has_rgb) found = {{rgb[0], rgb[1]}, {rgb[2], rgb[3]}, {rgb[4], rgb[5]}, found.white};
+    if (has_white) found.white = {white[0], white[1]};
+    const auto out = file_.other_primaries(found, "its tags");
+    if (out && has_rgb != has_white)
+      file_.warn(has_rgb ? "it has PrimaryChromaticities without a white; that of sRGB is taken"
+                         : "it has a WhitePoint without PrimaryChromaticities; those of sRGB are "
+                           "taken");
+    return out;
   }
 
   void warn(const Raster& picture) {

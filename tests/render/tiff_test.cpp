@@ -267,6 +267,56 @@ TEST_F(Tiff, ProfileIsHonoured) {
     EXPECT_NEAR(rec709_of(texture.texel(size_t(x))).x, tiff.sample(x, 0, 0) / 255, 1e-3);
 }
 
+// A curve ends at 1, so that of floats none but a straight one can be applied.
+TEST_F(Tiff, ProfileOfFloatsIsHonouredIfItIsLinear) {
+  for (const int bits : {16, 32}) {
+    TiffOfTest tiff{.bits = bits, .format = SAMPLEFORMAT_IEEEFP};
+    const Texture plain = read(tiff);
+    const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
+    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(1)).bytes();
+    const Texture linear = read(tiff);
+    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(2.2)).bytes();
+    std::string said;
+    const Texture curved = read(tiff, &said);
+    EXPECT_TRUE(tells(said, {"ICC profile 'of the test'", "linear sRGB"}));
+    for (size_t p = 0; p < plain.texels(); ++p) {
+      const V3f wide = matrix(rec709_of(plain.texel(p)));
+      expect_near(linear.texel(p), wide, 1e-3f * (1 + wide.x));  // colorants have four digits
+      EXPECT_EQ(curved.texel(p), plain.texel(p));
+    }
+  }
+}
+
+TEST_F(Tiff, PrimariesAreHonoured) {
+  for (const int format : {SAMPLEFORMAT_UINT, SAMPLEFORMAT_IEEEFP}) {
+    TiffOfTest tiff{.bits = format == SAMPLEFORMAT_UINT ? 8 : 32, .format = format};
+    const Texture plain = read(tiff);
+    tiff.white = {0.3127f, 0.329f};
+    tiff.primaries = {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f};
+    const Texture same = read(tiff);
+    tiff.primaries = {0.68f, 0.32f, 0.265f, 0.69f, 0.15f, 0.06f};
+    const Texture wide = read(tiff);
+    tiff.white = {};
+    std::string said;
+    const Texture guessed = read(tiff, &said);
+    EXPECT_TRUE(tells(said, {"PrimaryChromaticities", "white"}));
+    const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
+    for (size_t p = 0; p < plain.texels(); ++p) {
+      EXPECT_EQ(same.texel(p), plain.texel(p));
+      const V3f expected = matrix(rec709_of(plain.texel(p)));
+      expect_near(wide.texel(p), expected, 1e-5f * (1 + expected.x));
+      EXPECT_EQ(guessed.texel(p), wide.texel(p));
+    }
+  }
+}
+
+TEST_F(Tiff, TransferFunctionIsNamed) {
+  TiffOfTest tiff{.transfer = true};
+  std::string said;
+  expect_pixels(read(tiff, &said), tiff, "curves");
+  EXPECT_TRUE(tells(said, {"TransferFunction", "sRGB"}));
+}
+
 TEST_F(Tiff, NormalsAreNotConverted) {
   for (const int bits : {8, 16}) {
     TiffOfTest tiff{.bits = bits};
