@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 #include <png.h>
+#include <zlib.h>
 
+#include <cmath>
 #include <csetjmp>
 #include <cstring>
 #include <optional>
+#include <span>
 
 #include "render/picture_file.h"
 
@@ -229,31 +232,46 @@ class PngReader {
     return file_.other_primaries({at(2), at(4), at(6), at(0)}, "its cHRM chunk");
   }
 
-  /// Of a cICP chunk, ITU-T H.273 code points; none if there is none or they are not known here.
+  /// The data of the cICP chunk before the pixels, which libpng knows from 1.6.45 on; none if there
+  /// is none or its check sum is wrong, of which libpng warns.
+  std::span<const unsigned char> cicp() const {
+    const auto* file = reinterpret_cast<const unsigned char*>(state_.data);
+    const auto number = [&](size_t from) { return size_t(png_get_uint_32(file + from)); };
+    constexpr size_t kAround = 12;  // length and type before the data, check sum after
+    for (size_t at = 8; at + kAround <= state_.size;) {
+      const size_t size = number(at);
+      const unsigned char* type = file + at + 4;
+      if (size > state_.size - at - kAround || std::memcmp(type, "IDAT", 4) == 0) break;
+      if (std::memcmp(type, "cICP", 4) == 0 &&
+          crc32(0, type, uInt(4 + size)) == number(at + 8 + size))
+        return {type + 4, size};
+      at += kAround + size;
+    }
+    return {};
+  }
+
+  /// Of ITU-T H.273 code points; none if there are none or they are not known here. PNG has R, G
+  /// and B in full range: matrix 0, range 1.
   std::optional<ColourCode> code_of_cicp() const {
-    size_t at = 8;
-    const auto number = [&](size_t from) {
-      uint32_t out = 0;
-      for (size_t k = 0; k < 4; ++k) out = out << 8 | uint32_t(state_.data[from + k]);
-      return size_t(out);
-    };
-    while (at + 16 <= state_.size && std::memcmp(state_.data + at + 4, "IDAT", 4) != 0) {
-      if (std::memcmp(state_.data + at + 4, "cICP", 4) != 0) {
-        at += 12 + number(at);
-        continue;
-      }
-      const int primaries = int(state_.data[at + 8]), transfer = int(state_.data[at + 9]);
-      ColourCode out = ColourCode::srgb();
-      if (primaries == 12)  // Display P3
-        out.primaries = {{0.680f, 0.320f}, {0.265f, 0.690f}, {0.150f, 0.060f}, {0.3127f, 0.3290f}};
-      if (transfer == 8) out.to_linear = ColourCode::linear(out.primaries).to_linear;
-      if ((primaries == 1 || primaries == 12) && (transfer == 13 || transfer == 8)) return out;
+    const auto chunk = cicp();
+    if (chunk.empty()) return {};
+    if (chunk.size() != 4) {
       file_.warn(
-          fmt::format("its cICP chunk names primaries {} and transfer {}, which are not "
-                      "known here; it is read without. Convert it to sRGB or EXR",
-                      primaries, transfer));
+          fmt::format("its cICP chunk has {} bytes, not 4; it is read without", chunk.size()));
       return {};
     }
+    const int primaries = chunk[0], transfer = chunk[1], matrix = chunk[2], range = chunk[3];
+    ColourCode out = ColourCode::srgb();
+    if (primaries == 12)  // Display P3
+      out.primaries = {{0.680f, 0.320f}, {0.265f, 0.690f}, {0.150f, 0.060f}, {0.3127f, 0.3290f}};
+    if (transfer == 8) out.to_linear = ColourCode::linear(out.primaries).to_linear;
+    if ((primaries == 1 || primaries == 12) && (transfer == 13 || transfer == 8) && matrix == 0 &&
+        range == 1)
+      return out;
+    file_.warn(
+        fmt::format("its cICP chunk names primaries {}, transfer {}, matrix {} and {} range, "
+                    "which are not known here; it is read without. Convert it to sRGB or EXR",
+                    primaries, transfer, matrix, range == 1 ? "full" : "narrow"));
     return {};
   }
 

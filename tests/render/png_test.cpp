@@ -203,6 +203,32 @@ TEST_F(Png, CodePointsGoBeforeAllElse) {
   EXPECT_TRUE(tells(said, {"cICP", "primaries 9", "transfer 16"}));
 }
 
+// The picture is of RGB in full range, as PNG's third edition asks: matrix 0, range 1.
+TEST_F(Png, CodePointsOfVideoAreNamed) {
+  const Texture plain = read(ramp(8).bytes());
+  for (const auto& [points, words] :
+       {std::pair{"\x0c\x0d\0\0", "narrow range"}, std::pair{"\x0c\x0d\1\1", "matrix 1"}}) {
+    std::string png = ramp(8).bytes(), said;
+    png.insert(33, chunk("cICP", std::string(points, 4)));
+    const Texture texture = read(png, &said);
+    EXPECT_TRUE(tells(said, {"cICP", words}));
+    for (size_t k = 0; k < 256; ++k) EXPECT_EQ(texture.texel(k), plain.texel(k)) << k;
+  }
+}
+
+TEST_F(Png, CodePointsThatAreDamagedAreNotApplied) {
+  const Texture plain = read(ramp(8).bytes());
+  std::string wrong = chunk("cICP", std::string("\x0c\x0d\0\1", 4));
+  wrong.back() ^= 1;  // of its check sum
+  for (const std::string& damaged : {wrong, chunk("cICP", std::string("\x0c\x0d\0\1\0", 5))}) {
+    std::string png = ramp(8).bytes(), said;
+    png.insert(33, damaged);
+    const Texture texture = read(png, &said);
+    EXPECT_TRUE(tells(said, {"cICP"}));
+    for (size_t k = 0; k < 256; ++k) EXPECT_EQ(texture.texel(k), plain.texel(k)) << k;
+  }
+}
+
 TEST_F(Png, ProfilesThatCannotBeUsedAreNamed) {
   PngOfTest png = ramp(8);
   const Texture plain = read(png.bytes());
