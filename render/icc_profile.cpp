@@ -104,6 +104,12 @@ ColourCode::Curve curve_of(Bytes data) {
   return curve;
 }
 
+/// Of CIE L*, 0 to 100; 24389 / 27 is the slope at black.
+float luminance_of(float lightness) {
+  const float root = (lightness + 16) / 116;
+  return lightness > 8 ? root * root * root : lightness * 27 / 24389;
+}
+
 struct Colorant {
   double x = 0, y = 0, z = 0;  // XYZ under D50, the profile connection space
 };
@@ -144,11 +150,17 @@ std::optional<ColourCode> code_of(Bytes bytes, std::string& why_not) {
   if (bytes.size() < 132) return cannot("it is cut off");
   const bool grey = has_text(bytes, 16, "GRAY");
   if (!grey && !has_text(bytes, 16, "RGB ")) return cannot("it is not of RGB or grey");
-  if (!grey && !has_text(bytes, 20, "XYZ ")) return cannot("it is one of tables");
+  const bool lightness = grey && has_text(bytes, 20, "Lab ");
+  if ((!lightness && !has_text(bytes, 20, "XYZ ")) || !tag(bytes, "A2B0").empty() ||
+      !tag(bytes, "D2B0").empty())  // which go before a matrix and curves
+    return cannot("it is one of tables");
   std::array<ColourCode::Curve, 3> curves;
   const char* names[3] = {"rTRC", "gTRC", "bTRC"};
   for (size_t c = 0; c < 3; ++c) curves[c] = curve_of(tag(bytes, grey ? "kTRC" : names[c]));
   if (!curves[0] || !curves[1] || !curves[2]) return cannot("it has no curves that can be used");
+  if (lightness)
+    for (auto& curve : curves)
+      curve = [l = curve](float code) { return luminance_of(100 * l(code)); };
   if (grey) return ColourCode{curves, rec709_chromaticities()};
   const std::array<Colorant, 3> rgb{colorant(tag(bytes, "rXYZ")), colorant(tag(bytes, "gXYZ")),
                                     colorant(tag(bytes, "bXYZ"))};

@@ -11,7 +11,7 @@
 namespace drench {
 
 /// Method: ICC.1:2022 (profile version 4.4), clauses 7 (header, tags), 8.3.3 (three-component
-/// matrix-based profiles), 10.6 (curveType) and 10.18 (parametricCurveType).
+/// matrix-based profiles), 10.6 (curveType) and 10.18 (parametricCurveType); annex F.
 class IccProfile {
  public:
   /// @param bytes  a whole profile; any bytes are safe.

@@ -24,6 +24,8 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kLargestFile = uint64_t(1) << 32;
 constexpr uint64_t kLargestPixels = uint64_t(1) << 28;  // 16384 x 16384
+/// Beyond this a conversion of primaries may leave float's range.
+constexpr float kLargestSample = 1e37f;
 constexpr double kGib = double(1 << 30);
 
 using Reader = Raster (*)(const PictureFile&);
@@ -111,19 +113,31 @@ void check_finite(const PictureFile& file, const Raster& picture, const Finite& 
                   picture.bytes.data() + (p * size_t(picture.stride) + size_t(c)) * sizeof(Value),
                   sizeof value);
       if (!finite(value))
-        file.fail(fmt::format("pixel {}, {} is not finite ({}); repair it",
-                              p % size_t(picture.width), p / size_t(picture.width), float(value)));
+        file.fail(fmt::format("pixel {}, {} is {} ({}); repair it", p % size_t(picture.width),
+                              p / size_t(picture.width),
+                              std::isfinite(float(value))
+                                  ? fmt::format("above {} in size", kLargestSample)
+                                  : "not finite",
+                              float(value)));
     }
 }
-
-/// Beyond this a conversion of primaries may leave float's range.
-constexpr float kLargestSample = 1e37f;
 
 void check_finite(const PictureFile& file, const Raster& picture) {
   if (picture.sample == Raster::Sample::f16)
     check_finite<Imath::half>(file, picture, [](Imath::half h) { return h.isFinite(); });
   if (picture.sample == Raster::Sample::f32)
     check_finite<float>(file, picture, [](float f) { return std::abs(f) <= kLargestSample; });
+}
+
+bool is_real(Raster::Sample sample) {
+  return sample == Raster::Sample::f16 || sample == Raster::Sample::f32;
+}
+
+bool is_curved(const ColourCode& code) {
+  for (const auto& curve : code.to_linear)
+    for (int k = 0; k <= 255; ++k)
+      if (std::abs(curve(float(k) / 255) - float(k) / 255) > 1e-3f) return true;
+  return false;
 }
 
 std::string described(const Raster& picture, uint64_t width, uint64_t height) {
@@ -192,15 +206,42 @@ void PictureFile::make_room(Raster& picture, uint64_t width, uint64_t height,
   picture.bytes.resize(own);
 }
 
-ColourCode PictureFile::code_of_profile(const unsigned char* profile, size_t size) const {
+void PictureFile::check_room(const std::string& what, uint64_t bytes) const {
+  memory_.take(path_, what, bytes);
+  memory_.give_back(bytes);
+}
+
+ColourCode PictureFile::code_of_profile(const unsigned char* profile, size_t size,
+                                        Raster::Sample sample) const {
   const IccProfile icc(std::span(profile, size));
-  if (icc.code()) return *icc.code();
+  const bool real = is_real(sample);
+  if (icc.code() && !(real && is_curved(*icc.code()))) return *icc.code();
   if (!is_data())
     warn(
-        fmt::format("its ICC profile '{}' is not applied, {}; its values are taken as sRGB. "
-                    "Convert it to sRGB in the program that made it",
-                    icc.name(), icc.why_not()));
-  return ColourCode::srgb();
+        fmt::format("its ICC profile '{}' is not applied, {}; its values are taken as {}sRGB. "
+                    "Convert it to that in the program that made it",
+                    icc.name(), icc.code() ? "its curves do not reach above 1" : icc.why_not(),
+                    real ? "linear " : ""));
+  return real ? ColourCode::linear(rec709_chromaticities()) : ColourCode::srgb();
+}
+
+std::optional<Imf::Chromaticities> PictureFile::other_primaries(const Imf::Chromaticities& found,
+                                                                const char* where) const {
+  const Imf::Chromaticities same = rec709_chromaticities();
+  const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
+    return a.equalWithAbsError(b, 0.002f);
+  };
+  if (near(found.red, same.red) && near(found.green, same.green) && near(found.blue, same.blue) &&
+      near(found.white, same.white))
+    return {};
+  try {
+    color_conversion(found, acescg_chromaticities());
+    return found;
+  } catch (const Error&) {
+    warn(fmt::format("the chromaticities in {} span no colour space; those of sRGB are taken",
+                     where));
+    return {};
+  }
 }
 
 Raster read_picture(const fs::path& path, PictureUse use, PictureMemory& memory) {

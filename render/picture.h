@@ -14,8 +14,9 @@
 
 namespace drench {
 
-/// Colours are light. Data (normals) are numbers: what a file says of colours is not for them.
-enum class PictureUse { colour, data };
+/// Colours and skies are light. Data (normals) are numbers: what a file says of colours is not for
+/// them.
+enum class PictureUse { colour, sky, data };
 
 /// What pictures may take together, asked before memory is taken.
 class PictureMemory {

@@ -39,7 +39,7 @@ struct Choice {
   Kind kind = Kind::none;
   int part = 0;
   std::string layer;                  // "diffuse.", or none
-  std::vector<std::string> channels;  // 1 or 3
+  std::vector<std::string> channels;  // 1 or 3, luminance before chroma
 };
 
 bool has(const Imf::Header& header, const std::string& channel) {
@@ -68,7 +68,8 @@ Choice choice_in(const Imf::Header& header, int part, const std::string& layer) 
     if (all({names[0], names[1], names[2]}))
       return {Kind::rgb, part, layer, {layer + names[0], layer + names[1], layer + names[2]}};
   if (all({"X", "Y"})) return {};  // a place or direction
-  if (all({"Y", "RY", "BY"})) return {Kind::luminance_chroma, part, layer, {layer + "Y"}};
+  if (all({"Y", "RY", "BY"}))
+    return {Kind::luminance_chroma, part, layer, {layer + "Y", layer + "RY", layer + "BY"}};
   if (all({"Y"})) return {Kind::grey, part, layer, {layer + "Y"}};
   return {};
 }
@@ -131,6 +132,11 @@ class ExrReader {
     seen_ = {{std::max(data_.min.x, display_.min.x), std::max(data_.min.y, display_.min.y)},
              {std::min(data_.max.x, display_.max.x), std::min(data_.max.y, display_.max.y)}};
     check_windows();
+    check_channels(header);
+    if (file_.is_sky() && Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE)
+      file_.fail(
+          "its header says that it is a cube map; convert it to latitude and longitude "
+          "(exrenvmap -l)");
     Raster picture;
     picture.code = ColourCode::linear(Imf::hasChromaticities(header) ? Imf::chromaticities(header)
                                                                      : rec709_chromaticities());
@@ -217,6 +223,26 @@ class ExrReader {
                       width, height, size));
   }
 
+  /// UINT is for what is counted, such as objects. Chroma alone may be coarser, as its writers are.
+  void check_channels(const Imf::Header& header) const {
+    for (const std::string& name : choice_.channels) {
+      const Imf::Channel& channel = *header.channels().findChannel(name);
+      if (channel.type == Imf::UINT)
+        file_.fail(
+            fmt::format("its channel {} holds integers, which are no light; write it as half or "
+                        "float",
+                        name));
+      const bool chroma =
+          choice_.kind == Choice::Kind::luminance_chroma && name != choice_.channels.front();
+      const int step = chroma ? 2 : 1;
+      if (channel.xSampling != step || channel.ySampling != step)
+        file_.fail(
+            fmt::format("its channel {} has one sample for {} x {} pixels, where only {} x {} is "
+                        "read; write it again as R, G and B at full resolution",
+                        name, channel.xSampling, channel.ySampling, step, step));
+    }
+  }
+
   void check_primaries(Raster& picture) const {
     try {
       color_conversion(picture.code.primaries, acescg_chromaticities());
@@ -236,6 +262,13 @@ class ExrReader {
                 width_of(seen_) * pixel);
   }
 
+  /// @param first  of a row of the data window, whose alphas `alpha` gives
+  template <class Alpha>
+  void count_transparent(size_t first, const Alpha& alpha) {
+    const size_t from = first + size_t(seen_.min.x - data_.min.x);
+    for (size_t at = from; at < from + width_of(seen_); ++at) transparent_ += alpha(at) < 1 ? 1 : 0;
+  }
+
   /// What the library keeps of all channels: a row of tiles, or the lines of its largest chunks.
   uint64_t taken_by_library(const Imf::Header& header) const {
     constexpr uint64_t kLines = 256;
@@ -249,15 +282,8 @@ class ExrReader {
 
   void read_channels(Raster& picture, const Imf::Header& header) {
     bool half = true;
-    for (const std::string& name : choice_.channels) {
-      const Imf::Channel& channel = *header.channels().findChannel(name);
-      half = half && channel.type == Imf::HALF;
-      if (channel.xSampling != 1 || channel.ySampling != 1)
-        file_.fail(
-            fmt::format("its channel {} is subsampled, which only luminance-chroma may be; "
-                        "write it again at full resolution",
-                        name));
-    }
+    for (const std::string& name : choice_.channels)
+      half = half && header.channels().findChannel(name)->type == Imf::HALF;
     picture.sample = half ? Raster::Sample::f16 : Raster::Sample::f32;
     picture.colours = picture.stride = int(choice_.channels.size());
     const Imf::PixelType type = half ? Imf::HALF : Imf::FLOAT;
@@ -271,7 +297,7 @@ class ExrReader {
     std::vector<float> alpha;
     const std::string alpha_name = choice_.layer + "A";
     if (const Imf::Channel* a = header.channels().findChannel(alpha_name);
-        a && a->xSampling == 1 && a->ySampling == 1)
+        a && a->xSampling == 1 && a->ySampling == 1 && choice_.channels[0] != alpha_name)
       alpha.resize(size_t(at_once) * width);
     Imf::InputPart part(exr_, choice_.part);
     for (int y = seen_.min.y; y <= seen_.max.y; y += at_once) {
@@ -286,11 +312,11 @@ class ExrReader {
                                                   width * sizeof(float)));
       part.setFrameBuffer(frame);
       part.readPixels(y, last);
-      for (int r = y; r <= last; ++r) place_row(picture, r, rows.data() + size_t(r - y) * row);
-      if (!alpha.empty())
-        transparent_ += uint64_t(
-            std::count_if(alpha.begin(), alpha.begin() + std::ptrdiff_t(width) * (last - y + 1),
-                          [](float a) { return a < 1; }));
+      for (int r = y; r <= last; ++r) {
+        const size_t k = size_t(r - y);
+        place_row(picture, r, rows.data() + k * row);
+        if (!alpha.empty()) count_transparent(k * width, [&](size_t at) { return alpha[at]; });
+      }
     }
   }
 
@@ -315,10 +341,9 @@ class ExrReader {
       exr.setFrameBuffer(row.data() - data_.min.x - std::ptrdiff_t(y) * std::ptrdiff_t(width), 1,
                          width);
       exr.readPixels(y);
-      for (size_t x = 0; x < width; ++x) {
+      for (size_t x = 0; x < width; ++x)
         rgb[3 * x] = row[x].r, rgb[3 * x + 1] = row[x].g, rgb[3 * x + 2] = row[x].b;
-        transparent_ += row[x].a < 1 ? 1 : 0;
-      }
+      count_transparent(0, [&](size_t at) { return float(row[at].a); });
       place_row(picture, y, reinterpret_cast<const std::byte*>(rgb.data()));
     }
   }

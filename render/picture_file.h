@@ -2,6 +2,7 @@
 // For the readers of the formats: the file that is read, its messages, and the memory it may take.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ class PictureFile {
   const std::filesystem::path& path() const { return path_; }
   const std::vector<std::byte>& bytes() const { return bytes_; }
   bool is_data() const { return use_ == PictureUse::data; }
+  bool is_sky() const { return use_ == PictureUse::sky; }
 
   [[noreturn]] void fail(const std::string& why) const;
   void warn(const std::string& text) const;
@@ -28,9 +30,19 @@ class PictureFile {
   /// @param beside  bytes that reading takes besides, for a while
   void make_room(Raster& picture, uint64_t width, uint64_t height, uint64_t beside = 0) const;
 
-  /// What an ICC profile says of 8- or 16-bit samples; one that cannot be used is a warning, and
-  /// the code is sRGB.
-  ColourCode code_of_profile(const unsigned char* profile, size_t size) const;
+  /// @throws Error if there is no room for what is taken for a while. @param what  "its tile"
+  void check_room(const std::string& what, uint64_t bytes) const;
+
+  /// What an ICC profile says of samples; one that cannot be used, as are curves of floats, is a
+  /// warning, and the code is that of samples without a profile.
+  ColourCode code_of_profile(const unsigned char* profile, size_t size,
+                             Raster::Sample sample) const;
+
+  /// Primaries that a file names besides; none if they are those of sRGB within rounding or, with a
+  /// warning, span no colour space.
+  /// @param where  "its cHRM chunk"
+  std::optional<Imf::Chromaticities> other_primaries(const Imf::Chromaticities& found,
+                                                     const char* where) const;
 
  private:
   std::filesystem::path path_;

@@ -52,7 +52,7 @@ class HdrReader {
   /// Up to the end of the line, which must be there.
   std::string text_line() {
     std::string out;
-    constexpr size_t kLongest = 2048;
+    constexpr size_t kLongest = 1 << 16;
     while (at_ < file_.bytes().size() && out.size() < kLongest) {
       const char c = char(file_.bytes()[at_++]);
       if (c == '\n') {
@@ -61,7 +61,10 @@ class HdrReader {
       }
       out += c;
     }
-    file_.fail("its header has no end; write it again or give another");
+    file_.fail(
+        fmt::format("its header has no end or a line of more than {} bytes; write it again or "
+                    "give another",
+                    kLongest));
   }
 
   /// Numbers after the '='. Fewer than `count`, or such that are not finite, or not above 0 where

@@ -46,7 +46,14 @@ void on_error(j_common_ptr info) {
   std::longjmp(state.jump, 1);
 }
 
-/// Where data is damaged or missing, libjpeg would go on with grey; that is an error here.
+/// Whether the bytes that were passed over before a marker are zeros, as some cameras pad scans by.
+bool is_padding(const jpeg_decompress_struct& jpeg, int count) {
+  const JOCTET* end = jpeg.src->next_input_byte;
+  return std::all_of(end - count, end, [](JOCTET byte) { return byte == 0; });
+}
+
+/// Where data is damaged or missing, libjpeg would go on with grey; that is an error here. So are
+/// bytes that a scan leaves over: it was decoded out of step.
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;  // of what is traced
   Jpeg& state = state_of(info);
@@ -55,6 +62,9 @@ void on_message(j_common_ptr info, int level) {
     state.lacks_end = true;
     return;
   }
+  const auto& jpeg = *reinterpret_cast<j_decompress_ptr>(info);
+  const bool left_over = code == JWRN_EXTRANEOUS_DATA && jpeg.input_scan_number > 0;
+  if (left_over && (state.lacks_end || !is_padding(jpeg, info->err->msg_parm.i[0]))) on_error(info);
   if (code != JWRN_EXTRANEOUS_DATA && code != JWRN_ADOBE_XFORM && code != JWRN_JFIF_MAJOR &&
       code != JWRN_BOGUS_ICC)
     on_error(info);
@@ -194,12 +204,17 @@ class JpegReader {
     }
   }
 
-  /// All pixels of a single scan were decoded without a word; of several scans, some may lack.
+  /// All pixels of a single scan of Huffman codes were decoded without a word. Of several scans
+  /// some may lack; an arithmetic decoder reads zeros past its end (ITU-T T.81, annex D).
   void check_end() const {
     const bool several = state_.library.progressive_mode ||
                          state_.library.comps_in_scan < state_.library.num_components;
     if (state_.lacks_end && several)
       file_.fail("it is cut off: its last scans are missing; write it again or give another");
+    if (state_.lacks_end && state_.library.arith_code)
+      file_.fail(
+          "it is cut off: its end is missing, and pixels may be with it; write it again or give "
+          "another");
     if (state_.lacks_end)
       file_.warn("all its pixels are there, but its end is missing; it may have been cut off");
     const size_t rest = state_.library.src->bytes_in_buffer;
@@ -218,7 +233,7 @@ class JpegReader {
                           ? ""
                           : " and, since it lacks Adobe's marker, with 0 for no ink"));
     if (inks_ || !state_.profile) return ColourCode::srgb();
-    return file_.code_of_profile(state_.profile, state_.profile_size);
+    return file_.code_of_profile(state_.profile, state_.profile_size, Raster::Sample::u8);
   }
 
   void warn_of_orientation() const {

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 #include <png.h>
+#include <zlib.h>
 
+#include <cmath>
 #include <csetjmp>
 #include <cstring>
 #include <optional>
+#include <span>
 
-#include "pipeline/contract/error.h"
-#include "render/color.h"
 #include "render/picture_file.h"
 
 namespace drench {
@@ -110,7 +111,7 @@ class PngReader {
     picture.stride = int(png_get_channels(state_.png, state_.info));
     read_samples(picture);
     if (type == PNG_COLOR_TYPE_PALETTE) picture.palette = palette();
-    picture.code = file_.is_data() ? ColourCode::srgb() : code();
+    picture.code = file_.is_data() ? ColourCode::srgb() : code(picture.sample);
     file_.warn_of_alpha(transparent(picture));
     for (int k = 0; k < state_.warnings; ++k)
       if (!std::strstr(state_.warning[k], "known incorrect sRGB profile"))
@@ -201,14 +202,14 @@ class PngReader {
     return found;
   }
 
-  ColourCode code() {
+  ColourCode code(Raster::Sample sample) {
     if (const auto code = code_of_cicp()) return *code;
     png_charp name = nullptr;
     int compression = 0;
     png_bytep profile = nullptr;
     png_uint_32 size = 0;
     if (png_get_iCCP(state_.png, state_.info, &name, &compression, &profile, &size))
-      return file_.code_of_profile(profile, size);
+      return file_.code_of_profile(profile, size, sample);
     if (png_get_valid(state_.png, state_.info, PNG_INFO_sRGB)) return ColourCode::srgb();
     ColourCode out = ColourCode::srgb();
     double gamma = 0;
@@ -222,56 +223,55 @@ class PngReader {
     return out;
   }
 
-  /// None if they are those of sRGB within rounding, or not there.
   std::optional<Imf::Chromaticities> primaries_of_chrm() {
     double c[8];
     if (!png_get_cHRM(state_.png, state_.info, &c[0], &c[1], &c[2], &c[3], &c[4], &c[5], &c[6],
                       &c[7]))
       return {};
     const auto at = [&](int k) { return Imath::V2f(float(c[k]), float(c[k + 1])); };
-    const Imf::Chromaticities found(at(2), at(4), at(6), at(0)), same = rec709_chromaticities();
-    const auto near = [](const Imath::V2f& a, const Imath::V2f& b) {
-      return a.equalWithAbsError(b, 0.002f);
-    };
-    if (near(found.red, same.red) && near(found.green, same.green) && near(found.blue, same.blue) &&
-        near(found.white, same.white))
-      return {};
-    try {
-      color_conversion(found, acescg_chromaticities());
-    } catch (const Error&) {
-      file_.warn(
-          "the chromaticities in its cHRM chunk span no colour space; those of sRGB are "
-          "taken");
-      return {};
-    }
-    return found;
+    return file_.other_primaries({at(2), at(4), at(6), at(0)}, "its cHRM chunk");
   }
 
-  /// Of a cICP chunk, ITU-T H.273 code points; none if there is none or they are not known here.
+  /// The data of the cICP chunk before the pixels, which libpng knows from 1.6.45 on; none if there
+  /// is none or its check sum is wrong, of which libpng warns.
+  std::span<const unsigned char> cicp() const {
+    const auto* file = reinterpret_cast<const unsigned char*>(state_.data);
+    const auto number = [&](size_t from) { return size_t(png_get_uint_32(file + from)); };
+    constexpr size_t kAround = 12;  // length and type before the data, check sum after
+    for (size_t at = 8; at + kAround <= state_.size;) {
+      const size_t size = number(at);
+      const unsigned char* type = file + at + 4;
+      if (size > state_.size - at - kAround || std::memcmp(type, "IDAT", 4) == 0) break;
+      if (std::memcmp(type, "cICP", 4) == 0 &&
+          crc32(0, type, uInt(4 + size)) == number(at + 8 + size))
+        return {type + 4, size};
+      at += kAround + size;
+    }
+    return {};
+  }
+
+  /// Of ITU-T H.273 code points; none if there are none or they are not known here. PNG has R, G
+  /// and B in full range: matrix 0, range 1.
   std::optional<ColourCode> code_of_cicp() const {
-    size_t at = 8;
-    const auto number = [&](size_t from) {
-      uint32_t out = 0;
-      for (size_t k = 0; k < 4; ++k) out = out << 8 | uint32_t(state_.data[from + k]);
-      return size_t(out);
-    };
-    while (at + 16 <= state_.size && std::memcmp(state_.data + at + 4, "IDAT", 4) != 0) {
-      if (std::memcmp(state_.data + at + 4, "cICP", 4) != 0) {
-        at += 12 + number(at);
-        continue;
-      }
-      const int primaries = int(state_.data[at + 8]), transfer = int(state_.data[at + 9]);
-      ColourCode out = ColourCode::srgb();
-      if (primaries == 12)  // Display P3
-        out.primaries = {{0.680f, 0.320f}, {0.265f, 0.690f}, {0.150f, 0.060f}, {0.3127f, 0.3290f}};
-      if (transfer == 8) out.to_linear = ColourCode::linear(out.primaries).to_linear;
-      if ((primaries == 1 || primaries == 12) && (transfer == 13 || transfer == 8)) return out;
+    const auto chunk = cicp();
+    if (chunk.empty()) return {};
+    if (chunk.size() != 4) {
       file_.warn(
-          fmt::format("its cICP chunk names primaries {} and transfer {}, which are not "
-                      "known here; it is read without. Convert it to sRGB or EXR",
-                      primaries, transfer));
+          fmt::format("its cICP chunk has {} bytes, not 4; it is read without", chunk.size()));
       return {};
     }
+    const int primaries = chunk[0], transfer = chunk[1], matrix = chunk[2], range = chunk[3];
+    ColourCode out = ColourCode::srgb();
+    if (primaries == 12)  // Display P3
+      out.primaries = {{0.680f, 0.320f}, {0.265f, 0.690f}, {0.150f, 0.060f}, {0.3127f, 0.3290f}};
+    if (transfer == 8) out.to_linear = ColourCode::linear(out.primaries).to_linear;
+    if ((primaries == 1 || primaries == 12) && (transfer == 13 || transfer == 8) && matrix == 0 &&
+        range == 1)
+      return out;
+    file_.warn(
+        fmt::format("its cICP chunk names primaries {}, transfer {}, matrix {} and {} range, "
+                    "which are not known here; it is read without. Convert it to sRGB or EXR",
+                    primaries, transfer, matrix, range == 1 ? "full" : "narrow"));
     return {};
   }
 

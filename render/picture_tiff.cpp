@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include "render/color.h"
 #include "render/picture_file.h"
@@ -19,9 +20,29 @@ namespace {
 
 /// Of one strip or tile, and of what libtiff takes for itself at once.
 constexpr uint64_t kLargestBlock = uint64_t(1) << 30;
-/// Neither deflate (1032 to 1) nor LZW, of whose codes of 12 bits none stands for more than 3838
-/// bytes, packs tighter.
-constexpr double kLargestPacking = 4096;
+/// The most bytes that one of a codec's stands for; none where only decoding tells.
+std::optional<double> largest_packing(int compression, uint32_t width) {
+  switch (compression) {
+    case COMPRESSION_NONE:
+    case COMPRESSION_PACKBITS:
+    case COMPRESSION_JPEG:  // a block of 64 samples takes 2 bits
+    case COMPRESSION_DEFLATE:
+    case COMPRESSION_ADOBE_DEFLATE:  // 1032
+    case COMPRESSION_LZW:            // 3838 a code of 12 bits
+      return 4096;
+    case COMPRESSION_LZMA:  // 273 bytes by 14 decisions of at least 0.022 bits: 7090
+      return 8192;
+    case COMPRESSION_ZSTD:  // a block of 128 KiB of one byte takes 4
+      return 32768;
+    case COMPRESSION_CCITTRLE:
+    case COMPRESSION_CCITTRLEW:
+    case COMPRESSION_CCITTFAX3:
+    case COMPRESSION_CCITTFAX4:  // a row like the one above takes a bit
+      return width + 8.0;
+    default:
+      return {};
+  }
+}
 
 struct Source {
   const std::byte* data = nullptr;
@@ -104,17 +125,12 @@ class TiffReader {
           fmt::format("its strips or tiles have {} bytes each; write it again with smaller "
                       "ones",
                       block));
-    if (double(width_) * height_ * samples_ * bits_ / 8 >
-        kLargestPacking * double(file_.bytes().size()))
-      file_.fail(
-          fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
-                      "forged. Write it again or give another",
-                      width_, height_, file_.bytes().size()));
+    check_size(place, block);
     file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()), 2 * block);
     read_blocks(picture, place, block);
     if (inks_) to_rgb(picture);
     if (photometric_ == PHOTOMETRIC_PALETTE) picture.palette = palette();
-    picture.code = code();
+    picture.code = code(picture.sample);
     warn(picture);
     return picture;
   }
@@ -157,13 +173,31 @@ class TiffReader {
     if (orientation_ < 1 || orientation_ > 8) orientation_ = 1;
   }
 
+  /// Before room is made: whether the file can hold what its header says.
+  void check_size(const Orientation& place, uint64_t block) {
+    const auto packing = largest_packing(tag(TIFFTAG_COMPRESSION), width_);
+    if (!packing) {
+      file_.check_room("a strip or tile of it", 2 * block);
+      Raster none;
+      return read_blocks(none, place, block);
+    }
+    const uint64_t size = file_.bytes().size();
+    if (double(width_) * height_ * samples_ * bits_ / 8 > *packing * double(size))
+      file_.fail(
+          fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
+                      "forged. Write it again or give another",
+                      width_, height_, size));
+  }
+
   std::string described() const {
     const char* names[] = {"grey, white at 0", "grey", "RGB", "palette", "mask", "CMYK", "YCbCr"};
-    const std::string colours = size_t(photometric_) < std::size(names) ? names[photometric_]
-                                : photometric_ == PHOTOMETRIC_CIELAB    ? "CIE L*a*b*"
-                                : photometric_ == PHOTOMETRIC_LOGL      ? "LogL"
-                                : photometric_ == PHOTOMETRIC_LOGLUV    ? "LogLuv"
-                                : photometric_ == 0xffff                ? "no colours named"
+    const bool other_inks = photometric_ == PHOTOMETRIC_SEPARATED && !is_cmyk();
+    const std::string colours = other_inks                                ? "inks other than CMYK"
+                                : size_t(photometric_) < std::size(names) ? names[photometric_]
+                                : photometric_ == PHOTOMETRIC_CIELAB      ? "CIE L*a*b*"
+                                : photometric_ == PHOTOMETRIC_LOGL        ? "LogL"
+                                : photometric_ == PHOTOMETRIC_LOGLUV      ? "LogLuv"
+                                : photometric_ == 0xffff                  ? "no colours named"
                                                          : fmt::format("colours {}", photometric_);
     return fmt::format("{}, {} x {} bits{}", colours, samples_, bits_,
                        format_ == SAMPLEFORMAT_IEEEFP ? " of floats"
@@ -171,15 +205,19 @@ class TiffReader {
                                                       : "");
   }
 
+  bool is_cmyk() const { return tag(TIFFTAG_INKSET) == INKSET_CMYK; }
+
   Raster kind() {
     const bool grey =
         photometric_ == PHOTOMETRIC_MINISBLACK || photometric_ == PHOTOMETRIC_MINISWHITE;
-    inks_ = photometric_ == PHOTOMETRIC_SEPARATED && samples_ >= 4;
+    inks_ = photometric_ == PHOTOMETRIC_SEPARATED && samples_ >= 4 && is_cmyk();
     const bool integer = format_ == SAMPLEFORMAT_UINT || format_ == SAMPLEFORMAT_VOID;
     const bool real = format_ == SAMPLEFORMAT_IEEEFP && (bits_ == 16 || bits_ == 32);
     const bool packed = integer && samples_ == 1 && (bits_ == 1 || bits_ == 2 || bits_ == 4);
     const bool palette = photometric_ == PHOTOMETRIC_PALETTE && integer && bits_ <= 8;
-    const bool known = (grey && samples_ >= 1) ||
+    // White at 0 has black at the maximum, which floats do not have.
+    const bool inverse = photometric_ == PHOTOMETRIC_MINISWHITE;
+    const bool known = (grey && samples_ >= 1 && !(real && inverse)) ||
                        (photometric_ == PHOTOMETRIC_RGB && samples_ >= 3) || (inks_ && integer) ||
                        (palette && samples_ >= 1);
     if (!known || samples_ > 16 || !(real || packed || (integer && (bits_ == 8 || bits_ == 16))))
@@ -201,7 +239,7 @@ class TiffReader {
     return std::min(TIFFStripSize64(tiff()), TIFFVStripSize64(tiff(), height_));
   }
 
-  /// Reads each strip or tile and puts its samples where they belong.
+  /// Reads each strip or tile and puts its samples where they belong, if `picture` has room.
   void read_blocks(Raster& picture, const Orientation& place, uint64_t size) {
     uint32_t wide = width_, high = height_;
     if (tiled_) {
@@ -223,7 +261,7 @@ class TiffReader {
           const auto rows = std::min<uint64_t>(high, height_ - y);
           const auto columns = std::min<uint64_t>(wide, width_ - x);
           read_block(block, uint32_t(x), uint32_t(y), uint16_t(plane), rows * row_bytes);
-          for (uint64_t r = 0; r < rows; ++r)
+          for (uint64_t r = 0; r < rows && !picture.bytes.empty(); ++r)
             for (uint64_t c = 0; c < columns; ++c)
               put(picture, place.pixel(int(x + c), int(y + r)), plane, block.data() + r * row_bytes,
                   c);
@@ -254,7 +292,7 @@ class TiffReader {
       const size_t count = planar_ ? 1 : size_t(samples_);
       std::memcpy(to, row + column * count * sample, count * sample);
     }
-    if (photometric_ == PHOTOMETRIC_MINISWHITE && plane == 0 && is_integer())
+    if (photometric_ == PHOTOMETRIC_MINISWHITE && plane == 0)
       for (size_t k = 0; k < sample; ++k) to[k] = ~to[k];
   }
   bool is_integer() const { return format_ != SAMPLEFORMAT_IEEEFP; }
@@ -297,13 +335,35 @@ class TiffReader {
     return out;
   }
 
-  ColourCode code() const {
-    if (!is_integer()) return ColourCode::linear(rec709_chromaticities());
+  ColourCode code(Raster::Sample sample) const {
+    ColourCode out =
+        is_integer() ? ColourCode::srgb() : ColourCode::linear(rec709_chromaticities());
+    if (file_.is_data() || inks_) return out;
     uint32_t size = 0;
     void* profile = nullptr;
-    if (file_.is_data() || inks_ || !TIFFGetField(tiff(), TIFFTAG_ICCPROFILE, &size, &profile))
-      return ColourCode::srgb();
-    return file_.code_of_profile(static_cast<const unsigned char*>(profile), size);
+    if (TIFFGetField(tiff(), TIFFTAG_ICCPROFILE, &size, &profile))
+      return file_.code_of_profile(static_cast<const unsigned char*>(profile), size, sample);
+    if (const auto primaries = primaries_of_tags()) out.primaries = *primaries;
+    uint16_t* curve[3] = {};
+    if (TIFFGetField(tiff(), TIFFTAG_TRANSFERFUNCTION, &curve[0], &curve[1], &curve[2]))
+      file_.warn(
+          "its TransferFunction is not applied. Convert it to sRGB in the program that made it");
+    return out;
+  }
+
+  std::optional<Imf::Chromaticities> primaries_of_tags() const {
+    Imf::Chromaticities found = rec709_chromaticities();
+    float *rgb = nullptr, *white = nullptr;
+    const bool has_rgb = TIFFGetField(tiff(), TIFFTAG_PRIMARYCHROMATICITIES, &rgb) != 0;
+    const bool has_white = TIFFGetField(tiff(), TIFFTAG_WHITEPOINT, &white) != 0;
+    if (has_rgb) found = {{rgb[0], rgb[1]}, {rgb[2], rgb[3]}, {rgb[4], rgb[5]}, found.white};
+    if (has_white) found.white = {white[0], white[1]};
+    const auto out = file_.other_primaries(found, "its tags");
+    if (out && has_rgb != has_white)
+      file_.warn(has_rgb ? "it has PrimaryChromaticities without a white; that of sRGB is taken"
+                         : "it has a WhitePoint without PrimaryChromaticities; those of sRGB are "
+                           "taken");
+    return out;
   }
 
   void warn(const Raster& picture) {

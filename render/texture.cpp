@@ -128,7 +128,13 @@ Texture read_normal_map(const std::filesystem::path& path, PictureMemory& memory
 }
 
 Texture read_sky(const std::filesystem::path& path, PictureMemory& memory) {
-  Raster picture = read_picture(path, PictureUse::colour, memory);
+  Raster picture = read_picture(path, PictureUse::sky, memory);
+  if (std::abs(picture.width - 2 * picture.height) > 1)
+    log_warning("render",
+                fmt::format("{}: as a sky its {} x {} pixels are stretched to latitude and "
+                            "longitude, which are twice as wide as high; convert a cube map or "
+                            "mirror ball before",
+                            path.string(), picture.width, picture.height));
   if (picture.sample == Raster::Sample::u8 || picture.sample == Raster::Sample::u16)
     log_warning("render",
                 fmt::format("{}: as a sky it has no light above 1, its {} bits end there: suns and "

@@ -7,6 +7,7 @@
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRgbaFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfTiledOutputFile.h>
 
 #include <deque>
@@ -159,6 +160,82 @@ TEST_F(ExrPicture, OneChannelIsGrey) {
   const Texture other = read_path(write_part({{"height"}}), &said);
   expect_near(other.texel(3), V3f(value_of("height", 3, 0)), 1e-5f);
   EXPECT_TRUE(tells(said, {"height", "grey"}));
+}
+
+TEST_F(ExrPicture, AlphaAloneIsGrey) {
+  std::string said;
+  const Texture texture = read_path(write_part({{"A"}}), &said);
+  for (int x = 0; x < 16; ++x)
+    expect_near(texture.texel(size_t(x)), V3f(value_of("A", x, 0)), 1e-5f);
+  EXPECT_TRUE(tells(said, {"A, is read as grey"}));
+  EXPECT_EQ(said.find("alpha"), std::string::npos) << said;
+}
+
+// Two of the eight columns that the data window has are seen.
+TEST_F(ExrPicture, AlphaIsCountedWhereItIsSeen) {
+  const Part part{{"R", "G", "B", "A"}, {{0, 0}, {1, 7}}, {{0, 0}, {7, 9}}, Imf::FLOAT, {}};
+  for (const int transparent : {1, 2}) {  // the columns from here on
+    const auto path = next();
+    Written w(part);
+    for (size_t p = 0; p < 80; ++p) w.values[3][p] = int(p % 8) < transparent ? 1.f : 0.f;
+    {
+      Imf::OutputFile file(path.c_str(), w.header);
+      file.setFrameBuffer(w.buffer);
+      file.writePixels(10);
+    }
+    std::string said;
+    read_path(path, &said);
+    if (transparent == 2)
+      EXPECT_EQ(said, "");
+    else
+      EXPECT_TRUE(tells(said, {"8 pixels are not opaque"}));
+  }
+}
+
+// OpenEXR has UINT for numbers of objects and the like.
+TEST_F(ExrPicture, IntegersAreNoLight) {
+  for (const std::vector<std::string>& channels :
+       {std::vector<std::string>{"R", "G", "B"}, std::vector<std::string>{"id"}}) {
+    const auto path = next();
+    {
+      std::vector<unsigned> value(16 * 8, 7);
+      Imf::Header header(16, 8);
+      Imf::FrameBuffer buffer;
+      for (const std::string& channel : channels) {
+        header.channels().insert(channel, Imf::Channel(Imf::UINT));
+        buffer.insert(channel, Imf::Slice(Imf::UINT, reinterpret_cast<char*>(value.data()), 4, 64));
+      }
+      Imf::OutputFile file(path.c_str(), header);
+      file.setFrameBuffer(buffer);
+      file.writePixels(8);
+    }
+    EXPECT_TRUE(tells(error_of([&] { read_texture(path); }),
+                      {"channel " + channels[0], "integers", "half or float"}));
+  }
+}
+
+TEST_F(ExrPicture, ChromaOfAnotherSizeIsNamed) {
+  const auto path = write_part({{"Y", "RY", "BY"}});
+  const std::string said = error_of([&] { read_texture(path); });
+  EXPECT_TRUE(tells(said, {"channel RY", "1 x 1", "2 x 2", "R, G and B"}));
+  EXPECT_EQ(said.find("damaged"), std::string::npos) << said;
+}
+
+TEST_F(ExrPicture, CubeMapsAreRefusedAsSkiesAlone) {
+  const auto path = next();
+  {
+    Written w({{"R", "G", "B"}, {{0, 0}, {7, 47}}, {{0, 0}, {7, 47}}, Imf::FLOAT, {}});
+    Imf::addEnvmap(w.header, Imf::ENVMAP_CUBE);
+    Imf::OutputFile file(path.c_str(), w.header);
+    file.setFrameBuffer(w.buffer);
+    file.writePixels(48);
+  }
+  Light light;
+  light.type = LightType::environment;
+  light.map = path;
+  EXPECT_TRUE(tells(error_of([&] { Environment(light, Environment::Sampling::off); }),
+                    {"cube map", "latitude"}));
+  EXPECT_EQ(read_path(path).height(), 48);
 }
 
 TEST_F(ExrPicture, LuminanceAndChromaGiveColours) {

@@ -132,6 +132,21 @@ TEST_F(Hdr, HeadersThatAreNotUnderstoodAreNamed) {
   EXPECT_TRUE(tells(refused("#?RADIANCE\nFORMAT=words\n\n-Y 1 +X 1\nabcd"), {"FORMAT=words"}));
 }
 
+// Radiance's programs add their command lines, with the names of all files, to the header.
+TEST_F(Hdr, LinesOfTheHeaderMayBeLong) {
+  const std::string command = "pcomb " + std::string(60000, 'x') + "\n";
+  expect_pixels(read(head(command, "-Y 3 +X 5") + flat(5, 3)), 5, 3);
+  EXPECT_TRUE(tells(refused(head(command + std::string(70000, 'x') + "\n", "-Y 3 +X 5")),
+                    {"no end", "65536 bytes"}));
+}
+
+TEST_F(Hdr, LightBeyondMeasureIsNamedAsIs) {
+  // 255 / 256 x 2^127, which a float still holds.
+  const std::string said = refused(head("", "-Y 1 +X 1") + std::string("\xff\xff\xff\xff", 4));
+  EXPECT_TRUE(tells(said, {"pixel 0, 0", "1.69", "above 1e+37"}));
+  EXPECT_EQ(said.find("finite"), std::string::npos) << said;
+}
+
 TEST_F(Hdr, WhatIsCutOffOrDamagedIsRefused) {
   const std::string before = head("", "-Y 3 +X 20"), data = with_runs(20, 3);
   for (size_t size = 0; size < data.size(); ++size)

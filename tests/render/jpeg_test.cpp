@@ -15,6 +15,7 @@
 
 #include <jpeglib.h>
 
+#include "pipeline/contract/error.h"
 #include "tests/render/picture_support.h"
 
 namespace drench::test {
@@ -27,7 +28,7 @@ struct Jpeg {
   std::array<std::array<double, 64>, 2> step;  // of luma and chroma coefficients, in levels
 };
 
-enum class Scans { baseline, progressive };
+enum class Scans { baseline, progressive, arithmetic };
 
 /// Chroma at full resolution; `components` is 1 (grey) or 3 (RGB).
 Jpeg encode(int width, int height, int components, std::vector<uint8_t> pixels, int quality,
@@ -46,6 +47,7 @@ Jpeg encode(int width, int height, int components, std::vector<uint8_t> pixels, 
   jpeg_set_quality(&jpeg, quality, TRUE);
   jpeg.comp_info[0].h_samp_factor = jpeg.comp_info[0].v_samp_factor = 1;
   if (scans == Scans::progressive) jpeg_simple_progression(&jpeg);
+  jpeg.arith_code = scans == Scans::arithmetic ? TRUE : FALSE;
   jpeg_start_compress(&jpeg, TRUE);
   while (jpeg.next_scanline < jpeg.image_height) {
     uint8_t* row = pixels.data() + size_t(jpeg.next_scanline) * width * components;
@@ -185,17 +187,62 @@ TEST_F(JpegTexture, IsRefusedWhereAPixelIsMissing) {
   }
 }
 
-// A cut between scans leaves a coarser picture that decodes without a fault.
-TEST_F(JpegTexture, ProgressiveIsRefusedWithoutItsLastScans) {
+std::vector<uint8_t> noise() {
   std::vector<uint8_t> pixels;
   for (int k = 0; k < 64 * 64 * 3; ++k) pixels.push_back(uint8_t(k * 37 % 251));
-  const std::string whole = encode(64, 64, 3, pixels, 90, Scans::progressive).bytes;
+  return pixels;
+}
+
+// A cut between scans leaves a coarser picture that decodes without a fault.
+TEST_F(JpegTexture, ProgressiveIsRefusedWithoutItsLastScans) {
+  const std::string whole = encode(64, 64, 3, noise(), 90, Scans::progressive).bytes;
   EXPECT_EQ(read(whole).width(), 64);
   int scans = 0;
   for (size_t at = whole.find("\xff\xda"); at != std::string::npos;
        at = whole.find("\xff\xda", at + 2), ++scans)
     EXPECT_TRUE(tells(refused(whole.substr(0, at)), {"JPEG"})) << scans;
   EXPECT_GT(scans, 5);
+}
+
+// Past its data an arithmetic decoder reads zeros (ITU-T T.81, annex D), so that pixels that are
+// missing decode without a fault.
+TEST_F(JpegTexture, ArithmeticIsRefusedWithoutItsEnd) {
+  const std::string whole = encode(64, 64, 3, noise(), 90, Scans::arithmetic).bytes;
+  EXPECT_EQ(read(whole).width(), 64);
+  for (size_t size = whole.find("\xff\xda"); size < whole.size(); size += 10)
+    EXPECT_TRUE(tells(refused(whole.substr(0, size)), {"JPEG"})) << size;
+  EXPECT_TRUE(tells(refused(whole.substr(0, whole.size() - 2)), {"cut off"}));
+}
+
+// Codes have no common length: after a wrong bit the scan ends too early or too late.
+TEST_F(JpegTexture, DamageWithinAScanIsRefused) {
+  int late = 0;
+  for (const Scans scans : {Scans::baseline, Scans::progressive}) {
+    const std::string whole = encode(64, 64, 3, noise(), 90, scans).bytes;
+    for (size_t place = whole.size() / 2; place < whole.size() / 2 + 200; place += 10) {
+      std::string damaged = whole;
+      damaged[place] ^= 0x55;
+      const auto path = write("damaged", damaged);
+      std::string error, said;
+      try {
+        said = said_by([&] { read_texture(path); });
+      } catch (const Error& e) {
+        error = e.what();
+      }
+      EXPECT_EQ(said.find("extraneous"), std::string::npos) << said;
+      late += error.find("extraneous") != std::string::npos ? 1 : 0;
+    }
+  }
+  EXPECT_GT(late, 5);
+  // Some cameras pad a scan with zeros.
+  const std::string whole = encode(64, 64, 3, noise(), 90).bytes;
+  std::string padded = whole, said;
+  padded.insert(whole.size() - 2, 20, '\0');
+  const Texture texture = read(padded, &said), same = read(whole);
+  EXPECT_TRUE(tells(said, {"not quite right", "extraneous"}));
+  for (size_t p = 0; p < texture.texels(); ++p) EXPECT_EQ(texture.texel(p), same.texel(p));
+  padded.resize(padded.size() - 2);
+  EXPECT_NE(refused(padded), "");
 }
 
 TEST_F(JpegTexture, StrayBytesAreAWarning) {

@@ -21,10 +21,15 @@
 
 namespace drench::test {
 
-/// What `f` writes to stderr.
+/// What `f` writes to stderr, which is free again even where it throws.
 inline std::string said_by(const std::function<void()>& f) {
   testing::internal::CaptureStderr();
-  f();
+  try {
+    f();
+  } catch (...) {
+    testing::internal::GetCapturedStderr();
+    throw;
+  }
   return testing::internal::GetCapturedStderr();
 }
 
@@ -117,8 +122,9 @@ struct PngOfTest {
 class IccOfTest {
  public:
   /// @param colorants  XYZ of red, green and blue under D50
+  /// @param space  of the colours, then that of their connection
   IccOfTest(const std::array<std::array<double, 3>, 3>& colorants, const std::string& curve,
-            const std::string& space = "RGB ")
+            const std::string& space = "RGB XYZ ")
       : space_(space) {
     const char* names[] = {"rXYZ", "gXYZ", "bXYZ"};
     add("desc", std::string("desc\0\0\0\0\0\0\0\x0b", 12) + "of the test");
@@ -126,7 +132,10 @@ class IccOfTest {
     for (size_t k = 0; k < 3; ++k)
       add(names[k], std::string("XYZ \0\0\0\0", 8) + fixed(colorants[k][0]) +
                         fixed(colorants[k][1]) + fixed(colorants[k][2]));
-    for (const char* name : {"rTRC", "gTRC", "bTRC"}) add(name, curve);
+    for (const char* name : {"rTRC", "gTRC", "bTRC", "kTRC"}) add(name, curve);
+  }
+  void add(const std::string& name, const std::string& content) {
+    tags_.emplace_back(name, content);
   }
 
   static std::string gamma(double g) {
@@ -152,7 +161,7 @@ class IccOfTest {
     };
     put(0, number(uint32_t(from + data.size()), 4));
     put(8, std::string("\2\x40\0\0", 4));
-    put(12, "mntr" + space_ + "XYZ ");
+    put(12, "mntr" + space_);
     put(36, "acsp");
     put(68, fixed(0.9642) + fixed(1) + fixed(0.8249));
     return head + table + data;
@@ -167,10 +176,6 @@ class IccOfTest {
   static std::string fixed(double value) {
     return number(uint32_t(int32_t(std::lround(value * 65536))), 4);
   }
-  void add(const std::string& name, const std::string& content) {
-    tags_.emplace_back(name, content);
-  }
-
   std::string space_;
   std::vector<std::pair<std::string, std::string>> tags_;
 };

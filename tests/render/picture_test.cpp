@@ -67,6 +67,23 @@ TEST_F(PictureFormat, SkiesOfIntegersAreReadWithAWord) {
   }
 }
 
+// A sphere is twice as long around as from pole to pole; a pixel of rounding is no matter.
+TEST_F(PictureFormat, SkiesOfAnotherShapeAreReadWithAWord) {
+  const std::string head = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n";
+  std::string said;
+  for (const auto& [width, height] : {std::pair{8, 4}, {7, 4}, {1, 1}, {4, 4}, {4, 6}, {12, 2}}) {
+    const auto path =
+        write("sky.hdr", head + "-Y " + std::to_string(height) + " +X " + std::to_string(width) +
+                             "\n" + std::string(size_t(4 * width * height), '\x80'));
+    expect_near(up_in(path, &said), V3f(0.5f), 1e-5f);
+    if (width == 8 || width == 7 || width == 1)
+      EXPECT_EQ(said, "");
+    else
+      EXPECT_TRUE(tells(said, {"sky.hdr", std::to_string(width) + " x " + std::to_string(height),
+                               "twice as wide"}));
+  }
+}
+
 TEST_F(PictureFormat, SkiesHeedTheLimitOfMemory) {
   PngOfTest png{.width = 512, .height = 256, .depth = 1, .type = PNG_COLOR_TYPE_GRAY};
   png.samples.assign(512 * 256, 1);

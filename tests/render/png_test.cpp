@@ -203,6 +203,61 @@ TEST_F(Png, CodePointsGoBeforeAllElse) {
   EXPECT_TRUE(tells(said, {"cICP", "primaries 9", "transfer 16"}));
 }
 
+// The picture is of RGB in full range, as PNG's third edition asks: matrix 0, range 1.
+TEST_F(Png, CodePointsOfVideoAreNamed) {
+  const Texture plain = read(ramp(8).bytes());
+  for (const auto& [points, words] :
+       {std::pair{"\x0c\x0d\0\0", "narrow range"}, std::pair{"\x0c\x0d\1\1", "matrix 1"}}) {
+    std::string png = ramp(8).bytes(), said;
+    png.insert(33, chunk("cICP", std::string(points, 4)));
+    const Texture texture = read(png, &said);
+    EXPECT_TRUE(tells(said, {"cICP", words}));
+    for (size_t k = 0; k < 256; ++k) EXPECT_EQ(texture.texel(k), plain.texel(k)) << k;
+  }
+}
+
+TEST_F(Png, CodePointsThatAreDamagedAreNotApplied) {
+  const Texture plain = read(ramp(8).bytes());
+  std::string wrong = chunk("cICP", std::string("\x0c\x0d\0\1", 4));
+  wrong.back() ^= 1;  // of its check sum
+  for (const std::string& damaged : {wrong, chunk("cICP", std::string("\x0c\x0d\0\1\0", 5))}) {
+    std::string png = ramp(8).bytes(), said;
+    png.insert(33, damaged);
+    const Texture texture = read(png, &said);
+    EXPECT_TRUE(tells(said, {"cICP"}));
+    for (size_t k = 0; k < 256; ++k) EXPECT_EQ(texture.texel(k), plain.texel(k)) << k;
+  }
+}
+
+// ICC.1, annex F: where colours connect by CIE L*a*b*, the curve of a grey gives L* / 100.
+TEST_F(Png, GreyProfilesGiveLightnessOrLuminance) {
+  PngOfTest png{.width = 256, .type = PNG_COLOR_TYPE_GRAY};
+  for (int k = 0; k < 256; ++k) png.samples.push_back(uint16_t(k));
+  png.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1), "GRAYXYZ ").bytes();
+  const Texture luminance = read(png.bytes());
+  png.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1), "GRAYLab ").bytes();
+  const Texture lightness = read(png.bytes());
+  for (size_t k = 0; k < 256; ++k) {
+    const double l = 100 * double(k) / 255;  // CIE 15: the inverse of L* = 116 f(Y) - 16
+    const double y = l > 8 ? std::pow((l + 16) / 116, 3) : l * 27 / 24389;
+    EXPECT_NEAR(luminance.texel(k).y, double(k) / 255, 1e-5) << k;
+    EXPECT_NEAR(lightness.texel(k).y, y, 1e-5) << k;
+  }
+}
+
+// ICC.1: where there are both, tables go before matrix and curves.
+TEST_F(Png, ProfilesOfTablesAndMatrixAreNamed) {
+  PngOfTest png = ramp(8);
+  const Texture plain = read(png.bytes());
+  IccOfTest icc(kP3Colorants, IccOfTest::gamma(1));
+  icc.add("A2B0", "mft2, a table");
+  png.icc = icc.bytes();
+  std::string said;
+  const Texture texture = read(png.bytes(), &said);
+  EXPECT_TRUE(tells(said, {"ICC profile 'of the test'", "tables"}));
+  for (size_t k = 0; k < 256; ++k) EXPECT_EQ(texture.texel(k), plain.texel(k)) << k;
+}
+
 TEST_F(Png, ProfilesThatCannotBeUsedAreNamed) {
   PngOfTest png = ramp(8);
   const Texture plain = read(png.bytes());

@@ -18,6 +18,9 @@ struct TiffOfTest {
   std::vector<uint16_t> extra{};
   std::vector<std::array<uint16_t, 256>> palette{};
   std::string icc{};
+  std::vector<float> primaries{}, white{};  // x, y of each
+  bool transfer = false;                    // a TransferFunction
+  int ink_set = 0;                          // 0: no tag
 
   /// Of 0 to 2^bits - 1; of floats a number above 1, too.
   double sample(int x, int y, int c) const {
@@ -47,6 +50,12 @@ struct TiffOfTest {
     if (!palette.empty())
       TIFFSetField(tiff, TIFFTAG_COLORMAP, palette[0].data(), palette[1].data(), palette[2].data());
     if (!icc.empty()) TIFFSetField(tiff, TIFFTAG_ICCPROFILE, uint32_t(icc.size()), icc.data());
+    if (!primaries.empty()) TIFFSetField(tiff, TIFFTAG_PRIMARYCHROMATICITIES, primaries.data());
+    if (!white.empty()) TIFFSetField(tiff, TIFFTAG_WHITEPOINT, white.data());
+    if (ink_set > 0) TIFFSetField(tiff, TIFFTAG_INKSET, ink_set);
+    std::vector<uint16_t> curve(transfer ? size_t(1) << bits : 0);
+    if (transfer)
+      TIFFSetField(tiff, TIFFTAG_TRANSFERFUNCTION, curve.data(), curve.data(), curve.data());
     const int wide = tiled ? 16 : width, high = tiled ? 16 : 5;
     if (tiled) {
       TIFFSetField(tiff, TIFFTAG_TILEWIDTH, wide);
@@ -258,6 +267,56 @@ TEST_F(Tiff, ProfileIsHonoured) {
     EXPECT_NEAR(rec709_of(texture.texel(size_t(x))).x, tiff.sample(x, 0, 0) / 255, 1e-3);
 }
 
+// A curve ends at 1, so that of floats none but a straight one can be applied.
+TEST_F(Tiff, ProfileOfFloatsIsHonouredIfItIsLinear) {
+  for (const int bits : {16, 32}) {
+    TiffOfTest tiff{.bits = bits, .format = SAMPLEFORMAT_IEEEFP};
+    const Texture plain = read(tiff);
+    const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
+    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(1)).bytes();
+    const Texture linear = read(tiff);
+    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(2.2)).bytes();
+    std::string said;
+    const Texture curved = read(tiff, &said);
+    EXPECT_TRUE(tells(said, {"ICC profile 'of the test'", "linear sRGB"}));
+    for (size_t p = 0; p < plain.texels(); ++p) {
+      const V3f wide = matrix(rec709_of(plain.texel(p)));
+      expect_near(linear.texel(p), wide, 1e-3f * (1 + wide.x));  // colorants have four digits
+      EXPECT_EQ(curved.texel(p), plain.texel(p));
+    }
+  }
+}
+
+TEST_F(Tiff, PrimariesAreHonoured) {
+  for (const int format : {SAMPLEFORMAT_UINT, SAMPLEFORMAT_IEEEFP}) {
+    TiffOfTest tiff{.bits = format == SAMPLEFORMAT_UINT ? 8 : 32, .format = format};
+    const Texture plain = read(tiff);
+    tiff.white = {0.3127f, 0.329f};
+    tiff.primaries = {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f};
+    const Texture same = read(tiff);
+    tiff.primaries = {0.68f, 0.32f, 0.265f, 0.69f, 0.15f, 0.06f};
+    const Texture wide = read(tiff);
+    tiff.white = {};
+    std::string said;
+    const Texture guessed = read(tiff, &said);
+    EXPECT_TRUE(tells(said, {"PrimaryChromaticities", "white"}));
+    const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
+    for (size_t p = 0; p < plain.texels(); ++p) {
+      EXPECT_EQ(same.texel(p), plain.texel(p));
+      const V3f expected = matrix(rec709_of(plain.texel(p)));
+      expect_near(wide.texel(p), expected, 1e-5f * (1 + expected.x));
+      EXPECT_EQ(guessed.texel(p), wide.texel(p));
+    }
+  }
+}
+
+TEST_F(Tiff, TransferFunctionIsNamed) {
+  TiffOfTest tiff{.transfer = true};
+  std::string said;
+  expect_pixels(read(tiff, &said), tiff, "curves");
+  EXPECT_TRUE(tells(said, {"TransferFunction", "sRGB"}));
+}
+
 TEST_F(Tiff, NormalsAreNotConverted) {
   for (const int bits : {8, 16}) {
     TiffOfTest tiff{.bits = bits};
@@ -275,6 +334,87 @@ TEST_F(Tiff, KindsThatAreNotReadAreNamed) {
   TiffOfTest lab{.photometric = PHOTOMETRIC_CIELAB};
   lab.write(next());
   EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"CIE L*a*b*", "8 bits"}));
+}
+
+TEST_F(Tiff, InksOtherThanCmykAreRefused) {
+  TiffOfTest tiff{.channels = 4, .photometric = PHOTOMETRIC_SEPARATED, .ink_set = INKSET_MULTIINK};
+  tiff.write(next());
+  EXPECT_TRUE(tells(error_of([&] { read_texture(folder_ / "1.tif"); }), {"inks other than CMYK"}));
+  tiff.ink_set = INKSET_CMYK;
+  std::string said;
+  EXPECT_EQ(read(tiff, &said).width(), tiff.width);
+}
+
+// TIFF 6.0 has the maximum black then, and floats have none.
+TEST_F(Tiff, FloatsWithWhiteAtZeroAreRefused) {
+  for (const int bits : {16, 32}) {
+    const TiffOfTest tiff{.channels = 1,
+                          .bits = bits,
+                          .photometric = PHOTOMETRIC_MINISWHITE,
+                          .format = SAMPLEFORMAT_IEEEFP};
+    const auto path = next();
+    tiff.write(path);
+    EXPECT_TRUE(tells(error_of([&] { read_texture(path); }), {"white at 0", "floats"}));
+  }
+}
+
+/// Black, or the first strip of it, in strips of `rows`.
+void write_black(const std::filesystem::path& path, int size, int channels, int bits,
+                 int compression, int rows, int strips) {
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  for (const int tag : {TIFFTAG_IMAGEWIDTH, TIFFTAG_IMAGELENGTH}) TIFFSetField(tiff, tag, size);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, channels);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, bits);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, channels == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, compression);
+  if (compression == COMPRESSION_WEBP) TIFFSetField(tiff, TIFFTAG_WEBP_LOSSLESS, 1);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows);
+  std::string strip(size_t(rows) * size_t(size) * size_t(channels) * size_t(bits) / 8, '\0');
+  for (int k = 0; k < strips; ++k)
+    TIFFWriteEncodedStrip(tiff, uint32_t(k), strip.data(), tmsize_t(strip.size()));
+  TIFFWriteDirectory(tiff);
+  TIFFClose(tiff);
+}
+
+// Some codecs pack what is even far tighter than deflate, whose 1032 to 1 is the most.
+TEST_F(Tiff, EvenPicturesAreReadHoweverTheyArePacked) {
+  struct Even {
+    int size, channels, bits, compression;
+  };
+  for (const Even& even :
+       {Even{2048, 3, 8, COMPRESSION_ZSTD}, Even{2048, 3, 8, COMPRESSION_LZMA},
+        Even{2048, 3, 8, COMPRESSION_WEBP}, Even{8192, 1, 1, COMPRESSION_CCITTFAX4},
+        Even{2048, 3, 8, COMPRESSION_ADOBE_DEFLATE}}) {
+    if (!TIFFIsCODECConfigured(uint16_t(even.compression))) continue;
+    const auto path = next();
+    write_black(path, even.size, even.channels, even.bits, even.compression, even.size, 1);
+    const uint64_t samples = uint64_t(even.size) * uint64_t(even.size) * uint64_t(even.channels);
+    const double packing =
+        double(samples) * even.bits / 8 / double(std::filesystem::file_size(path));
+    EXPECT_GT(packing, even.compression == COMPRESSION_ADOBE_DEFLATE ? 500 : 4096)
+        << even.compression;
+    const Texture texture = [&] {
+      Texture out;
+      EXPECT_EQ(said_by([&] { out = read_texture(path); }), "");
+      return out;
+    }();
+    EXPECT_EQ(texture.texels(), size_t(even.size) * size_t(even.size)) << even.compression;
+    EXPECT_EQ(texture.texel(texture.texels() - 1), V3f(0)) << even.compression;
+  }
+}
+
+// Of 768 MiB of samples the file holds a strip: whatever the codec, no room is asked for.
+TEST_F(Tiff, StripsThatAreMissingAreSeenBeforeRoomIsMade) {
+  for (const int compression : {COMPRESSION_ADOBE_DEFLATE, COMPRESSION_WEBP, COMPRESSION_ZSTD}) {
+    if (!TIFFIsCODECConfigured(uint16_t(compression))) continue;
+    const auto path = next();
+    write_black(path, 16384 - 64, 3, 8, compression, 16, 1);
+    PictureMemory little(64 << 20);
+    const std::string said = error_of([&] { read_texture(path, little); });
+    EXPECT_TRUE(tells(said, {"cut off"})) << compression;
+    EXPECT_EQ(said.find("--memory"), std::string::npos) << said;
+  }
 }
 
 // 4 GiB of samples of which the file holds a strip: refused before room is made.
