@@ -240,6 +240,32 @@ ObstaclePlacement ObstacleSet::placement(Entry& entry, double begin, double end)
   return p;
 }
 
+void ObstacleSet::extend_behind_walls(const Obstacle& box, double begin, double end,
+                                      ObstaclePlacement& p) const {
+  const double a = shot_.fluid.spacing, more = 4 * a;
+  const Pose pose[2] = {obstacle_pose(box, begin), obstacle_pose(box, end)};
+  for (int k = 0; k < 3; ++k) {
+    if (shot_.domain.axis[size_t(k)] != Axis::walls) continue;
+    for (int own = 0; own < 3; ++own) {
+      const double half = 0.5 * box.size[own];
+      // Of the face that looks down the axis, and of that which looks up: how far before its wall.
+      double low = -far_off, high = -far_off;
+      bool along = true;
+      for (const Pose& at : pose) {
+        along &= std::abs(at.axis[own][k]) > 1 - 1e-6;
+        low = std::max(low, at.position[k] - half - shot_.domain.min[k]);
+        high = std::max(high, shot_.domain.max[k] - at.position[k] - half);
+      }
+      if (!along) continue;
+      for (const double side : {-1., 1.}) {
+        if ((side < 0 ? low : high) > 0.5 * a) continue;
+        p.half[own] += float(0.5 * more);
+        for (int when = 0; when < 2; ++when) p.centre[when][k] += float(side * 0.5 * more);
+      }
+    }
+  }
+}
+
 void ObstacleSet::place(Solver& solver, double start, double end) {
   std::vector<ObstaclePlacement> all;
   for (size_t k = 0; k < obstacle_.size(); ++k) {
@@ -253,6 +279,8 @@ void ObstacleSet::place(Solver& solver, double start, double end) {
     }
     ObstaclePlacement own = placement(entry, begin, film_frame(end));
     own.of = int(k);
+    if (own.shape == ObstacleShape::box && role_ == Solids::obstacles)
+      extend_behind_walls(entry.obstacle, begin, film_frame(end), own);
     const double middle = 0.5 * (start + end);
     const bool there = window_.empty() || (middle >= window_[k].start && middle < window_[k].stop);
     for (int c = 0; c < 3 && !there; ++c) own.low[c] = float(far_off), own.high[c] = -far_off;

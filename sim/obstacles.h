@@ -86,6 +86,10 @@ class ObstacleSet {
   LevelSet level_set(const Entry& entry, const TriangleMesh& mesh) const;
   double travel(Entry& entry, double begin, double end);
   ObstaclePlacement placement(Entry& entry, double begin, double end);
+  /// A box that stands on a wall, or before it by less than half a spacing, goes on behind it: with
+  /// an edge there it would leave some of the corner to the wall, and push along it.
+  void extend_behind_walls(const Obstacle& box, double begin, double end,
+                           ObstaclePlacement& placement) const;
   V3d extent(const Entry& entry, const ObstaclePlacement& placement) const;
 
   Solids role_ = Solids::obstacles;

@@ -220,6 +220,41 @@ TEST(DiscOnABall, ReadsThePressureOfItsDepth) {
   }
 }
 
+// A block that stands on the floor: what water presses on its top and the floor around it is the
+// weight above each, and a disc on the floor, half of it under the block, reads the depth.
+TEST(BlockOnTheFloor, LeavesTheCornerToNeither) {
+  const double a = depth / 20, side = 16 * a, size = 8 * a, high = 10 * a;
+  const std::string text = tank_text(a, side, side, 1.5 * depth) +
+                           water_text(0, 0, side, depth, side) +
+                           fmt::format(R"([[obstacle]]
+type = "box"
+name = "block"
+position = [{0}, {1}, {0}]
+size = [{2}, {3}, {2}]
+rotation_deg = [0, 90, 0]
+[[probe]]
+type = "volume"
+name = "water"
+)",
+                                       side / 2, high / 2, size, high) +
+                           force_text("block") + force_text("y_low") +
+                           disc_text("half", side / 2 + size / 2, 0, side / 2, "[0, 1, 0]", 2 * a);
+  Probed run(text);
+  run.run_to(31);
+  const double water = run.mean("water", "volume [m^3]", 0.75),
+               level = (water + size * size * high) / (side * side);
+  const double top = rho * g * (level - high) * size * size,
+               floor = rho * g * level * (side * side - size * size);
+  const double on_block = run.mean("block", "force y [N]", 0.75),
+               on_floor = run.mean("y_low", "force y [N]", 0.75);
+  const double disc = run.mean("half", "pressure [Pa]", 0.75) / (rho * g * level);
+  RecordProperty("figures", fmt::format("block {:.4f} floor {:.4f} disc {:.4f}", -on_block / top,
+                                        -on_floor / floor, disc));
+  EXPECT_NEAR(-on_block / top, 1, 0.03);
+  EXPECT_NEAR(-on_floor / floor, 1, 0.03);
+  EXPECT_NEAR(disc, 1, 0.03);
+}
+
 /// Queries for the force on all six walls and all obstacles.
 std::vector<sim::ProbeQuery> all_bodies(int obstacles) {
   std::vector<sim::ProbeQuery> all;
