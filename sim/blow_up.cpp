@@ -21,8 +21,10 @@ V3d world(const Scene& scene, const HostVec& column, int i) {
 
 /// Emitters that pour into a domain which is full, or into fluid that is too dense.
 std::string sources_that_overfill(const Shot& shot, Scene& scene, const HostState& state,
-                                  const std::vector<float>& density, double time) {
-  const double room = room_of(shot, scene), share = double(state.id.size()) / room;
+                                  const std::vector<float>& density,
+                                  const std::vector<bool>& crowded, double time) {
+  const double room = room_of(shot, scene, Counted::standing, time),
+               share = double(state.id.size()) / room;
   const bool full = share > 0.97;
   std::string names;
   for (size_t e = 0; e < shot.fluid.emitter.size(); ++e) {
@@ -32,7 +34,7 @@ std::string sources_that_overfill(const Shot& shot, Scene& scene, const HostStat
     const double frame = shot.timeline.first + time * shot.timeline.fps;
     const bool inlet = emitter.type != EmitterType::mesh && density.size() == state.id.size();
     constexpr double too_dense = 1.01;
-    if (!full &&
+    if (!full && !crowded[e] &&
         !(inlet &&
           near_inlet(shot, scene, emitter, frame, state.position, density, {}).density > too_dense))
       continue;
@@ -43,15 +45,46 @@ std::string sources_that_overfill(const Shot& shot, Scene& scene, const HostStat
       "{}: {} had no room left to send into. Stop it earlier (stop), leave a way "
       "out, or add a [[sink]]",
       full ? fmt::format("The domain is closed and {:.0f} % full", 100 * share)
-           : "The fluid before an inlet is too dense",
+           : "The fluid before an inlet is too dense, or in a vessel that is closed and full",
       names);
+}
+
+/// Obstacles that move in a closed domain and leave its fluid too little room.
+std::string obstacles_that_take_room(const Shot& shot, Scene& scene, const HostState& state,
+                                     double time) {
+  if (!scene.obstacles.any_moves()) return "";
+  const double room = room_of(shot, scene, Counted::all, time), held = double(state.id.size());
+  if (held < 0.97 * room) return "";
+  std::string names;
+  for (int k = 0; k < scene.obstacles.count(); ++k) {
+    if (!scene.obstacles.moves(k)) continue;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", scene.obstacles.obstacle(k).name);
+  }
+  return fmt::format(
+      "The domain is closed, and what moves in it leaves room for {:.0f} of its {:.0f} particles: "
+      "obstacle {}. Stop it earlier, or leave the fluid a way out",
+      room, held, names);
 }
 
 struct Solid {
   std::string name;
   double distance;  // m
   bool moves;
+  V3d normal;  // unit, from the solid to the place
 };
+
+/// By differences of the distance over half a spacing.
+V3d normal_of(const Shot& shot, Scene& scene, int obstacle, const V3d& p, double time) {
+  const double e = 0.25 * shot.fluid.spacing;
+  V3d slope;
+  for (int k = 0; k < 3; ++k) {
+    V3d step(0);
+    step[k] = e;
+    slope[k] = scene.obstacles.distance_to(obstacle, p + step, time) -
+               scene.obstacles.distance_to(obstacle, p - step, time);
+  }
+  return slope.length() > 0 ? slope.normalized() : slope;
+}
 
 /// Walls and obstacles within reach of a place.
 std::vector<Solid> solids_near(const Shot& shot, Scene& scene, const V3d& p, double time,
@@ -61,14 +94,16 @@ std::vector<Solid> solids_near(const Shot& shot, Scene& scene, const V3d& p, dou
     if (shot.domain.axis[size_t(k)] != Axis::walls) continue;
     const double low = p[k] - shot.domain.min[k], high = shot.domain.max[k] - p[k];
     const std::string axis(1, "xyz"[k]);
-    if (low < reach) near.push_back({"the domain's wall " + axis + "_low", low, false});
-    if (high < reach) near.push_back({"the domain's wall " + axis + "_high", high, false});
+    V3d up(0);
+    up[k] = 1;
+    if (low < reach) near.push_back({"the domain's wall " + axis + "_low", low, false, up});
+    if (high < reach) near.push_back({"the domain's wall " + axis + "_high", high, false, -up});
   }
   for (int k = 0; k < scene.obstacles.count(); ++k) {
     const double d = scene.obstacles.distance_to(k, p, time);
     if (d >= reach) continue;
     near.push_back({fmt::format("obstacle \"{}\"", scene.obstacles.obstacle(k).name), d,
-                    scene.obstacles.moves(k)});
+                    scene.obstacles.moves(k), normal_of(shot, scene, k, p, time)});
   }
   return near;
 }
@@ -81,13 +116,18 @@ std::string obstacle_that_closes(const Shot& shot, Scene& scene, const V3d& p, d
     return s.moves != t.moves ? s.moves : s.distance < t.distance;
   });
   if (near.size() < 2 || !near[0].moves) return "";
-  const double gap = std::max(0.0, near[0].distance) + std::max(0.0, near[1].distance);
+  // What it slides along does not face it.
+  const auto other = std::find_if(near.begin() + 1, near.end(), [&](const Solid& solid) {
+    return solid.normal.dot(near[0].normal) < -0.5;
+  });
+  if (other == near.end()) return "";
+  const double gap = std::max(0.0, near[0].distance) + std::max(0.0, other->distance);
   if (gap > tight * a) return "";
   return fmt::format(
       "{} closes on {} there: {:.2g} spacings are left between them, and fluid that "
       "is shut in has nowhere to go. Leave two spacings ({:.3g} m), or move it more "
       "slowly",
-      near[0].name, near[1].name, gap / a, tight * a);
+      near[0].name, other->name, gap / a, tight * a);
 }
 
 /// m, of the spring s from node v, over its rest length.
@@ -124,15 +164,16 @@ std::string sheet_beyond_its_length(const Shot& shot, const Scene& scene, const 
 }  // namespace
 
 std::string cause_of_blow_up(const Shot& shot, Scene& scene, const HostState& state,
-                             const std::vector<float>& density, const Culprit& culprit, double time,
-                             double dt) {
+                             const std::vector<float>& density, const std::vector<bool>& crowded,
+                             const Culprit& culprit, double time, double dt) {
   const HostVec& x = culprit.particle ? state.position : state.cloth_position;
   const HostVec& v = culprit.particle ? state.velocity : state.cloth_velocity;
   const auto i = size_t(culprit.index);
   // Where it was thrown, not where it is now.
   const V3d p = world(scene, x, culprit.index) - V3d(v.x[i], v.y[i], v.z[i]) * dt;
   const bool placed = std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-  std::string cause = sources_that_overfill(shot, scene, state, density, time);
+  std::string cause = sources_that_overfill(shot, scene, state, density, crowded, time);
+  if (cause.empty()) cause = obstacles_that_take_room(shot, scene, state, time);
   if (cause.empty() && placed) cause = obstacle_that_closes(shot, scene, p, time);
   if (cause.empty() && scene.cloth.vertices() > 0)
     cause = sheet_beyond_its_length(shot, scene, state);

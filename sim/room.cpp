@@ -8,17 +8,17 @@
 
 namespace drench::sim {
 
-double room_of(const Shot& shot, Scene& scene) {
+double room_of(const Shot& shot, Scene& scene, Counted which, double time) {
   const Domain& domain = shot.domain;
   for (const Axis axis : domain.axis)
     if (axis == Axis::open) return 1e30;
   const double a = shot.fluid.spacing;
   const V3d size = domain.max - domain.min;
   const double cells = size.x * size.y * size.z / (a * a * a);
-  std::vector<int> standing;
+  std::vector<int> counted;
   for (int k = 0; k < scene.obstacles.count(); ++k)
-    if (!scene.obstacles.moves(k)) standing.push_back(k);
-  if (standing.empty()) return cells;
+    if (which == Counted::all || !scene.obstacles.moves(k)) counted.push_back(k);
+  if (counted.empty()) return cells;
   constexpr double most_places = 2e6;
   const double step = a * std::max(1.0, std::cbrt(cells / most_places));
   int n[3];
@@ -30,8 +30,8 @@ double room_of(const Shot& shot, Scene& scene) {
         const V3d p = domain.min + V3d((x + 0.5) * size.x / n[0], (y + 0.5) * size.y / n[1],
                                        (z + 0.5) * size.z / n[2]);
         bool taken = false;
-        for (size_t k = 0; k < standing.size() && !taken; ++k)
-          taken = scene.obstacles.distance_to(standing[k], p, -shot.preroll) < 0;
+        for (size_t k = 0; k < counted.size() && !taken; ++k)
+          taken = scene.obstacles.distance_to(counted[k], p, time) < 0;
         free += !taken;
       }
     }

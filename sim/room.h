@@ -5,10 +5,13 @@
 
 namespace drench::sim {
 
-/// Particles at rest density that fit between the walls of a domain and outside the obstacles that
-/// stand; 1e30 if a side is open. On a lattice of at most two million places, so that obstacles are
-/// known to a share of their surface only.
-double room_of(const Shot& shot, Scene& scene);
+/// Which obstacles take room.
+enum class Counted { standing, all };
+
+/// Particles at rest density that fit between the walls of a domain and outside the obstacles, as
+/// they are at `time`, s; 1e30 if a side is open. On a lattice of at most two million places, so
+/// that obstacles are known to a share of their surface only.
+double room_of(const Shot& shot, Scene& scene, Counted which, double time);
 
 /// Means over the particles around an inlet, as far as a support beyond its rim; 0 if there are
 /// none.

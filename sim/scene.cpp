@@ -9,8 +9,10 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
+#include "sim/cloth_start.h"
 #include "sim/geometry.h"
 #include "sim/kernels.h"
+#include "sim/probe_report.h"
 #include "sim/periodic.h"
 
 namespace drench::sim {
@@ -379,109 +381,20 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
   }
 }
 
-using Triangle = std::array<cpu::Vec3<float>, 3>;
-
-/// The images of a triangle of which something lies within `reach` of the domain, along periodic
-/// axes.
-std::vector<Triangle> images_of(const Triangle& triangle, float reach, const Parameters& p) {
-  std::vector<Triangle> images{triangle};
-  for (int k = 0; k < 3; ++k) {
-    if (!p.periodic[k]) continue;
-    const auto along = [k](auto& v) -> auto& { return k == 0 ? v.x : k == 1 ? v.y : v.z; };
-    const float period = p.high[k] - p.low[k];
-    float low = 1e30f, high = -1e30f;
-    for (const auto& c : triangle)
-      low = std::min(low, along(c) - reach), high = std::max(high, along(c) + reach);
-    std::vector<Triangle> moved;
-    for (float n = std::ceil((p.low[k] - high) / period); low + n * period < p.high[k]; ++n) {
-      for (Triangle image : images) {
-        for (auto& c : image) along(c) += n * period;
-        moved.push_back(image);
-      }
-    }
-    images = moved;
-  }
-  return images;
-}
-
-/// Refuses particles closer to a sheet than a quarter spacing: the side they belong to is a guess.
-void check_overlap(const Shot& shot, const Scene& scene) {
-  using P = cpu::Vec3<float>;
-  const HostVec &x = scene.start.position, &v = scene.start.cloth_position,
-                &shift = scene.cloth.corner_shift;
-  const float a = scene.parameters.spacing;
-  std::unordered_multimap<uint64_t, int> cells;
-  const auto key = [a](float px, float py, float pz) {
-    const auto c = [a](float s) { return uint64_t(int64_t(std::floor(s / a)) & 0x1fffff); };
-    return c(px) << 42 | c(py) << 21 | c(pz);
-  };
-  for (size_t i = 0; i < x.size(); ++i) cells.emplace(key(x.x[i], x.y[i], x.z[i]), int(i));
-  for (int t = 0; t < scene.cloth.triangles(); ++t) {
-    Triangle whole;
-    for (int k = 0; k < 3; ++k) {
-      const int c = scene.cloth.corner[3 * t + k];
-      whole[k] = {v.x[c], v.y[c], v.z[c]};
-      if (shift.size() > 0)
-        whole[k] = whole[k] + P{shift.x[3 * t + k], shift.y[3 * t + k], shift.z[3 * t + k]};
-    }
-    const float reach = 0.25f * a + scene.cloth.half_thickness[t];
-    for (const Triangle& corner : images_of(whole, reach, scene.parameters)) {
-      P low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
-      for (int k = 0; k < 3; ++k) {
-        low = {std::min(low.x, corner[k].x), std::min(low.y, corner[k].y),
-               std::min(low.z, corner[k].z)};
-        high = {std::max(high.x, corner[k].x), std::max(high.y, corner[k].y),
-                std::max(high.z, corner[k].z)};
-      }
-      for (float z = low.z - reach; z < high.z + reach + a; z += a) {
-        for (float y = low.y - reach; y < high.y + reach + a; y += a) {
-          for (float px = low.x - reach; px < high.x + reach + a; px += a) {
-            const auto [begin, end] = cells.equal_range(key(px, y, z));
-            for (auto it = begin; it != end; ++it) {
-              const P p{x.x[it->second], x.y[it->second], x.z[it->second]};
-              const float d2 = cpu::closest_point(p, corner[0], corner[1], corner[2]).distance2;
-              if (d2 >= reach * reach) continue;
-              throw Error(
-                  fmt::format("{}: fluid starts inside cloth \"{}\": the particle at ({:.4g}, "
-                              "{:.4g}, {:.4g}) m is {:.2g} m from it, "
-                              "nearer than {:.2g} m (a quarter spacing and half the thickness), so "
-                              "it has no side. Move the fluid "
-                              "or the cloth at least half a spacing ({:.3g} m) apart",
-                              shot.file.string(), scene.sheet[scene.cloth.sheet[t]].name,
-                              scene.frame.to_world(0, p.x), scene.frame.to_world(1, p.y),
-                              scene.frame.to_world(2, p.z), std::sqrt(d2), reach, 0.5 * a));
-            }
-          }
-        }
-      }
-    }
-  }
-}
-
-/// Refuses free vertices farther inside an obstacle than the first step may move them out.
-void check_cloth_outside(const Shot& shot, Scene& scene) {
-  if (scene.obstacles.count() == 0) return;
-  for (size_t s = 0; s < scene.sheet.size(); ++s) {
-    const Sheet& sheet = scene.sheet[s];
-    for (size_t v = 0; v < sheet.point.size(); ++v) {
-      const V3d p = sheet.position[sheet.point[v]];
-      if (sheet.pinned[v]) continue;
-      const double distance = scene.obstacles.distance(p, -shot.preroll);
-      if (distance > -0.25 * shot.fluid.spacing) continue;
-      throw Error(
-          fmt::format("{}: cloth \"{}\" starts inside an obstacle: vertex {} at ({:.4g}, {:.4g}, "
-                      "{:.4g}) m is {:.2g} m deep in it. Move the cloth or the obstacle, or pin "
-                      "the vertex: pinned ones may be inside",
-                      shot.file.string(), sheet.name, sheet.point[v], p.x, p.y, p.z, -distance));
-    }
-  }
-}
-
 /// Of sides that are open, which drop what is more than a spacing beyond.
 bool is_outside(const Domain& domain, const V3d& p, double spacing) {
   for (int k = 0; k < 3; ++k) {
     const bool open = domain.axis[size_t(k)] == Axis::open;
     if (open && (p[k] < domain.min[k] - spacing || p[k] > domain.max[k] + spacing)) return true;
+  }
+  return false;
+}
+
+/// Whether a point lies in a sink that is there from the start.
+bool drains_at_once(const Shot& shot, Scene& scene, const V3d& p) {
+  for (int k = 0; k < scene.sinks.count(); ++k) {
+    if (shot.sink[size_t(k)].start > 0) continue;
+    if (scene.sinks.distance_to(k, p, -shot.preroll) < 0) return true;
   }
   return false;
 }
@@ -504,8 +417,9 @@ void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
     start.velocity.push(float(u.x), float(u.y), float(u.z));
     scene.births.add({int(start.id.size()), fluid.source[i], -shot.preroll});
     start.id.push_back(int(start.id.size()));
-    ++(is_outside(shot.domain, p, shot.fluid.spacing) ? scene.report.source[source].outside
-                                                      : scene.report.source[source].kept);
+    const bool outside = is_outside(shot.domain, p, shot.fluid.spacing);
+    ++(outside ? scene.report.source[source].outside : scene.report.source[source].kept);
+    scene.report.source[source].drained += !outside && drains_at_once(shot, scene, p);
   }
   for (size_t s = 0; s < lost.size(); ++s) {
     for (size_t k = 0; k < lost[s].size(); ++k) {
@@ -546,6 +460,8 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
       build_parameters(shot, scene.frame, fluid, scene.mesh_emitter, scene.obstacles, scene.motion);
   scene.obstacles.set_images(ObstacleImages(scene.parameters));
   note_meshes(shot, scene);
+  note_sinks(shot, scene);
+  note_probes(shot, scene);
   place_fluid(shot, fluid, scene);
   double dt_limit = 1e30;
   for (size_t s = 0; s < shot.cloth.size(); ++s) {
@@ -565,8 +481,8 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
-  check_overlap(shot, scene);
-  check_cloth_outside(shot, scene);
+  note_cloth(shot, scene);
+  check_cloth_start(shot, scene);
   complete_report(shot, scene);
   return scene;
 }

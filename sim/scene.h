@@ -101,6 +101,16 @@ EmitterLayer emitter_layer(const FluidEmitter& emitter, double spacing);
 /// An inlet at a film frame: the axes of its plane, and the velocity of what leaves it, m/s.
 struct Inlet {
   V3d center, axis[2], velocity;
+
+  /// A place of its layer, world.
+  V3d at(const std::array<double, 2>& place) const {
+    return center + axis[0] * place[0] + axis[1] * place[1];
+  }
+  /// Unit, the way of what leaves; 0 if it does not move.
+  V3d along() const {
+    const double speed = velocity.length();
+    return speed > 0 ? velocity / speed : V3d(0);
+  }
 };
 Inlet inlet_at(const FluidEmitter& emitter, const Timeline& time, double frame);
 

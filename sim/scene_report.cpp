@@ -6,7 +6,8 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/source_check.h"
+#include "pipeline/contract/obstacle.h"
+#include "sim/inlet_report.h"
 #include "sim/room.h"
 #include "sim/scene.h"
 
@@ -14,7 +15,8 @@ namespace drench::sim {
 
 namespace {
 
-constexpr double worth_a_word = 0.05;  // share of a source or inlet
+// Shares. Obstacles in a pool displace some of it in most shots; an inlet is to send all.
+constexpr double worth_a_word_of_source = 0.5, worth_a_word_of_inlet = 0.05;
 constexpr double worth_a_word_of_rounding = 0.2;
 
 /// "2400 particles (0.3 litres)".
@@ -38,137 +40,12 @@ std::string where_of(const SourceReport& source) {
                         source.lost.size() > 1 ? "s" : "", names_of(source.lost),
                         source.lost.size() > 1 ? "them" : "it");
   }
-  if (source.outside > 0)
-    where += std::string(where.empty() ? "" : ", or ") + "beyond the domain's open sides";
+  const auto add = [&](const char* text) {
+    where += (where.empty() ? "" : ", or ") + std::string(text);
+  };
+  if (source.outside > 0) add("beyond the domain's open sides");
+  if (source.drained > 0) add("in a sink, which takes them at once");
   return where;
-}
-
-// ---- emitters ----
-
-/// What may hold back the places of an emitter at one time.
-struct Blocked {
-  size_t places = 0, blocked = 0;
-  std::vector<size_t> by;  // each obstacle
-
-  void add(int obstacle) { ++blocked, ++by[size_t(obstacle)]; }
-};
-
-class InletLook {
- public:
-  InletLook(const Shot& shot, Scene& scene) : shot_(shot), scene_(scene) {}
-  InletReport of(size_t e);
-
- private:
-  void look(size_t e, double time, Blocked& found);
-  void look_at_layer(const FluidEmitter& emitter, double time, Blocked& found);
-  bool beyond(const V3d& p) const;
-  bool stands(size_t e) const;
-  MeshEmitter& mesh_emitter(size_t e) const;
-
-  const Shot& shot_;
-  Scene& scene_;
-};
-
-MeshEmitter& InletLook::mesh_emitter(size_t e) const {
-  return *std::find_if(scene_.mesh_emitter.begin(), scene_.mesh_emitter.end(),
-                       [e](const MeshEmitter& m) { return m.index() == e; });
-}
-
-bool InletLook::stands(size_t e) const {
-  const FluidEmitter& emitter = shot_.fluid.emitter[e];
-  return emitter.center.keys.size() < 2 && emitter.direction.keys.size() < 2 &&
-         emitter.rotation_deg.keys.size() < 2;
-}
-
-/// Of sides that are open: what is more than a spacing beyond is dropped before it comes in.
-bool InletLook::beyond(const V3d& p) const {
-  const double a = shot_.fluid.spacing;
-  for (int k = 0; k < 3; ++k) {
-    if (shot_.domain.axis[size_t(k)] != Axis::open) continue;
-    if (p[k] < shot_.domain.min[k] - a || p[k] > shot_.domain.max[k] + a) return true;
-  }
-  return false;
-}
-
-/// A layer is moved on from the inlet by up to a step's way, so that a place counts as blocked only
-/// if it is so a spacing farther along, too.
-void InletLook::look_at_layer(const FluidEmitter& emitter, double time, Blocked& found) {
-  const double a = shot_.fluid.spacing;
-  const EmitterLayer layer = emitter_layer(emitter, a);
-  const Inlet inlet =
-      inlet_at(emitter, shot_.timeline, shot_.timeline.first + time * shot_.timeline.fps);
-  const double speed = inlet.velocity.length();
-  const V3d along = speed > 0 ? inlet.velocity / speed : V3d(0);
-  for (const auto& place : layer.place) {
-    const V3d p = inlet.center + inlet.axis[0] * place[0] + inlet.axis[1] * place[1];
-    ++found.places;
-    if (beyond(p)) {
-      ++found.blocked;
-      continue;
-    }
-    int in_the_way = -1;
-    for (int k = 0; k < 3; ++k) {
-      in_the_way = obstacle_in_the_way(scene_.obstacles, p + along * (0.5 * k * a), time, a);
-      if (in_the_way < 0) break;
-    }
-    if (in_the_way >= 0) found.add(in_the_way);
-  }
-}
-
-void InletLook::look(size_t e, double time, Blocked& found) {
-  const FluidEmitter& emitter = shot_.fluid.emitter[e];
-  if (emitter.type != EmitterType::mesh) return look_at_layer(emitter, time, found);
-  for (const V3d& p : mesh_emitter(e).places(time)) {
-    ++found.places;
-    const int obstacle = obstacle_in_the_way(scene_.obstacles, p, time, shot_.fluid.spacing);
-    if (obstacle >= 0) found.add(obstacle);
-  }
-}
-
-InletReport InletLook::of(size_t e) {
-  const FluidEmitter& emitter = shot_.fluid.emitter[e];
-  const Timeline& t = shot_.timeline;
-  InletReport report;
-  report.name = fmt::format("fluid.emitter[{}]", e);
-  const double begin = std::max(emitter.start, 0.0) - shot_.preroll;
-  const double end = std::min(emitter.stop - shot_.preroll, (t.last - t.first) / t.fps);
-  report.in_time = begin < end || (t.first == t.last && begin <= end);
-  report.fixed = stands(e) && !scene_.obstacles.any_moves();
-  if (!report.in_time) return report;
-  constexpr int most_looks = 500;
-  const double frames = std::ceil((end - begin) * t.fps);
-  // One look is two level sets of each obstacle that deforms: too many for every frame.
-  const bool once =
-      report.fixed ||
-      std::any_of(shot_.obstacle.begin(), shot_.obstacle.end(), [](const Obstacle& o) {
-        return o.type == ObstacleType::mesh && is_sequence(o.mesh_file);
-      });
-  const int looks = once ? 0 : int(std::clamp(frames, 1.0, double(most_looks)));
-  Blocked found{0, 0, std::vector<size_t>(shot_.obstacle.size(), 0)};
-  for (int k = 0; k <= looks; ++k)
-    look(e, begin + (looks > 0 ? (end - begin) * k / looks : 0), found);
-  if (found.places > 0) report.blocked = double(found.blocked) / double(found.places);
-  const auto most = std::max_element(found.by.begin(), found.by.end());
-  if (most != found.by.end() && *most > 0)
-    report.obstacle = shot_.obstacle[size_t(most - found.by.begin())].name;
-  const double a = shot_.fluid.spacing, clear = 1 - report.blocked;
-  report.emitted = emitter.type == EmitterType::mesh
-                       ? clear * double(found.places) / (looks + 1)
-                       : clear * inlet_area(emitter) * emitter.speed * (end - begin) / (a * a * a);
-  return report;
-}
-
-std::string where_of(const InletReport& inlet) {
-  if (inlet.obstacle.empty()) return "beyond the domain's open sides";
-  return fmt::format("inside obstacle \"{}\" or nearer to it than half a spacing", inlet.obstacle);
-}
-
-void check_inlet(const Shot& shot, const InletReport& inlet) {
-  if (!inlet.in_time || !inlet.never() || !inlet.fixed) return;
-  throw Error(fmt::format(
-      "{}: {} can never send a particle: every place of it is {} through the whole shot. Move it "
-      "more than half a spacing ({:.3g} m) out, or remove it",
-      shot.file.string(), inlet.name, where_of(inlet), 0.5 * shot.fluid.spacing));
 }
 
 // ---- estimates ----
@@ -193,6 +70,18 @@ double steps_a_frame(const Shot& shot, Scene& scene) {
   return std::ceil(frame / std::min(frame, scene.obstacles.limit(0, std::min(dt, frame))));
 }
 
+/// @throws Error if there is never anything: no fluid, no cloth.
+void check_anything_starts(const Shot& shot, const SceneReport& report) {
+  const bool never = std::all_of(report.inlet.begin(), report.inlet.end(),
+                                 [](const InletReport& inlet) { return !inlet.in_time; });
+  if (!shot.fluid.present() || !shot.cloth.empty() || report.particles > 0 || !never) return;
+  throw Error(fmt::format(
+      "{}: there is never any fluid: {} sends its first layer after the last frame or after its "
+      "stop. Change its start and stop, which count from the start of the simulation, pre-roll "
+      "included, or give the shot more frames",
+      shot.file.string(), report.inlet.front().name));
+}
+
 }  // namespace
 
 size_t SourceReport::in_obstacles() const {
@@ -201,11 +90,39 @@ size_t SourceReport::in_obstacles() const {
   return sum;
 }
 
+size_t SourceReport::gone() const { return in_obstacles() + outside + drained; }
+
 double SourceReport::rounding(double spacing) const {
   return volume > 0 ? double(asked) * spacing * spacing * spacing / volume - 1 : 0;
 }
 
-std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high) {
+bool lies_beyond(const Domain& domain, const ObstacleSet& solids, int k) {
+  const Obstacle& shape = solids.obstacle(k);
+  const Pose pose = obstacle_pose(shape, 0);
+  const bool plane = shape.type == ObstacleType::plane;
+  V3d low(1e30), high(-1e30);
+  double lowest = 1e30;  // over the plane
+  for (int corner = 0; corner < 8; ++corner) {
+    V3d of_domain, own;
+    for (int c = 0; c < 3; ++c) {
+      of_domain[c] = corner >> c & 1 ? domain.max[c] : domain.min[c];
+      own[c] = corner >> c & 1 ? solids.high(k)[c] : solids.low(k)[c];
+    }
+    lowest = std::min(lowest, pose.to_own(of_domain).y);
+    const V3d at = pose.to_world(own);
+    for (int c = 0; c < 3; ++c)
+      low[c] = std::min(low[c], at[c]), high[c] = std::max(high[c], at[c]);
+  }
+  if (plane) return lowest > 0;
+  for (int c = 0; c < 3; ++c) {
+    if (domain.axis[size_t(c)] == Axis::periodic) continue;
+    if (high[c] < domain.min[c] || low[c] > domain.max[c]) return true;
+  }
+  return false;
+}
+
+std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high,
+                          std::string_view remedy) {
   const V3d size = high - low, room = domain.max - domain.min;
   const double longest = std::max({size.x, size.y, size.z});
   const double thinnest = std::min({size.x, size.y, size.z});
@@ -220,7 +137,7 @@ std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high)
       fmt::format("the mesh is {} wide in a domain of {}", text(longest), text(width));
   for (const auto& [unit, scale] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
     if (longest * scale > 3 * width) continue;
-    return fmt::format("{}: are these {}? Set scale = {}", sizes, unit, scale);
+    return fmt::format("{}: are these {}? {} {}", sizes, unit, remedy, scale);
   }
   return sizes + ": is its scale right?";
 }
@@ -236,7 +153,8 @@ void note_meshes(const Shot& shot, Scene& scene) {
     bool apart = false;
     for (int c = 0; c < 3; ++c) apart |= low[c] > near.high[c] || high[c] < near.low[c];
     const std::string guess = guess_of_unit(shot.domain, low, high);
-    if (apart && !is_sequence(obstacle.mesh_file)) {
+    const bool seen = obstacle.visible && obstacle.matte != Matte::none;  // a prop for a plate
+    if (apart && !is_sequence(obstacle.mesh_file) && !(seen && guess.empty())) {
       scene.report.notes.push_back(fmt::format(
           "obstacle \"{}\" meets no fluid: its mesh lies wholly beyond the domain in every frame. "
           "Look at its position and scale{}{}",
@@ -246,6 +164,50 @@ void note_meshes(const Shot& shot, Scene& scene) {
           fmt::format("obstacle \"{}\" is much larger than the domain, fluid meets only a part of "
                       "it: {}",
                       obstacle.name, guess));
+    }
+  }
+}
+
+std::string guess_of_unit(const Domain& domain, const Cloth& cloth, const Sheet& sheet) {
+  if (cloth.mesh_file.empty()) return "";
+  V3d low(1e30), high(-1e30);
+  for (const V3d& p : sheet.position) {
+    for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+  }
+  return guess_of_unit(domain, low, high, "Scale the file by");
+}
+
+void note_cloth(const Shot& shot, Scene& scene) {
+  for (size_t s = 0; s < scene.sheet.size(); ++s) {
+    const std::string guess = guess_of_unit(shot.domain, shot.cloth[s], scene.sheet[s]);
+    if (guess.empty()) continue;
+    scene.report.notes.push_back(
+        fmt::format("cloth \"{}\" is much larger than the domain: {}", shot.cloth[s].name, guess));
+  }
+}
+
+void note_sinks(const Shot& shot, Scene& scene) {
+  const Timeline& t = shot.timeline;
+  for (int k = 0; k < scene.sinks.count(); ++k) {
+    const Obstacle& shape = scene.sinks.obstacle(k);
+    const std::string guess =
+        shape.type == ObstacleType::mesh
+            ? guess_of_unit(shot.domain, scene.sinks.low(k), scene.sinks.high(k))
+            : "";
+    if (!guess.empty()) {
+      scene.report.notes.push_back(
+          fmt::format("sink \"{}\" is much larger than the domain: {}", shape.name, guess));
+    }
+    const double begin = shot.sink[size_t(k)].start - shot.preroll;
+    if (begin >= (t.last - t.first) / t.fps && begin > -shot.preroll) {
+      scene.report.notes.push_back(fmt::format(
+          "sink \"{}\" takes nothing: it starts after the last frame. Change its start, which "
+          "counts from the start of the simulation, pre-roll included",
+          shape.name));
+    } else if (!scene.sinks.moves(k) && lies_beyond(shot.domain, scene.sinks, k)) {
+      scene.report.notes.push_back(fmt::format(
+          "sink \"{}\" takes nothing: it lies wholly beyond the domain. Look at its position",
+          shape.name));
     }
   }
 }
@@ -262,8 +224,7 @@ void check_sources_start(const Shot& shot, const SceneReport& report) {
     throw Error(fmt::format(
         "{}: all fluid of {} is lost: {} lie {}. Move it, or look at the size (scale) and the "
         "place of what is in its way{}",
-        shot.file.string(), source.name,
-        amount(double(source.in_obstacles() + source.outside), shot.fluid.spacing),
+        shot.file.string(), source.name, amount(double(source.gone()), shot.fluid.spacing),
         where_of(source), notes));
   }
 }
@@ -272,15 +233,15 @@ void complete_report(const Shot& shot, Scene& scene) {
   SceneReport& report = scene.report;
   report.spacing = shot.fluid.spacing;
   for (const SourceReport& source : report.source) report.particles += source.kept;
-  InletLook look(shot, scene);
   report.particles_at_end = double(report.particles);
   for (size_t e = 0; e < shot.fluid.emitter.size(); ++e) {
-    report.inlet.push_back(look.of(e));
-    check_inlet(shot, report.inlet.back());
+    report.inlet.push_back(report_of_inlet(shot, scene, e));
     report.particles_at_end += report.inlet.back().emitted;
   }
+  check_anything_starts(shot, report);
   if (!report.inlet.empty())
-    report.particles_at_end = std::min(report.particles_at_end, room_of(shot, scene));
+    report.particles_at_end =
+        std::min(report.particles_at_end, room_of(shot, scene, Counted::standing, -shot.preroll));
   report.particles_at_end = std::max(report.particles_at_end, double(report.particles));
   report.cloth_triangles = size_t(scene.cloth.triangles());
   report.obstacle_triangles = scene.obstacles.triangles() + scene.sinks.triangles();
@@ -303,8 +264,8 @@ std::vector<std::string> warnings_of(const SceneReport& report) {
                       source.name, 1000 * source.volume,
                       amount(double(source.asked), report.spacing), 100 * rounding));
     }
-    const double gone = double(source.in_obstacles() + source.outside);
-    if (gone < worth_a_word * double(source.asked)) continue;
+    const double gone = double(source.gone());
+    if (gone < worth_a_word_of_source * double(source.asked)) continue;
     all.push_back(fmt::format(
         "{} loses {} of {}, {:.0f} %: they would start {}. If that is not meant, move it, or look "
         "at the size (scale) and the place of what is in its way",
@@ -314,19 +275,20 @@ std::vector<std::string> warnings_of(const SceneReport& report) {
   for (const InletReport& inlet : report.inlet) {
     if (!inlet.in_time) {
       all.push_back(fmt::format(
-          "{} sends nothing: it starts after the last frame or stops before the first. Change its "
-          "start and stop, which count from the start of the simulation, pre-roll included",
+          "{} sends nothing: its first layer would leave after the last frame or after its stop. "
+          "Change its start and stop, which count from the start of the simulation, pre-roll "
+          "included",
           inlet.name));
     } else if (inlet.blocked >= 1) {
       all.push_back(
           fmt::format("{} probably sends nothing: in every frame that was looked at all "
                       "of it is {}. Move it out of there",
-                      inlet.name, where_of(inlet)));
-    } else if (inlet.blocked >= worth_a_word) {
+                      inlet.name, inlet.where));
+    } else if (inlet.blocked >= worth_a_word_of_inlet) {
       all.push_back(
           fmt::format("{:.0f} % of {} sends nothing: it is {}. Move it, or make it "
                       "smaller, for the flow that was asked for",
-                      100 * inlet.blocked, inlet.name, where_of(inlet)));
+                      100 * inlet.blocked, inlet.name, inlet.where));
     }
   }
   all.insert(all.end(), report.notes.begin(), report.notes.end());

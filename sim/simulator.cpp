@@ -12,6 +12,7 @@
 #include "pipeline/contract/shot_file.h"
 #include "sim/blow_up.h"
 #include "sim/checkpoint.h"
+#include "sim/inlet_report.h"
 #include "sim/probe_series.h"
 #include "sim/room.h"
 #include "sim/scene.h"
@@ -119,11 +120,10 @@ struct Simulator::Implementation {
         if (that_fit(e, layer[e].place.size(), until) < layer[e].place.size()) continue;
         if (shut[e] > 0) continue;
         const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
-        sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
+        const sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
         limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
-        inlet.center += inlet.velocity * (until - leaves);
         births.add({next_id, emitter_source(e), leaves});
-        add_layer(layer[e], inlet, until);
+        add_layer(layer[e], inlet, until - leaves, until);
       }
     }
     for (sim::MeshEmitter& e : scene.mesh_emitter) {
@@ -156,7 +156,7 @@ struct Simulator::Implementation {
   /// Of `more` particles of an emitter those that a closed domain has room for. Nothing but their
   /// number decides, so that a sink lets it send again and a resumed run does the same.
   size_t that_fit(size_t emitter, size_t more, double now) {
-    if (!room) room = sim::room_of(shot, scene);
+    if (!room) room = sim::room_of(shot, scene, sim::Counted::standing, -shot.preroll);
     const double there = double(solver->particles());
     if (there + double(more) <= *room) return more;
     warn_full(
@@ -168,7 +168,9 @@ struct Simulator::Implementation {
   /// Shuts emitters before whose inlets fluid has nowhere to go, as in a vessel that is full, which
   /// shows in its pressure; opens them once fluid has left the scene, or the inlet. Between,
   /// pressure falls back to what rest has, and would tell nothing.
+  /// A domain without obstacles or sheets holds no vessel: that_fit knows its room.
   void shut_crowded_inlets(double now) {
+    if (shot.obstacle.empty() && shot.cloth.empty()) return;
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& emitter = shot.fluid.emitter[e];
       const double since = now + shot.preroll, most = sim::pressure_without_room(scene, emitter);
@@ -215,19 +217,24 @@ struct Simulator::Implementation {
     emitted[emitter.index()] += id.size();
   }
 
-  /// Less what would appear inside an obstacle.
-  void add_layer(const sim::EmitterLayer& what, const sim::Inlet& inlet, double now) {
+  /// Moved on for `since` s from where it left. Less what has no way out or would appear inside an
+  /// obstacle.
+  void add_layer(const sim::EmitterLayer& what, sim::Inlet inlet, double since, double now) {
     sim::HostVec position, velocity;
     std::vector<int> id;
-    const V3d u = inlet.velocity;
+    const V3d u = inlet.velocity, along = inlet.along(), moved = u * since;
+    inlet.center += moved;
     for (const auto& place : what.place) {
-      const V3d p = inlet.center + inlet.axis[0] * place[0] + inlet.axis[1] * place[1];
+      V3d p = inlet.at(place);
+      const sim::InletPlace from = sim::inlet_place(shot, scene.obstacles, p - moved, along, now);
+      if (from.blocked != sim::InletPlace::Blocked::no) continue;
+      if (from.ahead > 0) p += along * from.ahead;
       if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
       position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
       id.push_back(next_id++);
     }
-    solver->append(position, velocity, id);
+    if (!id.empty()) solver->append(position, velocity, id);
   }
 
   /// Steps to time `end` exactly: the rest is cut into equal parts no longer than the stable step.
@@ -315,7 +322,8 @@ struct Simulator::Implementation {
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
         scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
-        sim::cause_of_blow_up(shot, scene, state, solver->density(), {particle, i}, time, dt)));
+        sim::cause_of_blow_up(shot, scene, state, solver->density(), told_full, {particle, i}, time,
+                              dt)));
   }
 
   /// What emitters added, sinks took and open sides let go since the last report.

@@ -115,7 +115,7 @@ TEST(Density, OfOneParticleIsItsOwnKernel) {
 TEST(Density, NoParticlesAreNoError) {
   Shot shot = empty_shot();
   FluidEmitter later;
-  later.center = V3d(0), later.radius = 0.05, later.speed = 1, later.start = 100;
+  later.center = V3d(0), later.radius = 0.05, later.speed = 1, later.start = 1;
   shot.fluid.emitter.push_back(later);
   Stepper run(shot);
   run.solver->refresh();

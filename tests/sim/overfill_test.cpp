@@ -118,14 +118,14 @@ TEST(Overfill, RoomIsWhatObstaclesLeave) {
   Shot shot = overfilled();
   EXPECT_EQ(sim::build_scene(shot).report.particles, 1440u);
   sim::Scene scene = sim::build_scene(shot);
-  EXPECT_NEAR(sim::room_of(shot, scene), 1728, 1e-6);
+  EXPECT_NEAR(sim::room_of(shot, scene, sim::Counted::standing, 0), 1728, 1e-6);
   Obstacle& block = add_obstacle(shot, ObstacleType::box, V3d(0.15, 0.025, 0.15));
   block.size = V3d(0.1, 0.05, 0.1);
   scene = sim::build_scene(shot);
-  EXPECT_NEAR(sim::room_of(shot, scene), 1728 - 4 * 2 * 4, 1e-6);
+  EXPECT_NEAR(sim::room_of(shot, scene, sim::Counted::standing, 0), 1728 - 4 * 2 * 4, 1e-6);
   shot.domain.axis[1] = Axis::open;
   scene = sim::build_scene(shot);
-  EXPECT_GT(sim::room_of(shot, scene), 1e20);
+  EXPECT_GT(sim::room_of(shot, scene, sim::Counted::standing, 0), 1e20);
 }
 
 // Nothing but the state decides: a run that goes on from a checkpoint has the same bits.
@@ -150,7 +150,8 @@ TEST(Overfill, ResumedWhileFullIsTheSame) {
 std::string cause(const Shot& shot, sim::Scene& scene, const sim::HostState& state,
                   const sim::Culprit& culprit) {
   return sim::cause_of_blow_up(shot, scene, state, std::vector<float>(state.id.size(), 1000.f),
-                               culprit, 0.1, 1e-4);
+                               std::vector<bool>(shot.fluid.emitter.size(), false), culprit, 0.1,
+                               1e-4);
 }
 
 TEST(BlowUpCause, IsTheInletOfAFullDomain) {
@@ -161,6 +162,50 @@ TEST(BlowUpCause, IsTheInletOfAFullDomain) {
   state.id.resize(1720);
   const std::string text = cause(shot, scene, state, {});
   EXPECT_NE(text.find("100 % full: fluid.emitter[0]"), std::string::npos) << text;
+}
+
+// One that had no room a moment before, though the domain has.
+TEST(BlowUpCause, IsAnInletThatHadNoRoom) {
+  const Shot shot = overfilled();
+  sim::Scene scene = sim::build_scene(shot);
+  const sim::HostState state = scene.start;
+  const std::vector<float> density(state.id.size(), 1000.f);
+  const auto text = [&](bool crowded) {
+    return sim::cause_of_blow_up(shot, scene, state, density, {crowded}, {}, 0.1, 1e-4);
+  };
+  EXPECT_EQ(text(false).find("emitter"), std::string::npos);
+  EXPECT_NE(text(true).find("fluid.emitter[0] had no room"), std::string::npos);
+}
+
+// A lid that is pressed into a box of water: it slides along the walls and closes on none of them.
+TEST(BlowUpCause, IsALidThatLeavesNoRoom) {
+  Shot shot = overfilled();
+  shot.fluid.emitter.clear();
+  Obstacle& lid = add_obstacle(shot, ObstacleType::box, V3d(0));
+  lid.name = "lid", lid.size = V3d(0.3, 0.1, 0.3);
+  lid.position.keys = {{1001, V3d(0.15, 0.31, 0.15)}, {1003, V3d(0.15, 0.27, 0.15)}};
+  sim::Scene scene = sim::build_scene(shot);
+  sim::HostState state = scene.start;
+  state.position.x[0] = scene.frame.to_local(0, 0.01);
+  state.position.y[0] = scene.frame.to_local(1, 0.21);
+  state.velocity.y[0] = 0;
+  const std::string text = cause(shot, scene, state, {true, 0});
+  EXPECT_NE(text.find("leaves room for 12"), std::string::npos) << text;
+  EXPECT_NE(text.find("obstacle \"lid\""), std::string::npos) << text;
+  state.id.resize(1000);
+  const std::string calm = cause(shot, scene, state, {true, 0});
+  EXPECT_EQ(calm.find("closes on"), std::string::npos) << calm;
+}
+
+// A tank that is open at its top is no vessel, however an inlet presses.
+TEST(Overfill, InletAtTheBottomOfAHalfFullTankSends) {
+  Shot shot = overfilled();
+  shot.domain.max.y = 40 * a;
+  shot.fluid.emitter[0].center = V3d(0.15, a, 0.15), shot.fluid.emitter[0].direction = V3d(0, 1, 0);
+  shot.fluid.emitter[0].speed = 1;
+  const Ran ran = run(shot, 4);
+  EXPECT_EQ(ran.log.find("no room"), std::string::npos) << ran.log;
+  EXPECT_GT(ran.emitted, 100u);
 }
 
 // A ball that comes down on the floor, and one that stands there.

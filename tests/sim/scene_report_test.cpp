@@ -59,10 +59,12 @@ TEST(SceneReport, CountsWhatSourcesLoseToObstacles) {
   EXPECT_EQ(few.source[0].in_obstacles(), 32u);
   EXPECT_EQ(few.particles, 968u);
   EXPECT_EQ(sim::warnings_of(few), std::vector<std::string>{});
-  shot.obstacle[0].size = V3d(0.16);  // four layers of eight by eight: 2.05 of 8 litres
+  shot.obstacle[0].size = V3d(0.16);  // four layers of eight by eight, as a rock in a pool
+  EXPECT_EQ(warnings(shot), std::vector<std::string>{});
+  shot.obstacle[0].size = V3d(0.24);  // six layers of ten by ten: 4.8 of 8 litres
   const std::vector<std::string> said = warnings(shot);
   ASSERT_EQ(said.size(), 1u);
-  expect_words(said[0], {"fluid.box[0]", "256 particles", "2.05 litres", "26 %", "\"solid\""});
+  expect_words(said[0], {"fluid.box[0]", "600 particles", "4.8 litres", "60 %", "\"solid\""});
 }
 
 TEST(SceneReport, RefusesASourceThatIsAllInAnObstacle) {
@@ -130,6 +132,35 @@ TEST(SceneReport, WarnsOfAnInletThatIsPartlyBlockedOrOutOfTime) {
   said = warnings(shot);
   ASSERT_EQ(said.size(), 1u);
   expect_words(said[0], {"% of fluid.emitter[0] sends nothing", "\"solid\""});
+}
+
+// Probes in a solid, on one but given in the world's coordinates, and of one that is not there.
+TEST(SceneReport, WarnsOfProbesThatNeverRead) {
+  Shot shot = block_shot();
+  add_solid(shot, V3d(0.5, 0, 0.5), 0.4);
+  Probe probe;
+  const auto said = [&](ProbeType type, const V3d& position) {
+    probe.type = type, probe.position = position;
+    shot.probe = {probe};
+    const std::vector<std::string> all = warnings(shot);
+    return all.empty() ? std::string() : all.at(0);
+  };
+  for (const ProbeType type : {ProbeType::velocity, ProbeType::pressure}) {
+    expect_words(said(type, V3d(0.5, 0, 0.5)), {"can never read", "\"solid\""});
+    EXPECT_EQ(said(type, V3d(0.5, 0.2, 0.5)), "");
+  }
+  EXPECT_EQ(said(ProbeType::height, V3d(0.5, 0, 0.5)), "");
+  shot.obstacle[0].size.y = 10;
+  expect_words(said(ProbeType::height, V3d(0.5, 0, 0.5)), {"can never read", "\"solid\""});
+  shot.obstacle[0].size.y = 0.4;
+  probe.on = "solid";
+  expect_words(said(ProbeType::pressure, V3d(0.9, 0.9, 0.9)),
+               {"can never read", "own coordinates"});
+  EXPECT_EQ(said(ProbeType::pressure, V3d(0.2, 0, 0)), "");
+  probe.on.clear(), probe.target = "solid";
+  EXPECT_EQ(said(ProbeType::force, V3d(0)), "");
+  shot.obstacle[0].position = V3d(3, 0, 0);
+  expect_words(said(ProbeType::force, V3d(0)), {"can never read", "beyond the domain"});
 }
 
 // Against what the solver allocates, and against the steps of the first frames.

@@ -1,0 +1,12 @@
+#pragma once
+// Where sheets may start: between the walls, outside obstacles, apart from the fluid.
+
+#include "sim/scene.h"
+
+namespace drench::sim {
+
+/// @throws Error with cloth, place, and what to move if a sheet starts beyond walls or in an
+/// obstacle, or fluid starts nearer to a sheet than a quarter spacing.
+void check_cloth_start(const Shot& shot, Scene& scene);
+
+}  // namespace drench::sim

@@ -1,0 +1,76 @@
+// Where sheets may start, beside walls and fluid.
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/error.h"
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+constexpr double a = 0.025;  // m
+
+/// A tank of 0.5 m, half full.
+Shot tank_shot() {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  shot.fluid.spacing = a, shot.fluid.solver = FluidSolver::incompressible;
+  shot.domain.min = V3d(-0.25, 0, -0.25), shot.domain.max = V3d(0.25, 0.5, 0.25);
+  shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
+  add_box(shot, V3d(-0.25, 0, -0.25), {20, 8, 20});
+  return shot;
+}
+
+std::string refusal(const Shot& shot) {
+  try {
+    sim::build_scene(shot);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Walls would sweep it in within the first step.
+TEST(ClothStart, BeyondAWallIsRefused) {
+  Shot shot = empty_shot();
+  shot.domain.axis[0] = Axis::walls;  // at 1 m
+  Cloth& sheet = add_sheet(shot, 0.4, 0, 8);
+  EXPECT_EQ(refusal(shot), "");
+  sheet.corner.x = 0.61;
+  const std::string text = refusal(shot);
+  EXPECT_NE(text.find("starts beyond the domain's walls"), std::string::npos) << text;
+  EXPECT_NE(text.find("1.01 m in x"), std::string::npos) << text;
+  shot.domain.axis[0] = Axis::open;
+  EXPECT_EQ(refusal(shot), "");
+}
+
+// Walls keep a sheet a quarter spacing off, which is a quarter before the first particles: there is
+// no room below these. On the floor it threw the pool up to twice its energy.
+TEST(ClothStart, UnderAPoolOnItsFloorOrWallIsRefused) {
+  for (const double height : {0., 0.1 * a, 0.25 * a}) {
+    Shot shot = tank_shot();
+    add_sheet(shot, 0.4, height, 16);
+    EXPECT_NE(refusal(shot).find("fluid starts inside cloth"), std::string::npos) << height;
+  }
+  Shot wall = tank_shot();
+  Cloth& curtain = add_sheet(wall, 0.4, 0, 16);
+  curtain.corner = V3d(-0.25, 0.02, -0.2), curtain.u = V3d(0, 0.4, 0), curtain.v = V3d(0, 0, 0.4);
+  EXPECT_NE(refusal(wall).find("fluid starts inside cloth"), std::string::npos);
+  Shot above = tank_shot();
+  add_sheet(above, 0.4, 8 * a + 0.5 * a, 16);
+  EXPECT_EQ(refusal(above), "");
+}
+
+// Only where there are particles is a sheet compared with them: kilometres of it cost nothing.
+TEST(ClothStart, OfASheetFarLargerThanTheFluidIsKnownAtOnce) {
+  Shot shot = tank_shot();
+  shot.domain.axis = {Axis::open, Axis::open, Axis::open};
+  Cloth& sheet = add_sheet(shot, 40000, 0, 8);
+  sheet.u.y = 30000, sheet.v.y = 20000, sheet.corner.y = -25000 + 0.1;  // its middle is in the pool
+  EXPECT_NE(refusal(shot).find("fluid starts inside cloth"), std::string::npos);
+  shot.cloth[0].corner.y = 2;
+  EXPECT_EQ(refusal(shot), "");
+}
+
+}  // namespace
+}  // namespace drench::sim_tests
