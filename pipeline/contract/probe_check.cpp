@@ -48,7 +48,10 @@ class ProbeChecker {
     const Domain& domain = shot_.domain;
     const double slack = 0.5 * shot_.fluid.spacing + 1e-9;
     for (const int k : axes) {
-      if (domain.axis[size_t(k)] == Axis::open) continue;
+      if (domain.axis[size_t(k)] == Axis::open) {
+        check_beside_open_side(k, std::max(reach[k], probe_.radius));
+        continue;
+      }
       // Its images are seen across a seam, but each particle once.
       if (domain.axis[size_t(k)] == Axis::periodic) {
         if (2 * reach[k] <= domain.max[k] - domain.min[k] + 1e-9) continue;
@@ -65,6 +68,17 @@ class ProbeChecker {
                        "at {} and {} m, where no fluid comes. Move it, or widen [domain]",
                        path_, probe_.name, low, high, "xyz"[k], domain.min[k], domain.max[k]));
     }
+  }
+
+  /// What is a spacing beyond an open side is dropped.
+  void check_beside_open_side(int k, double reach) const {
+    const Domain& domain = shot_.domain;
+    const double x = probe_.position[k], most = reach + shot_.fluid.spacing;
+    if (x >= domain.min[k] - most && x <= domain.max[k] + most) return;
+    fail("position",
+         fmt::format("{} \"{}\" is at {:.6g} m in {}, beyond the domain's open sides at {} and {} "
+                     "m, where fluid is dropped. Move it, or widen [domain]",
+                     path_, probe_.name, x, "xyz"[k], domain.min[k], domain.max[k]));
   }
 
   void check_direction(const char* key, const V3d& direction) const {
@@ -96,10 +110,20 @@ class ProbeChecker {
 
   void check_target() const {
     if (const auto wall = wall_named(probe_.target)) {
-      if (shot_.domain.axis[size_t(wall->axis)] == Axis::walls) return;
-      fail("target", fmt::format("{}.target is \"{}\", but domain.{} is \"open\": there is no "
-                                 "wall. Use \"walls\", or another target",
-                                 path_, probe_.target, "xyz"[wall->axis]));
+      const bool sheet = std::any_of(shot_.cloth.begin(), shot_.cloth.end(),
+                                     [&](const Cloth& c) { return c.name == probe_.target; });
+      if (sheet || obstacle_named(shot_, probe_.target)) {
+        fail("target",
+             fmt::format("{}.target is \"{}\", which is a wall of the domain and the name "
+                         "of {}; rename that",
+                         path_, probe_.target, sheet ? "a sheet" : "an obstacle"));
+      }
+      const Axis axis = shot_.domain.axis[size_t(wall->axis)];
+      if (axis == Axis::walls) return;
+      fail("target", fmt::format("{}.target is \"{}\", but domain.{} is \"{}\": there is no wall. "
+                                 "Use \"walls\", or another target",
+                                 path_, probe_.target, "xyz"[wall->axis],
+                                 axis == Axis::open ? "open" : "periodic"));
     }
     if (const auto obstacle = obstacle_named(shot_, probe_.target)) {
       for (const Cloth& cloth : shot_.cloth) {

@@ -13,6 +13,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/printable.h"
 #include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/view_check.h"
 #include "pipeline/driver/device.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/frame_range.h"
@@ -83,6 +84,12 @@ void write_shot_lock(const Job& job, Manifest& manifest) {
 struct Counts {
   int ran = 0, skipped = 0;
 };
+
+bool renders(const Plan& plan) {
+  return std::any_of(plan.tasks.begin(), plan.tasks.end(), [](const Task& task) {
+    return task.step == Step::render && task.action != Action::skip;
+  });
+}
 
 Counts count_of(const Plan& plan) {
   Counts counts;
@@ -162,6 +169,7 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
     if (again.drops_inputs_of(job.wanted, plan)) continue;
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
+    if (attempt == 1 && renders(plan)) warn_of_empty_pictures(job.shot);
     write_shot_lock(job, manifest);
     if (plan.nothing_to_do()) return plan;
     try {
@@ -219,6 +227,7 @@ void plan_command(const ShotArguments& arguments) {
   const Manifest manifest(job.folder / layout::manifest);
   Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
   for (const std::string& warning : plan.warnings) log_warning("driver", warning);
+  if (renders(plan)) warn_of_empty_pictures(job.shot);
   std::string text = plan_text(plan), scene_object;
   if (plan.simulation.needed) {
     const sim::Scene scene = sim::build_scene(job.shot, level_sets_within(arguments.memory_gib));
@@ -227,11 +236,7 @@ void plan_command(const ShotArguments& arguments) {
     text += scene_text(scene.report);
     scene_object = json_line(scene_json(scene.report));
   }
-  const auto renders = [](const Task& task) {
-    return task.step == Step::render && task.action != Action::skip;
-  };
-  if (std::any_of(plan.tasks.begin(), plan.tasks.end(), renders))
-    check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
+  if (renders(plan)) check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
   print(printable(text, Lines::many));

@@ -301,6 +301,13 @@ TEST_F(ShotError, NamesBadProbes) {
        {"scene.toml:6", "normal", "no direction"}},
       {"[domain]\nx = \"periodic\"\n[[probe]]\ntype = \"pressure\"\nradius = 1.2\n",
        {"scene.toml:8", "2.4 m wide in x", "period of 2 m", "at most 1 m"}},
+      {"[domain]\nx = \"open\"\n[[probe]]\ntype = \"height\"\nposition = [5, 0, 0]\n",
+       {"scene.toml:8", "beyond the domain's open sides", "dropped"}},
+      {"[domain]\nx = \"periodic\"\n[[probe]]\ntype = \"force\"\ntarget = \"x_low\"\n",
+       {"scene.toml:8", "domain.x is \"periodic\"", "no wall"}},
+      {"[[obstacle]]\ntype = \"sphere\"\nname = \"y_low\"\n[[probe]]\ntype = \"force\"\n"
+       "target = \"y_low\"\n",
+       {"scene.toml:9", "a wall of the domain and the name of an obstacle", "rename"}},
       {"[[probe]]\ntype = \"front\"\ndirection = [0, 0, 0]\n",
        {"scene.toml:6", "direction", "no direction"}},
       {"[[obstacle]]\ntype = \"sphere\"\nname = \"ball\"\n[[probe]]\ntype = \"velocity\"\n"

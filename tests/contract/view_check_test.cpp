@@ -1,0 +1,93 @@
+// Lights and cameras that can show nothing, and those that only look so.
+
+#include "pipeline/contract/view_check.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/log.h"
+#include "pipeline/contract/shot_file.h"
+
+namespace drench {
+namespace {
+
+/// Texts of all warnings of a pool in a tank of 1 m with more of a shot behind it.
+std::string warned(const std::string& more) {
+  forget_warnings();
+  testing::internal::CaptureStderr();
+  const Shot shot = parse_shot(R"(
+[domain]
+min = [0, 0, 0]
+max = [1, 1, 1]
+[fluid]
+spacing = 0.05
+[[fluid.box]]
+min = [0, 0, 0]
+max = [1, 0.3, 1]
+)" + more,
+                               "pool.toml");
+  warn_of_empty_pictures(shot);
+  testing::internal::GetCapturedStderr();
+  std::string all;
+  for (const LoggedWarning& warning : logged_warnings()) all += warning.text + "\n";
+  forget_warnings();
+  return all;
+}
+
+constexpr const char* sky = "[[light]]\ntype = \"environment\"\n";
+std::string camera(const char* position, const char* target) {
+  return std::string("[camera]\nposition = ") + position + "\ntarget = " + target + "\n";
+}
+bool tells(const std::string& text, const char* word) {
+  return text.find(word) != std::string::npos;
+}
+
+TEST(Views, OfAPoolUnderASkyAreFine) { EXPECT_EQ(warned(sky), ""); }
+
+TEST(Views, WithoutAnyLightAreBlack) {
+  EXPECT_TRUE(tells(warned(""), "there is no light"));
+  EXPECT_EQ(warned("[[material]]\nname = \"lamp\"\nemission = [1, 1, 1]\n[[obstacle]]\ntype = "
+                   "\"sphere\"\nradius = 0.1\nposition = [0.5, 0.7, 0.5]\nmaterial = \"lamp\"\n"),
+            "");
+}
+
+// horizon and below multiply the radiance.
+TEST(Lights, OfRadianceZeroAreBlackWhateverTheRestSays) {
+  EXPECT_TRUE(tells(warned(std::string(sky) + "radiance = [0, 0, 0]\n"), "is black"));
+}
+
+TEST(Lights, ThatFaceTheCameraAloneAreInThePicture) {
+  const std::string panel =
+      std::string(sky) +
+      "[[light]]\ntype = \"rectangle\"\ncenter = [0.5, 0.5, 2]\nu = [0.1, 0, 0]\nv = [0, 0.1, 0]\n";
+  EXPECT_EQ(warned(panel + camera("[0.5, 0.5, 4]", "[0.5, 0.5, 0]")), "");
+  EXPECT_TRUE(tells(warned(panel + camera("[0.5, 0.5, 1.5]", "[0.5, 0.5, 0]")), "shines away"));
+}
+
+// A low sun comes in beside a small ground, and not through a large one.
+TEST(Lights, OfASunFromBelowAreHiddenByAGroundThatIsLargeEnough) {
+  const std::string sun =
+      "[[light]]\ntype = \"sun\"\ndirection = [1, 0.1, 0]\n[ground]\nheight = -0.1\nhalf_size = ";
+  EXPECT_EQ(warned(sun + "5\n"), "");
+  EXPECT_TRUE(tells(warned(sun + "50\n"), "from under the ground"));
+}
+
+TEST(Cameras, InASolidUnderTheGroundOrTurnedAwayAreSaid) {
+  const std::string block = std::string(sky) +
+                            "[[obstacle]]\ntype = \"box\"\nname = \"block\"\nposition = [0.5, 0.5, "
+                            "3]\nsize = [1, 1, 1]\n";
+  EXPECT_TRUE(
+      tells(warned(block + camera("[0.5, 0.5, 2.9]", "[0.5, 0, 0.5]")), "stands in obstacle"));
+  EXPECT_EQ(warned(block + camera("[0.5, 0.5, 2.4]", "[0.5, 0, 0.5]")), "");
+  // It comes out before the shot ends.
+  EXPECT_EQ(
+      warned(block + camera("[[1001, [0.5, 0.5, 2.9]], [1048, [0.5, 0.5, 2.4]]]", "[0.5, 0, 0.5]")),
+      "");
+  EXPECT_TRUE(tells(warned(std::string(sky) + camera("[0.5, 0.5, 3]", "[0.5, 0.5, 9]")),
+                    "looks away from all there is"));
+  EXPECT_TRUE(tells(warned(std::string(sky) + "[ground]\nheight = -0.1\n" +
+                           camera("[0.5, -0.2, 3]", "[0.5, 0.5, 0]")),
+                    "under the ground"));
+}
+
+}  // namespace
+}  // namespace drench
