@@ -246,6 +246,8 @@ struct JoinLimits {
 
 }  // namespace
 
+std::span<const Pass> every_pass() { return all_passes; }
+
 std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
   std::vector<Pass> plan;
   for (const Pass& pass : all_passes) {

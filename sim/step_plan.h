@@ -1,6 +1,8 @@
 #pragma once
 // The passes of a step in order. A pass that is not in the plan costs no memory and no launch.
 
+#include <span>
+
 #include "sim/solver.h"
 #include "sim/state.h"
 
@@ -13,7 +15,9 @@ struct Pass {
   void (*launch)(State& state);
 };
 
-/// Every pass there is, in order; the plan of a shot is those whose `when` holds.
+/// Every pass there is, in order.
+std::span<const Pass> every_pass();
+/// The plan of a shot: those whose `when` holds.
 std::vector<Pass> step_plan(const Parameters& parameters, bool cloth);
 
 /// A step of cloth that no fluid touches.

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
+#include "pipeline/contract/shot_file.h"
 #include "sim/probe_series.h"
+#include "sim/step_plan.h"
 #include "tests/sim/same_state.h"
 #include "tests/sim/support.h"
 
@@ -47,6 +50,24 @@ TEST(Skip, EachCouplingBringsItsOwnPassesOnly) {
     }
     EXPECT_EQ((run.solver->allocated() & sim::column_memory) != 0, !published);
   }
+}
+
+// So that a change of any pass shows in the digests of tests/bits.
+TEST(Passes, AreAllUsedByTheShotsWhoseBitsAreKept) {
+  std::set<std::string> used;
+  for (const auto& entry : std::filesystem::directory_iterator(DRENCH_SOURCE_DIR "/tests/bits")) {
+    if (entry.path().extension() != ".toml") continue;
+    Shot shot = read_shot(entry.path(), {});
+    // A mesh needs OpenVDB, which these tests do not link; a ball takes the same passes.
+    for (Obstacle& obstacle : shot.obstacle)
+      if (obstacle.type == ObstacleType::mesh)
+        obstacle.type = ObstacleType::sphere, obstacle.radius = obstacle.scale;
+    shot.fluid.volume.clear();
+    for (const sim::PassInfo& pass : Stepper(shot).solver->plan()) used.insert(pass.name);
+  }
+  std::set<std::string> all;
+  for (const sim::cpu::Pass& pass : sim::cpu::every_pass()) all.insert(pass.name);
+  EXPECT_EQ(used, all);
 }
 
 std::set<std::string> names(const std::vector<sim::PassInfo>& plan) {
