@@ -25,13 +25,8 @@ class ObjReader {
         }) {}
 
   TriangleMesh read() {
-    // Lines of old Macintoshes end with a carriage return alone.
-    if (text_.find('\n') == std::string_view::npos) end_of_line_ = '\r';
     std::string joined;
-    while (!text_.empty()) {
-      const std::string_view line = next_line(joined);
-      read_line(line.substr(0, line.find('#')));
-    }
+    while (!is_at_end()) read_line(next_line(joined));
     if (faces_ == 0) fail("has no faces; a triangle mesh is expected");
     warn();
     return builder_.finish();
@@ -42,22 +37,39 @@ class ObjReader {
     throw Error(fmt::format("{}:{}: {}. Export the mesh again", path_.string(), line_, why));
   }
 
+  bool is_at_end() const { return text_.empty() && block_.empty(); }
+
+  /// Ends with a line feed, a carriage return or both; without its comment and blanks at its end.
+  std::string_view take_line() {
+    if (block_.empty()) {
+      block_ = text_.substr(0, text_.find('\n'));
+      text_.remove_prefix(std::min(block_.size() + 1, text_.size()));
+    }
+    ++line_;
+    std::string_view line = block_.substr(0, block_.find('\r'));
+    block_.remove_prefix(std::min(line.size() + 1, block_.size()));
+    line = line.substr(0, line.find('#'));
+    return line.substr(0, line.find_last_not_of(" \t") + 1);
+  }
+
+  /// Whether what follows says something of the mesh; names may end with a backslash of their own.
+  static bool is_read(std::string_view line) {
+    const std::string_view keyword = take_word(line);
+    return keyword == "v" || keyword == "vt" || keyword == "vn" || keyword == "f" ||
+           keyword == "fo";
+  }
+
   /// One logical line: a backslash at the end joins the next.
   std::string_view next_line(std::string& joined) {
+    std::string_view line = take_line();
+    if (!line.ends_with('\\') || !is_read(line)) return line;
     joined.clear();
-    while (true) {
-      ++line_;
-      std::string_view line = text_.substr(0, text_.find(end_of_line_));
-      text_.remove_prefix(std::min(line.size() + 1, text_.size()));
-      while (line.ends_with('\r')) line.remove_suffix(1);
-      if (!line.ends_with('\\') || text_.empty()) {
-        if (joined.empty()) return line;
-        return joined += line;
-      }
+    for (; line.ends_with('\\'); line = is_at_end() ? std::string_view() : take_line()) {
       line.remove_suffix(1);
       joined += line;
       joined += ' ';
     }
+    return joined += line;
   }
 
   static std::string_view take_word(std::string_view& line) {
@@ -152,8 +164,7 @@ class ObjReader {
   }
 
   const fs::path& path_;
-  std::string_view text_;
-  char end_of_line_ = '\n';
+  std::string_view text_, block_;  // what is left; of it up to a line feed
   int line_ = 0;
   uint64_t faces_ = 0, curved_ = 0;
   NumberReader number_;

@@ -165,21 +165,30 @@ class PlyReader {
     return {std::string(words[4]), type_of(words[3]), count};
   }
 
-  PlyHeader read_header() const {
+  /// A line of the header; empty if it is a comment.
+  std::string_view header_line(size_t& at, char end_of_line) const {
+    const size_t end = text_.find(end_of_line, at);
+    if (end == std::string_view::npos) fail("has no whole PLY header");
+    std::string_view line = text_.substr(at, end - at);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    at = end + 1;
+    if (line.starts_with("comment") || line.starts_with("obj_info")) return {};
     constexpr size_t longest = 1 << 16;
-    const std::string_view head = text_.substr(0, longest);
+    if (line.size() > longest) fail("has a header line that is too long to be one");
+    return line;
+  }
+
+  PlyHeader read_header() const {
     PlyHeader header;
+    // Binary data may begin with a line feed: the first line says how those of the header end.
+    const char end_of_line =
+        text_.starts_with("ply\r") && !text_.starts_with("ply\r\n") ? '\r' : '\n';
+    if (words_of(header_line(header.body, end_of_line)) != std::vector<std::string_view>{"ply"})
+      fail("is not a PLY file");
     bool format = false;
-    size_t at = 0;
-    for (int line_number = 0;; ++line_number) {
-      const size_t end = head.find('\n', at);
-      if (end == std::string_view::npos) fail("has no whole PLY header");
-      const auto words = words_of(head.substr(at, end - at));
-      at = end + 1;
-      if (line_number == 0 && (words.size() != 1 || words[0] != "ply")) fail("is not a PLY file");
-      if (words.empty() || words[0] == "comment" || words[0] == "obj_info" || line_number == 0) {
-        continue;
-      }
+    while (true) {
+      const auto words = words_of(header_line(header.body, end_of_line));
+      if (words.empty()) continue;
       if (words[0] == "end_header") break;
       if (words[0] == "format") {
         read_format(words, header);
@@ -193,7 +202,6 @@ class PlyReader {
       }
     }
     if (!format) fail("has no format line");
-    header.body = at;
     return header;
   }
 
@@ -263,8 +271,12 @@ class PlyReader {
 
   uint64_t next_count(Type type) {
     const double count = next_value(type);
-    if (!(count >= 0) || count != std::floor(count) || count > double(rest_.size()) + 1) {
-      fail("has a list with an impossible length");
+    if (!(count >= 0) || count != std::floor(count)) fail("has a list with an impossible length");
+    if (count > double(rest_.size())) {
+      fail(
+          fmt::format("has a list of {} numbers, but the file is too short for them: cut off or "
+                      "damaged",
+                      count));
     }
     return uint64_t(count);
   }
