@@ -15,7 +15,7 @@ namespace drench {
 /// Takes faces as a file has them and says what it left out or mended.
 class MeshBuilder {
  public:
-  static constexpr uint32_t none = 0xffffffff;
+  static constexpr uint32_t none = 0xffffffff, nowhere = none - 1;  // an index beyond all
 
   /// A corner of a face: its vertex, and its own texture coordinate and normal if it has them.
   struct Corner {
@@ -38,9 +38,8 @@ class MeshBuilder {
 
   /// Vertices of which corners differ in texture coordinate or normal are split: the first kind
   /// keeps the file's index, others follow after the last vertex, and `point` says whose they are.
-  /// @throws Error if a face names a vertex, texture coordinate or normal that is not there, a
-  ///         vertex of a face is not finite, or a polygon crosses itself, or is not convex and has
-  ///         more than most_corners.
+  /// @throws Error if a face names a vertex that is not there, a vertex of a face is not finite, or
+  ///         a polygon crosses itself, or is not convex and has more than most_corners.
   TriangleMesh finish();
 
  private:
@@ -55,6 +54,7 @@ class MeshBuilder {
   void check_vertices() const;
   void mend_columns();
   void fill_normals();
+  void drop_lost_indices();
   void split_vertices();
   void warn() const;
 
@@ -65,7 +65,8 @@ class MeshBuilder {
   std::vector<Corner> polygon_corner_;
   std::vector<Corner> corner_;  // three a triangle, unless none are wanted
   bool by_corner_ = false;
-  uint64_t short_faces_ = 0, without_uv_ = 0, bad_uv_ = 0, bad_normals_ = 0, bad_values_ = 0;
+  uint64_t short_faces_ = 0, lost_corners_ = 0, without_uv_ = 0, bad_uv_ = 0, bad_normals_ = 0,
+           bad_values_ = 0;
   uint64_t first_short_face_ = 0;
 };
 

@@ -114,7 +114,8 @@ class ObjReader {
                            "place and a point in another could mean two things"));
   }
 
-  /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far.
+  /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far; one
+  /// that no file has if it counts back too far.
   uint32_t index_of(std::string_view word, size_t count) const {
     int64_t index = 0;
     const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), index);
@@ -123,10 +124,8 @@ class ObjReader {
                        word.substr(0, 40)));
     }
     index += index < 0 ? int64_t(count) : -1;
-    if (index < 0 || index >= int64_t(MeshBuilder::none)) {
-      fail(fmt::format("has an index '{}' outside the file's vertices", word.substr(0, 40)));
-    }
-    return uint32_t(index);
+    const bool is_possible = index >= 0 && index < int64_t(MeshBuilder::nowhere);
+    return is_possible ? uint32_t(index) : MeshBuilder::nowhere;
   }
 
   MeshBuilder::Corner read_corner(std::string_view word) {
@@ -136,7 +135,10 @@ class ObjReader {
       word.remove_prefix(std::min(part.size() + 1, word.size()));
       return part;
     };
-    corner.vertex = index_of(next_part(), builder_.mesh.position.size());
+    const std::string_view vertex = next_part();
+    corner.vertex = index_of(vertex, builder_.mesh.position.size());
+    if (corner.vertex == MeshBuilder::nowhere)
+      fail(fmt::format("has an index '{}' outside the file's vertices", vertex.substr(0, 40)));
     if (const auto part = next_part(); !part.empty())
       corner.uv = index_of(part, builder_.uv.size());
     if (const auto part = next_part(); !part.empty())

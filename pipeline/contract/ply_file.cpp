@@ -386,7 +386,7 @@ class PlyReader {
           if (p.name == "contact") contact_.push_back(value != 0);
         }
       }
-      if (uv > 0) name_texcoord(corner, uv, row);
+      if (uv > 0) name_texcoord(corner, uv);
       builder_.add_face(corner, row);
     }
   }
@@ -404,12 +404,11 @@ class PlyReader {
     return n;
   }
 
-  void name_texcoord(std::vector<MeshBuilder::Corner>& corner, size_t n, uint64_t row) const {
-    if (n != 2 * corner.size())
-      fail(fmt::format("has a face {} of {} vertices with {} numbers of texcoord, {} are expected",
-                       row, corner.size(), n, 2 * corner.size()));
+  /// @param n  numbers that were read of the face's coordinates; two a corner, or none is taken.
+  void name_texcoord(std::vector<MeshBuilder::Corner>& corner, size_t n) const {
+    const bool fits = n == 2 * corner.size();
     for (size_t k = 0; k < corner.size(); ++k)
-      corner[k].uv = uint32_t(builder_.uv.size() - corner.size() + k);
+      corner[k].uv = fits ? uint32_t(builder_.uv.size() - corner.size() + k) : MeshBuilder::nowhere;
   }
 
   // Of polygons that were cut into triangles nobody knows which lies where.

@@ -236,6 +236,26 @@ TEST_F(ForeignMesh, WhatNobodyNeedsRefusesNothing) {
   EXPECT_NE(error.find("vertex 2 that is not finite"), std::string::npos) << error;
 }
 
+TEST_F(ForeignMesh, ATextureCoordinateThatIsNotThereIsNone) {
+  for (const std::string face : {"f 1/9 2/1 3/-7", "f 1//9 2//9 3//9", "f 1/9/9 2/1/1 3/1/1"}) {
+    forget_warnings();
+    const TriangleMesh mesh =
+        read("lost.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvn 0 1 0\n" + face + "\n");
+    EXPECT_EQ(mesh.triangle.size(), 1u);
+    EXPECT_NE(warnings().find("of 3 corners name a texture coordinate or normal that is not there"),
+              std::string::npos)
+        << warnings();
+    for (const Imath::V2f& uv : mesh.uv) EXPECT_TRUE(uv == Imath::V2f(0) || uv == Imath::V2f(0.5f));
+  }
+  forget_warnings();
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+      "property list uchar float texcoord\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 4 1 1 1 1\n";
+  EXPECT_TRUE(read("lost.ply", ply).uv.empty());
+  EXPECT_NE(warnings().find("3 of 3 corners"), std::string::npos) << warnings();
+}
+
 TEST_F(ForeignMesh, AFaceThatCrossesItselfIsNamed) {
   const std::string bow = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 3 4\n";
   const std::string error = error_of([&] { read("bow.obj", bow); });
