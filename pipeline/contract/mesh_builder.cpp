@@ -66,10 +66,12 @@ void MeshBuilder::add_face(std::span<const Corner> corner, uint64_t number) {
 
 void MeshBuilder::cut(const Polygon& polygon) {
   const std::span corner(polygon_corner_.data() + polygon.corner, polygon.corners);
+  const std::span<const Imath::V3f> at = cut_by_.empty() ? mesh.position : cut_by_;
   std::vector<Imath::V3f> position;
   for (const Corner& c : corner) {
     if (c.vertex >= mesh.position.size()) refuse_vertex(polygon.triangle, c.vertex);
-    position.push_back(mesh.position[c.vertex]);
+    if (c.vertex >= at.size()) fail("has faces of vertices that the first frame does not have");
+    position.push_back(at[c.vertex]);
     if (!finite(position.back())) fail(fmt::format("has a vertex {} that is not finite", c.vertex));
   }
   const auto triangles = triangulate(position);

@@ -23,9 +23,10 @@ class MeshBuilder {
   };
 
   /// @param place_of  a face's place in the file from its number: "file.obj:12"
+  /// @param cut_by  see read_mesh
   MeshBuilder(const std::filesystem::path& path, CornerData wanted,
-              std::function<std::string(uint64_t)> place_of)
-      : path_(path), wanted_(wanted), place_of_(std::move(place_of)) {}
+              std::span<const Imath::V3f> cut_by, std::function<std::string(uint64_t)> place_of)
+      : path_(path), wanted_(wanted), cut_by_(cut_by), place_of_(std::move(place_of)) {}
 
   /// Vertex columns, in the file's order; their triangles are left to add_face.
   TriangleMesh mesh;
@@ -60,6 +61,7 @@ class MeshBuilder {
 
   std::filesystem::path path_;
   CornerData wanted_;
+  std::span<const Imath::V3f> cut_by_;
   std::function<std::string(uint64_t)> place_of_;
   std::vector<Polygon> polygon_;
   std::vector<Corner> polygon_corner_;

@@ -19,8 +19,9 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(const fs::path& path, std::string_view text, CornerData corners)
-      : path_(path), text_(text), builder_(path, corners, [&path](uint64_t line) {
+  ObjReader(const fs::path& path, std::string_view text, CornerData corners,
+            std::span<const Imath::V3f> cut_by)
+      : path_(path), text_(text), builder_(path, corners, cut_by, [&path](uint64_t line) {
           return fmt::format("{}:{}", path.string(), line);
         }) {}
 
@@ -176,8 +177,9 @@ class ObjReader {
 
 }  // namespace
 
-TriangleMesh read_obj(const fs::path& path, std::string_view text, CornerData corners) {
-  return ObjReader(path, text, corners).read();
+TriangleMesh read_obj(const fs::path& path, std::string_view text, CornerData corners,
+                      std::span<const Imath::V3f> cut_by) {
+  return ObjReader(path, text, corners, cut_by).read();
 }
 
 }  // namespace drench

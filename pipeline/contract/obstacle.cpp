@@ -81,8 +81,6 @@ double narrowest_gap(const TriangleMesh& mesh,
 
 /// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
 void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
-  if (mesh.triangle.empty())
-    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
   const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
   const auto open = free_edges(mesh, welded.first);
   if (!open.empty()) refuse_open(mesh, file, open);
@@ -200,7 +198,8 @@ TriangleMesh sphere_mesh(double radius) {
   return mesh;
 }
 
-TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
+                      const SequenceShape& shape) {
   switch (obstacle.type) {
     case ObstacleType::plane:
       return plane_mesh((shot.domain.max - shot.domain.min).length());
@@ -209,7 +208,7 @@ TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
     case ObstacleType::sphere:
       return sphere_mesh(obstacle.radius);
     case ObstacleType::mesh:
-      return read_obstacle_mesh(shot, obstacle, frame, CornerData::uv_and_normal);
+      return read_obstacle_mesh(shot, obstacle, frame, shape, CornerData::uv_and_normal);
   }
   throw std::logic_error("own_mesh: no such type");
 }
@@ -276,10 +275,18 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
   return pattern.parent_path() / name;
 }
 
-TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
-  TriangleMesh mesh = read_mesh(file, corners);
-  drop_unused_vertices(mesh, file);
+SequenceShape read_sequence_shape(const Shot& shot, const Obstacle& obstacle) {
+  if (!is_sequence(obstacle.mesh_file)) return {};
+  return read_mesh(sequence_file(obstacle.mesh_file, shot.timeline.first)).position;
+}
+
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners,
+                              const SequenceShape& shape) {
+  TriangleMesh mesh = read_mesh(file, corners, shape);
   close_gaps(mesh, file);
+  if (mesh.triangle.empty())
+    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
+  drop_unused_vertices(mesh, file);
   orient_shells(mesh);
   turn_normals(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
@@ -287,21 +294,35 @@ TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, C
 }
 
 TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
-                                CornerData corners) {
+                                const SequenceShape& shape, CornerData corners) {
   const bool sequence = is_sequence(obstacle.mesh_file);
   const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
-  return read_closed_mesh(file, obstacle.scale, corners);
+  return read_closed_mesh(file, obstacle.scale, corners, shape);
+}
+
+void check_obstacle_meshes(const Shot& shot) {
+  for (const Obstacle& o : shot.obstacle) {
+    if (o.type != ObstacleType::mesh) continue;
+    const SequenceShape shape = read_sequence_shape(shot, o);
+    const int first = shot.timeline.first;
+    const TriangleMesh mesh = read_obstacle_mesh(shot, o, first, shape, CornerData::uv_and_normal);
+    for (int frame = first + 1; !shape.empty() && frame <= shot.timeline.last; ++frame) {
+      check_same_topology(mesh,
+                          read_obstacle_mesh(shot, o, frame, shape, CornerData::uv_and_normal), o);
+    }
+  }
 }
 
 TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {
-  TriangleMesh mesh = own_mesh(shot, obstacle, frame);
   const bool deforms = obstacle.type == ObstacleType::mesh && is_sequence(obstacle.mesh_file);
+  const SequenceShape shape = deforms ? read_sequence_shape(shot, obstacle) : SequenceShape{};
+  TriangleMesh mesh = own_mesh(shot, obstacle, frame, shape);
   TriangleMesh before, after;
   if (deforms) {
-    before = read_obstacle_mesh(shot, obstacle, frame - 1);
-    after = read_obstacle_mesh(shot, obstacle, frame + 1);
+    before = read_obstacle_mesh(shot, obstacle, frame - 1, shape);
+    after = read_obstacle_mesh(shot, obstacle, frame + 1, shape);
     check_same_topology(mesh, before, obstacle), check_same_topology(mesh, after, obstacle);
   }
   const int between =
@@ -334,9 +355,11 @@ void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
   // Where vertices are split depends on a frame's normals; points do not.
   const std::vector<uint32_t> point = points_of(mesh), other_point = points_of(other);
   bool same = mesh.triangle.size() == other.triangle.size();
-  for (size_t k = 0; same && k < mesh.triangle.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      same &= point[mesh.triangle[k][c]] == other_point[other.triangle[k][c]];
+  for (size_t k = 0; same && k < mesh.triangle.size(); ++k) {
+    const Triangle &t = mesh.triangle[k], &u = other.triangle[k];
+    const uint32_t y = point[t.y], z = point[t.z], v = other_point[u.y], w = other_point[u.z];
+    same = point[t.x] == other_point[u.x] && ((y == v && z == w) || (y == w && z == v));
+  }
   if (same) return;
   throw Error(fmt::format(
       "obstacle \"{}\": the files of {} do not have the same triangles in every frame, so that "

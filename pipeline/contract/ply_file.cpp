@@ -61,10 +61,14 @@ constexpr std::array<std::string_view, 2> uv_names[] = {
 
 class PlyReader {
  public:
-  PlyReader(const fs::path& path, std::string_view text, CornerData corners)
-      : path_(path), text_(text), corners_(corners), builder_(path, corners, [&path](uint64_t row) {
-          return fmt::format("{}: face {}", path.string(), row);
-        }) {}
+  PlyReader(const fs::path& path, std::string_view text, CornerData corners,
+            std::span<const Imath::V3f> cut_by)
+      : path_(path),
+        text_(text),
+        corners_(corners),
+        builder_(path, corners, cut_by,
+                 [&path](uint64_t row) { return fmt::format("{}: face {}", path.string(), row); }) {
+  }
 
   TriangleMesh read() {
     const PlyHeader header = read_header();
@@ -465,8 +469,9 @@ class PlyReader {
 
 }  // namespace
 
-TriangleMesh read_ply(const fs::path& path, std::string_view text, CornerData corners) {
-  return PlyReader(path, text, corners).read();
+TriangleMesh read_ply(const fs::path& path, std::string_view text, CornerData corners,
+                      std::span<const Imath::V3f> cut_by) {
+  return PlyReader(path, text, corners, cut_by).read();
 }
 
 }  // namespace drench

@@ -11,6 +11,7 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/level_set.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/obstacle.h"
 #include "pipeline/contract/printable.h"
 #include "pipeline/contract/shot_file.h"
 #include "pipeline/driver/device.h"
@@ -227,6 +228,7 @@ void plan_command(const ShotArguments& arguments) {
     text += scene_text(scene.report);
     scene_object = json_line(scene_json(scene.report));
   }
+  if (!plan.nothing_to_do()) check_obstacle_meshes(job.shot);
   const auto renders = [](const Task& task) {
     return task.step == Step::render && task.action != Action::skip;
   };
