@@ -87,7 +87,7 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
   size_t moved = 0;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     const V3f& first = mesh.position[welded.first[v]];
-    if (mesh.position[v] == first) continue;
+    if (welded.first[v] == v || mesh.position[v] == first) continue;
     mesh.position[v] = first;
     ++moved;
   }
@@ -98,6 +98,20 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
                                  "distance",
                                  moved, welded.widest));
   }
+}
+
+/// Leaves out triangles of which two corners are at one place: they enclose nothing.
+void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
+  const auto& at = mesh.position;
+  const size_t dropped = std::erase_if(mesh.triangle, [&](const Triangle& t) {
+    return at[t.x] == at[t.y] || at[t.y] == at[t.z] || at[t.z] == at[t.x];
+  });
+  if (dropped == 0) return;
+  mesh.contact.clear();
+  log_file_warning("mesh", file,
+                   fmt::format("{} triangles with two corners at one place were left out; they "
+                               "enclose nothing. Merge its vertices by distance",
+                               dropped));
 }
 
 /// Leaves out vertices that no triangle has: they are no places of a solid.
@@ -284,6 +298,7 @@ TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, C
                               const SequenceShape& shape) {
   TriangleMesh mesh = read_mesh(file, corners, shape);
   close_gaps(mesh, file);
+  if (shape.empty()) drop_collapsed(mesh, file);
   if (mesh.triangle.empty())
     throw Error(file.string() + ": has no triangles; a solid or volume needs some");
   drop_unused_vertices(mesh, file);

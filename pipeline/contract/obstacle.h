@@ -43,7 +43,9 @@ using SequenceShape = std::vector<V3f>;
 SequenceShape read_sequence_shape(const Shot& shot, const Obstacle& obstacle);
 
 /// A closed mesh in its own coordinates times `scale`, m, turned away from what is solid: see
-/// shells.h. Gaps of less than weld_share of its diagonal are closed with a warning.
+/// shells.h. Gaps of less than weld_share of its diagonal are closed, and triangles of which two
+/// corners are at one place left out, with a warning; the latter are kept in a sequence, where they
+/// may open in another frame.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
                               CornerData corners = CornerData::none,

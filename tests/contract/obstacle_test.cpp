@@ -224,6 +224,27 @@ TEST_F(HouseSequence, KeepsTrianglesThatCollapseInAFrame) {
   }
 }
 
+TEST(ObstacleMesh, HasNoTrianglesWithTwoCornersAtOnePlace) {
+  const TemporaryFolder folder;
+  test::write_box(folder / "box.obj", V3f(1));
+  const std::string box = read_text(folder / "box.obj");
+  // Of one vertex twice; of two at one place, also as the poles of spheres are split.
+  for (const std::string more : {"f 1 1 2\n", "f 3 3 3\n", "v 0 0 0\nf 1 9 2\nf 9 1 2\n",
+                                 "v 5 5 5\nf 9 9 9\n", "v nan 0 0\nf 1 1 2\n"}) {
+    forget_warnings();
+    test::write_quickly(folder / "more.obj", box + more);
+    const TriangleMesh mesh = read_closed_mesh(folder / "more.obj", 1);
+    EXPECT_EQ(mesh.triangle.size(), 12u) << more;
+    EXPECT_EQ(mesh.position.size(), 8u) << more;
+    ASSERT_FALSE(logged_warnings().empty()) << more;
+    EXPECT_NE(logged_warnings()[0].text.find("with two corners at one place"), std::string::npos);
+  }
+  forget_warnings();
+  test::write_quickly(folder / "point.obj", "v 0 0 0\nv 1 0 0\nf 1 1 2\n");
+  EXPECT_THROW(read_closed_mesh(folder / "point.obj", 1), Error);
+  forget_warnings();
+}
+
 TEST(ObstacleMesh, IsTurnedOutward) {
   const TemporaryFolder folder;
   TriangleMesh inward = test::unit_sphere(6, 8);
