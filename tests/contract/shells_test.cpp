@@ -118,6 +118,22 @@ TEST(Shells, ApartEachIsTurnedOutwardByItself) {
               1e-5);
 }
 
+// A box in a box that sticks out of one of its sides, by a thousandth of its own volume or more, is
+// one body with it; by less it is a cavity. Which side makes no difference.
+TEST(Shells, StickOutAlongAnyAxisAlike) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool low : {false, true}) {
+      for (const float out : {0.0002f, 0.001f, 0.004f}) {
+        V3f from(-0.19f), to(0.19f);
+        (low ? from : to)[axis] = (0.2f + out) * (low ? -1.f : 1.f);
+        const Shells shells =
+            find_shells(joined(box_mesh(V3f(-0.2f), V3f(0.2f)), box_mesh(from, to)));
+        EXPECT_EQ(shells.bodies(), out / 0.39f > 1e-3f ? 1 : 2) << axis << " " << out;
+      }
+    }
+  }
+}
+
 // Two boxes that cross are their union, turned either way, also with faces in common planes, where
 // no edge crosses the inside of a face, and where they share a small corner of two long bars.
 TEST(Shells, CrossingOnesAreUnited) {
