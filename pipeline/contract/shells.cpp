@@ -163,6 +163,8 @@ class Nesting {
   Nesting(const TriangleMesh& mesh, Shells& shells);
   void find_bodies();
   void find_depths();
+  /// A shell of itself.
+  bool winds_twice(int shell) const;
 
  private:
   void measure_own_rays(int shell, int axis);
@@ -263,6 +265,16 @@ bool Nesting::overlap(int one, int other) const {
             found |= length > least && count.in_shell(one) && count.in_shell(other);
           });
   }
+  return found;
+}
+
+bool Nesting::winds_twice(int shell) const {
+  const Bounds& own = bounds_[size_t(shell)];
+  const double least = 1e-4 * (own.high.x - own.low.x);
+  bool found = false;
+  along(rays_through(own, {shell}, 0), shells_, [&](double length, const BodyCount& count) {
+    found |= length > least && std::abs(count.winding(shell)) > 1;
+  });
   return found;
 }
 
@@ -423,6 +435,15 @@ Shells find_shells(const TriangleMesh& mesh) {
   nesting.find_bodies();
   nesting.find_depths();
   return shells;
+}
+
+bool holds_twice(const TriangleMesh& mesh) {
+  Shells shells = find_shells(mesh);
+  if (shells.bodies() < shells.count()) return true;
+  const Nesting nesting(mesh, shells);
+  for (int s = 0; s < shells.count(); ++s)
+    if (nesting.winds_twice(s)) return true;
+  return false;
 }
 
 void orient_shells(TriangleMesh& mesh) {

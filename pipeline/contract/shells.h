@@ -30,6 +30,10 @@ struct Shells {
 /// so.
 Shells find_shells(const TriangleMesh& mesh);
 
+/// Whether a part of space is held more than once: by shells that cross, or by one that winds twice
+/// around it. The mesh's triangles then do not tell what its solid takes up.
+bool holds_twice(const TriangleMesh& mesh);
+
 /// Turns triangles so that they face away from the solid: each shell outward by itself, cavities
 /// inward. Normals stay as they are.
 void orient_shells(TriangleMesh& mesh);
@@ -75,7 +79,8 @@ class BodyCount {
         holders_(size_t(shells.bodies()), 0) {}
   void pass(const ShellRays::Crossing& crossing);
   bool inside() const { return holding_ % 2 == 1; }
-  bool in_shell(int shell) const { return winding_[size_t(shell)] != 0; }
+  bool in_shell(int shell) const { return winding(shell) != 0; }
+  int winding(int shell) const { return winding_[size_t(shell)]; }
 
  private:
   const Shells& shells_;

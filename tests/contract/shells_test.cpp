@@ -73,9 +73,6 @@ int wrong_places(const TriangleMesh& mesh, double voxel, const Holds& holds) {
   return wrong;
 }
 
-Holds in_ball(double radius, const V3d& centre = V3d(0)) {
-  return [=](const V3d& p) { return (p - centre).length() < radius; };
-}
 Holds in_box(const V3d& low, const V3d& high) {
   return [=](const V3d& p) {
     return p.x > low.x && p.y > low.y && p.z > low.z && p.x < high.x && p.y < high.y &&
@@ -156,6 +153,17 @@ TEST(Shells, CrossingOnesAreUnited) {
       EXPECT_NEAR(volume_of(oriented(mesh)), volume_of(one) + volume_of(two), 1e-5);
     }
   }
+}
+
+TEST(Shells, HoldTwiceWhatIsDoubled) {
+  const TriangleMesh one = box_mesh(V3f(0), V3f(1));
+  TriangleMesh doubled = one;
+  doubled.triangle.insert(doubled.triangle.end(), one.triangle.begin(), one.triangle.end());
+  EXPECT_TRUE(holds_twice(doubled));
+  EXPECT_TRUE(holds_twice(joined(one, one)));
+  EXPECT_TRUE(holds_twice(joined(one, box_mesh(V3f(0.5f), V3f(1.5f)))));
+  EXPECT_FALSE(holds_twice(one));
+  EXPECT_FALSE(holds_twice(joined(one, box_mesh(V3f(0.2f), V3f(0.8f)))));
 }
 
 // What the solid hides of a shell is no surface: distances within are to what can be seen.
