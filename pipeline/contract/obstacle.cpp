@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -21,6 +22,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 using Triangle = Imath::Vec3<uint32_t>;
+using OpenEdges = std::vector<std::pair<uint32_t, uint32_t>>;
 
 /// Turns the axes about x, then y, then z of the world.
 void turn(V3d (&axis)[3], const V3d& degrees) {
@@ -48,8 +50,7 @@ Field frame_field(const std::string& name) {
 }
 
 /// Between two corners of open edges, of the first thousand.
-double narrowest_gap(const TriangleMesh& mesh,
-                     const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+double narrowest_gap(const TriangleMesh& mesh, const OpenEdges& open) {
   std::set<uint32_t> rim;
   for (const auto& [a, b] : open) {
     rim.insert({a, b});
@@ -62,8 +63,32 @@ double narrowest_gap(const TriangleMesh& mesh,
   return gap;
 }
 
+/// What is wrong at the first open edge, and what to do.
+std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& first,
+                     const OpenEdges& open) {
+  std::multiset<std::array<uint32_t, 3>> faces;  // at the edge, their corners in order
+  for (const Triangle& t : mesh.triangle) {
+    std::array<uint32_t, 3> corner{first[t.x], first[t.y], first[t.z]};
+    std::sort(corner.begin(), corner.end());
+    const auto has = [&](uint32_t v) { return std::count(corner.begin(), corner.end(), v) == 1; };
+    if (has(open.front().first) && has(open.front().second)) faces.insert(corner);
+  }
+  for (const auto& face : faces)
+    if (faces.count(face) > 1) return "A face lies there more than once: remove doubled faces";
+  if (faces.size() == 2)
+    return "Both triangles there pass it the same way: one of them is turned; orient all faces in "
+           "one way";
+  if (faces.size() > 2)
+    return fmt::format("{} triangles meet there: remove faces within the solid", faces.size());
+  return fmt::format(
+      "The nearest of their corners are {:.3g} apart, in the file's unit; gaps up to {:.3g} are "
+      "closed. It needs an inside: close its holes, merge its vertices by distance, and orient it "
+      "in one way",
+      narrowest_gap(mesh, open), weld_share * diagonal_of(mesh));
+}
+
 [[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
-                              const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+                              const std::vector<uint32_t>& first, const OpenEdges& open) {
   // Nine digits tell any two floats apart.
   const auto corner = [&](uint32_t v) {
     const V3f& p = mesh.position[v];
@@ -72,18 +97,15 @@ double narrowest_gap(const TriangleMesh& mesh,
   const auto [a, b] = open.front();
   throw Error(fmt::format(
       "{}: the mesh is not closed: the edge from {} to {} has not as many triangles one way as the "
-      "other, and so have {} edges in all. The nearest of their corners are {:.3g} apart, in the "
-      "file's unit; gaps up to {:.3g} are closed. It needs an inside: close its holes, merge its "
-      "vertices by distance, and orient it in one way",
-      file.string(), corner(a), corner(b), open.size(), narrowest_gap(mesh, open),
-      weld_share * diagonal_of(mesh)));
+      "other, and so have {} edges in all. {}",
+      file.string(), corner(a), corner(b), open.size(), fault_at(mesh, first, open)));
 }
 
 /// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
 void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
   const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
   const auto open = free_edges(mesh, welded.first);
-  if (!open.empty()) refuse_open(mesh, file, open);
+  if (!open.empty()) refuse_open(mesh, file, welded.first, open);
   size_t moved = 0;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     const V3f& first = mesh.position[welded.first[v]];

@@ -298,6 +298,22 @@ TEST_F(ForeignMesh, AWiderGapIsRefusedWithItsWidth) {
   EXPECT_NE(error.find("corners are 0.000866 apart"), std::string::npos) << error;
 }
 
+TEST_F(ForeignMesh, ADoubledOrTurnedFaceOfASolidIsNoGap) {
+  test::write_box(folder_ / "box.obj", Imath::V3f(1));
+  const std::string box = read_text(folder_ / "box.obj"), face = "f 1 5 7\n";
+  std::string turned = box;
+  turned.replace(turned.find(face), face.size(), "f 1 7 5\n");
+  for (const auto& [text, reason] :
+       {std::pair<std::string, std::string>{box + face, "more than once"},
+        {turned, "one of them is turned"},
+        {box + "v 0.5 0.5 0.5\nf 1 5 9\n", "3 triangles meet there"}}) {
+    test::write_quickly(folder_ / "fault.obj", text);
+    const std::string error = error_of([&] { read_closed_mesh(folder_ / "fault.obj", 1); });
+    EXPECT_NE(error.find(reason), std::string::npos) << error;
+    EXPECT_EQ(error.find("gaps"), std::string::npos) << error;
+  }
+}
+
 TEST_F(ForeignMesh, NormalsAreTurnedWithTheirFaces) {
   TriangleMesh inward = test::box_mesh(Imath::V3f(-1), Imath::V3f(1));
   for (auto& t : inward.triangle) std::swap(t.y, t.z);
@@ -318,6 +334,8 @@ TEST_F(ForeignMesh, NamesOfWindowsAndPercentSignsAreFound) {
   EXPECT_EQ(named_file(folder, "meshes\\box.obj"), folder / "meshes/box.obj");
   EXPECT_NE(warnings().find("write paths with slashes"), std::string::npos);
   EXPECT_EQ(named_file(folder, "none\\box.obj"), folder / "none\\box.obj");
+  EXPECT_EQ(named_file("", "box.obj"), std::filesystem::current_path() / "box.obj");
+  EXPECT_NO_THROW(named_file("", ""));
   EXPECT_FALSE(is_sequence(folder / "100%done.obj"));
   EXPECT_TRUE(is_sequence(folder / "box.%04d.obj"));
   EXPECT_NE(hint_on_name("box.####.obj").find("%04d"), std::string::npos);
