@@ -187,6 +187,44 @@ TEST(Shells, HiddenFacesAreAtNoDistance) {
   }
 }
 
+// Two cavities that cross are one: no wall is left between them. A plate in it that is thinner than
+// a voxel stays.
+TEST(Shells, CavitiesThatCrossAreOneWithoutAWall) {
+  const TriangleMesh outer = box_mesh(V3f(-1.2f, -0.6f, -0.6f), V3f(1.2f, 0.6f, 0.6f));
+  const TriangleMesh mesh =
+      joined(outer, joined(box_mesh(V3f(-1, -0.4f, -0.4f), V3f(0.3f, 0.4f, 0.4f)),
+                           box_mesh(V3f(-0.3f, -0.4f, -0.4f), V3f(1, 0.4f, 0.4f))));
+  constexpr double voxel = 0.05;
+  const LevelSet set = make_level_set(mesh, voxel, 4 * voxel);
+  for (int x = -18; x <= 18; ++x) {
+    for (int y = -7; y <= 7; ++y) {
+      for (int z = -7; z <= 7; ++z) {
+        const double depth = voxel * std::min({20 - std::abs(x), 8 - std::abs(y), 8 - std::abs(z)});
+        const V3d p = V3d(x, y, z) * voxel;
+        EXPECT_GT(value_at(set, p), std::min(depth - 1.5 * voxel, 4 * voxel) - 1e-4) << p;
+      }
+    }
+  }
+  const TriangleMesh plate = box_mesh(V3f(-0.01f, -0.3f, -0.3f), V3f(0.01f, 0.3f, 0.3f));
+  EXPECT_LT(std::abs(value_at(make_level_set(joined(mesh, plate), voxel, 4 * voxel), V3d(0))),
+            0.011);
+}
+
+// Two chambers, with a wall of 0.02 between them, that a third below joins.
+TEST(Shells, AThinWallBetweenCavitiesThatCrossStays) {
+  TriangleMesh mesh = box_mesh(V3f(-0.7f), V3f(0.7f));
+  for (const auto& [low, high] : {std::pair{V3f(-0.5f, -0.2f, -0.3f), V3f(-0.01f, 0.5f, 0.3f)},
+                                  {V3f(0.01f, -0.2f, -0.3f), V3f(0.5f, 0.5f, 0.3f)},
+                                  {V3f(-0.5f, -0.5f, -0.3f), V3f(0.5f, -0.1f, 0.3f)}})
+    mesh = joined(mesh, box_mesh(low, high));
+  EXPECT_EQ(find_shells(mesh).depth, (std::vector<int>{0, 1}));
+  constexpr double voxel = 0.05;
+  const LevelSet set = make_level_set(mesh, voxel, 4 * voxel);
+  EXPECT_NEAR(value_at(set, V3d(0, 0.2, 0)), -0.01, 1e-4);
+  EXPECT_NEAR(value_at(set, V3d(0.1, 0.2, 0)), 0.09, 1e-4);
+  EXPECT_GT(value_at(set, V3d(0, -0.3, 0)), 0.2 - 1.5 * voxel);
+}
+
 // A cavity in a body of two crossing boxes, and a ball in it; the cavity is wholly in both boxes,
 // or in one.
 TEST(Shells, LieInWhatCrossingOnesUnite) {
