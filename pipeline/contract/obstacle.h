@@ -54,6 +54,8 @@ TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
 /// The mesh of a frame in its own coordinates, m, from the file or the file of a sequence; frames
 /// beyond the shot's are those of its ends.
 /// @param shape  that of the obstacle
+/// @param corners  with normals: for a picture, which cannot show glass of shells that meet; a
+/// warning
 /// @throws Error if the file cannot be read or is not closed.
 TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
                                 const SequenceShape& shape, CornerData corners = CornerData::none);

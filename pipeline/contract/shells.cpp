@@ -165,6 +165,8 @@ class Nesting {
   void find_depths();
   /// A shell of itself.
   bool winds_twice(int shell) const;
+  /// Face to face, on either side.
+  bool touch(int one, int other) const;
 
  private:
   void measure_own_rays(int shell, int axis);
@@ -276,6 +278,32 @@ bool Nesting::winds_twice(int shell) const {
     found |= length > least && std::abs(count.winding(shell)) > 1;
   });
   return found;
+}
+
+bool Nesting::touch(int one, int other) const {
+  const Bounds &a = bounds_[size_t(one)], &b = bounds_[size_t(other)];
+  for (int axis = 0; axis < 3; ++axis) {
+    Bounds both;
+    bool meet = true;
+    double slack = 0;  // m, along the axis
+    for (int k = 0; k < 3; ++k) {
+      both.low[k] = std::max(a.low[k], b.low[k]), both.high[k] = std::min(a.high[k], b.high[k]);
+      const double size = std::min(a.high[k] - a.low[k], b.high[k] - b.low[k]);
+      if (k == axis) slack = 1e-6 * size;
+      meet &= both.high[k] - both.low[k] >= (k == axis ? -1e-6 : 1e-5) * size;
+    }
+    if (!meet) continue;
+    const ShellRays rays = rays_through(both, {one, other}, axis);
+    for (int ray = 0; ray < rays_a_side * rays_a_side; ++ray) {
+      const auto* const first = rays.begin(ray % rays_a_side, ray / rays_a_side);
+      const auto* const last = rays.end(ray % rays_a_side, ray / rays_a_side);
+      const auto* const at = std::adjacent_find(first, last, [&](const auto& p, const auto& q) {
+        return p.shell != q.shell && q.x - p.x <= slack;
+      });
+      if (at != last) return true;
+    }
+  }
+  return false;
 }
 
 void Nesting::find_bodies() {
@@ -443,6 +471,16 @@ bool holds_twice(const TriangleMesh& mesh) {
   const Nesting nesting(mesh, shells);
   for (int s = 0; s < shells.count(); ++s)
     if (nesting.winds_twice(s)) return true;
+  return false;
+}
+
+bool shells_meet(const TriangleMesh& mesh) {
+  Shells shells = find_shells(mesh);
+  if (shells.bodies() < shells.count()) return true;
+  const Nesting nesting(mesh, shells);
+  for (int a = 0; a < shells.count(); ++a)
+    for (int b = a + 1; b < shells.count(); ++b)
+      if (nesting.touch(a, b)) return true;
   return false;
 }
 

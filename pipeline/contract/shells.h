@@ -34,6 +34,9 @@ Shells find_shells(const TriangleMesh& mesh);
 /// around it. The mesh's triangles then do not tell what its solid takes up.
 bool holds_twice(const TriangleMesh& mesh);
 
+/// Whether shells cross, or lie face to face. Then they do not bound their solid one by one.
+bool shells_meet(const TriangleMesh& mesh);
+
 /// Turns triangles so that they face away from the solid: each shell outward by itself, cavities
 /// inward. Normals stay as they are.
 void orient_shells(TriangleMesh& mesh);

@@ -13,8 +13,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/shot_file.h"
-#include "tests/contract/box_mesh.h"
-#include "tests/contract/sphere_mesh.h"
+#include "tests/contract/shells_mesh.h"
 #include "tests/temporary_folder.h"
 
 namespace drench {
@@ -242,6 +241,26 @@ TEST(ObstacleMesh, HasNoTrianglesWithTwoCornersAtOnePlace) {
   forget_warnings();
   test::write_quickly(folder / "point.obj", "v 0 0 0\nv 1 0 0\nf 1 1 2\n");
   EXPECT_THROW(read_closed_mesh(folder / "point.obj", 1), Error);
+  forget_warnings();
+}
+
+// What the simulation takes as one body is no glass of one piece: a picture counts faces.
+TEST(ObstacleMesh, OfGlassIsWarnedOfWhereShellsMeet) {
+  const TemporaryFolder folder;
+  write_mesh(folder / "one.ply", test::box_mesh(V3f(0), V3f(1)));
+  write_mesh(folder / "two.ply", test::joined(test::box_mesh(V3f(0), V3f(1)),
+                                              test::box_mesh(V3f(1, 0, 0), V3f(2, 1, 1))));
+  for (const std::string file : {"one", "two"}) {
+    for (const std::string type : {"diffuse", "dielectric"}) {
+      forget_warnings();
+      check_obstacle_meshes(shot_of("[[material]]\nname = \"m\"\ntype = \"" + type +
+                                        "\"\n[[obstacle]]\ntype = \"mesh\"\nmaterial = \"m\"\n"
+                                        "mesh = \"" +
+                                        file + ".ply\"\n",
+                                    folder.path()));
+      EXPECT_EQ(logged_warnings().size(), file == "two" && type == "dielectric" ? 1u : 0u);
+    }
+  }
   forget_warnings();
 }
 

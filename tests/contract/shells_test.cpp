@@ -166,6 +166,20 @@ TEST(Shells, HoldTwiceWhatIsDoubled) {
   EXPECT_FALSE(holds_twice(joined(one, box_mesh(V3f(0.2f), V3f(0.8f)))));
 }
 
+TEST(Shells, MeetWhereTheyCrossOrTouch) {
+  const TriangleMesh one = box_mesh(V3f(0), V3f(1));
+  EXPECT_FALSE(shells_meet(one));
+  EXPECT_FALSE(shells_meet(joined(one, box_mesh(V3f(0.2f), V3f(0.8f)))));  // a cavity
+  EXPECT_FALSE(shells_meet(joined(one, box_mesh(V3f(1.001f), V3f(2)))));   // apart
+  EXPECT_TRUE(shells_meet(joined(one, box_mesh(V3f(0.5f), V3f(1.5f)))));   // crossing
+  for (int axis = 0; axis < 3; ++axis) {
+    V3f beside(0), within(0.2f);
+    beside[axis] = 1, within[axis] = 0;
+    EXPECT_TRUE(shells_meet(joined(one, box_mesh(beside, beside + V3f(1)))));
+    EXPECT_TRUE(shells_meet(joined(one, box_mesh(within, V3f(0.8f)))));  // a flush cavity
+  }
+}
+
 // What the solid hides of a shell is no surface: distances within are to what can be seen.
 TEST(Shells, HiddenFacesAreAtNoDistance) {
   const TriangleMesh mesh =
