@@ -29,11 +29,6 @@ double volume_of(const TriangleMesh& mesh) {
   return std::abs(sum);
 }
 
-bool shells_cross(const TriangleMesh& mesh) {
-  const Shells shells = find_shells(mesh);
-  return shells.bodies() < shells.count();
-}
-
 void check_size(const Shot& shot, const TriangleMesh& mesh, const V3d& size,
                 const std::string& name) {
   const double a = shot.fluid.spacing, count = volume_of(mesh) / (a * a * a);
@@ -59,7 +54,7 @@ V3d place_of(const Shot& shot, const Cell& cell) {
 MeshInterior::MeshInterior(const Shot& shot, const TriangleMesh& mesh, double inset,
                            const std::string& name, const LevelSetMaker& make_level_set)
     : depth_((inset - rounding) * shot.fluid.spacing),
-      volume_(shells_cross(mesh) ? 0 : volume_of(mesh)) {
+      volume_(holds_twice(mesh) ? 0 : volume_of(mesh)) {
   if (!make_level_set) throw std::logic_error("MeshInterior: no make_level_set");
   for (const V3f& p : mesh.position) {
     for (int k = 0; k < 3; ++k) {

@@ -36,7 +36,8 @@ class MeshInterior {
   std::vector<Cell> cells(const Shot& shot, const Pose& pose, const CellRange& within = {}) const;
   /// Of its bounds, 0 to 7, own coordinates, m.
   V3d corner(int which) const;
-  /// m^3 inside the surface, cavities left out; 0 where shells cross: it is not known.
+  /// m^3 inside the surface, cavities left out; 0 where shells cross or wind twice: it is not
+  /// known.
   double volume() const { return volume_; }
 
  private:

@@ -73,7 +73,7 @@ ObstacleSet::ObstacleSet(Solids role, const Shot& shot, const std::vector<Obstac
       snap_(frame.spacing / (1 << 20)),
       make_level_set_(std::move(make_level_set)) {
   for (const Obstacle& obstacle : solids) {
-    Entry entry{obstacle, false, V3d(0), V3d(0), {}, {}, {}, {}};
+    Entry entry{obstacle, false, V3d(0), V3d(0), {}, {}, {}, {}, {}};
     entry.high = obstacle.type == ObstacleType::box ? obstacle.size * 0.5 : V3d(obstacle.radius);
     if (obstacle.type == ObstacleType::plane) {  // what of it the domain may hold
       entry.high = V3d((shot.domain.max - shot.domain.min).length());
@@ -82,6 +82,7 @@ ObstacleSet::ObstacleSet(Solids role, const Shot& shot, const std::vector<Obstac
     if (obstacle.type == ObstacleType::mesh) {
       if (!make_level_set_) throw std::logic_error("ObstacleSet: a mesh, but no make_level_set");
       entry.deforms = is_sequence(obstacle.mesh_file);
+      entry.shape = read_sequence_shape(shot, obstacle);
       read_meshes(entry, shot.timeline.first);
     }
     obstacle_.push_back(std::move(entry));
@@ -94,10 +95,10 @@ void ObstacleSet::read_meshes(Entry& entry, int frame) {
   if (entry.mesh_frame && *entry.mesh_frame + 1 == frame) {
     entry.before = std::move(entry.after);
   } else {
-    entry.before = read_obstacle_mesh(shot_, o, frame);
+    entry.before = read_obstacle_mesh(shot_, o, frame, entry.shape);
   }
   if (entry.deforms) {
-    entry.after = read_obstacle_mesh(shot_, o, frame + 1);
+    entry.after = read_obstacle_mesh(shot_, o, frame + 1, entry.shape);
     check_same_topology(entry.before, entry.after, o);
   }
   entry.mesh_frame = frame;

@@ -78,6 +78,7 @@ class ObstacleSet {
     TriangleMesh before, after;  // of a sequence: frame mesh_frame and the next
     std::optional<int> mesh_frame;
     std::optional<Bracket> bracket;
+    SequenceShape shape;
   };
 
   double film_frame(double time) const { return shot_.timeline.first + time * shot_.timeline.fps; }

@@ -80,8 +80,8 @@ FoamWalls::FoamWalls(const Shot& shot, int frame, const LevelSetMaker& level_set
     Solid solid{&obstacle, obstacle_pose(obstacle, frame - 1), obstacle_pose(obstacle, frame), {}};
     if (obstacle.type == ObstacleType::mesh)
       solid.level_set =
-          level_set(read_obstacle_mesh(shot, obstacle, frame), level_set_voxel * shot.fluid.spacing,
-                    level_set_band * shot.fluid.spacing,
+          level_set(read_obstacle_mesh(shot, obstacle, frame, read_sequence_shape(shot, obstacle)),
+                    level_set_voxel * shot.fluid.spacing, level_set_band * shot.fluid.spacing,
                     bounds_in_own_space(shot, obstacle, frame - 1, frame));
     solids_.push_back(std::move(solid));
   }

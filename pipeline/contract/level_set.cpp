@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
@@ -305,7 +306,13 @@ void set_signs(LevelSet& set, const TriangleMesh& mesh, const Shells& shells) {
   });
 }
 
-// ---- faces within the solid ----
+// ---- faces that are no surface ----
+
+/// Triangles, and of each the shell it is of.
+struct Faces {
+  TriangleMesh mesh;
+  std::vector<int> shell;
+};
 
 /// Of a corner of a voxel.
 bool is_inside(const LevelSet& set, const openvdb::Coord& at) {
@@ -323,18 +330,23 @@ bool is_inside(const LevelSet& set, const openvdb::Coord& at) {
                                 size_t((corner[2] * 9 + corner[1]) * 9 + corner[0])]);
 }
 
-/// The triangles less what lies within the solid: faces that cross into another shell. What is left
-/// of a triangle ends about a voxel from where it goes in.
+/// The triangles less what lies within a set: faces that cross into another shell. What is left of
+/// a triangle ends about a voxel from where it goes in.
 class VisibleFaces {
  public:
-  VisibleFaces(const LevelSet& set, const TriangleMesh& mesh) : set_(set) {
-    for (const auto& t : mesh.triangle) {
-      const std::array<V3f, 3> corners{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
-      if (keep(corners)) add(corners);
+  /// @param may_hide  a shell's faces
+  template <class MayHide>
+  VisibleFaces(const LevelSet& set, const Faces& faces, const MayHide& may_hide) : set_(set) {
+    const auto& at = faces.mesh.position;
+    for (size_t k = 0; k < faces.shell.size(); ++k) {
+      const auto& t = faces.mesh.triangle[k];
+      const std::array<V3f, 3> corners{at[t.x], at[t.y], at[t.z]};
+      shell_ = faces.shell[k];
+      if (!may_hide(shell_) || keep(corners)) add(corners);
     }
   }
   bool hides() const { return hides_; }
-  const TriangleMesh& mesh() const { return visible_; }
+  Faces take() { return std::move(visible_); }
 
  private:
   /// @return whether all of it is to be kept; if not, what is has been added.
@@ -348,7 +360,7 @@ class VisibleFaces {
     const V3f middle = (t[size_t(longest)] + t[size_t(longest + 1) % 3]) * 0.5f;
     const bool of_rounding = middle == t[size_t(longest)] || middle == t[size_t(longest + 1) % 3];
     if (length[longest] <= set_.voxel || of_rounding) {
-      const bool hidden = within_solid((t[0] + t[1] + t[2]) / 3);
+      const bool hidden = is_within((t[0] + t[1] + t[2]) / 3);
       hides_ |= hidden;
       return !hidden;
     }
@@ -362,7 +374,7 @@ class VisibleFaces {
     return false;
   }
   /// Whether all corners of voxels within a voxel along each axis are inside.
-  bool within_solid(const V3f& p) const {
+  bool is_within(const V3f& p) const {
     int low[3], high[3];
     for (int k = 0; k < 3; ++k) {
       const double at = std::clamp(double(p[k] / set_.voxel), -1e9, 1e9);
@@ -375,15 +387,51 @@ class VisibleFaces {
     return true;
   }
   void add(const std::array<V3f, 3>& t) {
-    const auto first = uint32_t(visible_.position.size());
-    visible_.position.insert(visible_.position.end(), t.begin(), t.end());
-    visible_.triangle.emplace_back(first, first + 1, first + 2);
+    auto& [mesh, shell] = visible_;
+    const auto first = uint32_t(mesh.position.size());
+    mesh.position.insert(mesh.position.end(), t.begin(), t.end());
+    mesh.triangle.emplace_back(first, first + 1, first + 2);
+    shell.push_back(shell_);
   }
 
   const LevelSet& set_;
-  TriangleMesh visible_;
+  Faces visible_;
+  int shell_ = 0;
   bool hides_ = false;
 };
+
+/// Of the blocks of a set: what one shell holds.
+LevelSet set_of(int shell, LevelSet set, const TriangleMesh& mesh, const Shells& shells) {
+  TriangleMesh own;
+  own.position = mesh.position;
+  for (size_t t = 0; t < mesh.triangle.size(); ++t)
+    if (shells.shell[t] == shell) own.triangle.push_back(mesh.triangle[t]);
+  set_signs(set, own, {std::vector<int>(own.triangle.size(), 0), {0}, {0}});
+  return set;
+}
+
+/// What of a mesh is its solid's surface: nothing within the solid, nor, of cavities that cross,
+/// within another of them.
+/// @param set  with values near all faces. @return nothing if all of them are.
+std::optional<TriangleMesh> surface_of(const LevelSet& set, const Faces& faces,
+                                       const TriangleMesh& mesh, const Shells& shells) {
+  VisibleFaces outside(set, faces, [](int) { return true; });
+  bool hides = outside.hides();
+  Faces visible = outside.take();
+  std::vector<int> count(size_t(shells.bodies()), 0);
+  for (const int body : shells.body) ++count[size_t(body)];
+  for (int s = 0; s < shells.count(); ++s) {
+    const int body = shells.body[size_t(s)];
+    if (!shells.is_cavity(s) || count[size_t(body)] < 2) continue;
+    const LevelSet held = set_of(s, set, mesh, shells);
+    VisibleFaces beyond(
+        held, visible, [&](int other) { return other != s && shells.body[size_t(other)] == body; });
+    hides |= beyond.hides();
+    visible = beyond.take();
+  }
+  if (!hides) return {};
+  return std::move(visible.mesh);
+}
 
 // ---- what is asked for, and what it takes ----
 
@@ -400,9 +448,11 @@ std::vector<V3d> cut(const std::vector<V3d>& polygon, int k, double at, double s
 }
 
 /// What of the triangles lies in a box: no closed mesh, but at the same distances near it.
-TriangleMesh part_within(const TriangleMesh& mesh, const Box& box) {
-  TriangleMesh part;
-  for (const auto& t : mesh.triangle) {
+Faces part_within(const TriangleMesh& mesh, const Shells& shells, const Box& box) {
+  Faces faces;
+  TriangleMesh& part = faces.mesh;
+  for (size_t source = 0; source < mesh.triangle.size(); ++source) {
+    const auto& t = mesh.triangle[source];
     std::vector<V3d> polygon;
     for (int c = 0; c < 3; ++c) polygon.emplace_back(mesh.position[t[c]]);
     for (int k = 0; k < 3 && !polygon.empty(); ++k) {
@@ -414,8 +464,9 @@ TriangleMesh part_within(const TriangleMesh& mesh, const Box& box) {
       part.triangle.emplace_back(first, first + c - 1, first + c);
     if (polygon.size() > 2)
       for (const V3d& p : polygon) part.position.emplace_back(p);
+    faces.shell.resize(part.triangle.size(), shells.shell[source]);
   }
-  return part;
+  return faces;
 }
 
 /// Bytes that a level set takes while it is made, from above: blocks in a band of about ten voxels
@@ -478,12 +529,12 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
     frame_blocks(voxels_of(whole, within, voxel, band), set);
   };
   const bool cut = beyond && bytes_of(mesh, voxel, 0) > worth_cutting;
-  const TriangleMesh part = cut ? part_within(mesh, reach) : TriangleMesh{};
-  const TriangleMesh& near = cut ? part : mesh;
+  const Shells shells = find_shells(mesh);
+  Faces part = cut ? part_within(mesh, shells, reach) : Faces{};
+  const TriangleMesh& near = cut ? part.mesh : mesh;
   check_memory(bytes_of(near, voxel, 0), voxel, bounds);
   frame_within(cut ? bounds : LevelSetBounds{});
   check_memory(bytes_of(near, voxel, blocks_of(set)), voxel, bounds);
-  const Shells shells = find_shells(mesh);
   const bool cavities = std::any_of(shells.depth.begin(), shells.depth.end(),
                                     [](int depth) { return depth % 2 == 1; });
   // Asked of every mesh, grooves narrower than a voxel would be taken for hidden.
@@ -502,8 +553,8 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
   };
   make(near);
   if (!hidden) return set;
-  const VisibleFaces visible(set, near);
-  if (visible.hides()) make(visible.mesh());
+  const Faces faces = cut ? std::move(part) : Faces{mesh, shells.shell};
+  if (const auto surface = surface_of(set, faces, mesh, shells)) make(*surface);
   return set;
 }
 

@@ -66,10 +66,12 @@ void MeshBuilder::add_face(std::span<const Corner> corner, uint64_t number) {
 
 void MeshBuilder::cut(const Polygon& polygon) {
   const std::span corner(polygon_corner_.data() + polygon.corner, polygon.corners);
+  const std::span<const Imath::V3f> at = cut_by_.empty() ? mesh.position : cut_by_;
   std::vector<Imath::V3f> position;
   for (const Corner& c : corner) {
     if (c.vertex >= mesh.position.size()) refuse_vertex(polygon.triangle, c.vertex);
-    position.push_back(mesh.position[c.vertex]);
+    if (c.vertex >= at.size()) fail("has faces of vertices that the first frame does not have");
+    position.push_back(at[c.vertex]);
     if (!finite(position.back())) fail(fmt::format("has a vertex {} that is not finite", c.vertex));
   }
   const auto triangles = triangulate(position);
@@ -142,7 +144,20 @@ void MeshBuilder::fill_normals() {
   }
 }
 
+/// Of texture coordinates and normals that are not there.
+void MeshBuilder::drop_lost_indices() {
+  for (Corner& c : corner_) {
+    const bool uv_lost = c.uv != none && c.uv >= uv.size(),
+               normal_lost = wanted_ == CornerData::uv_and_normal && c.normal != none &&
+                             c.normal >= normal.size();
+    if (uv_lost) c.uv = none;
+    if (normal_lost) c.normal = none;
+    lost_corners_ += uv_lost || normal_lost;
+  }
+}
+
 void MeshBuilder::split_vertices() {
+  drop_lost_indices();
   const size_t vertices = mesh.position.size();
   const bool has_uv =
       std::any_of(corner_.begin(), corner_.end(), [](const Corner& c) { return c.uv != none; });
@@ -157,9 +172,6 @@ void MeshBuilder::split_vertices() {
   for (uint32_t v = 0; v < vertices; ++v) point[v] = v;
   for (size_t k = 0; k < corner_.size(); ++k) {
     const Corner& c = corner_[k];
-    if ((c.uv != none && c.uv >= uv.size()) || (c.normal != none && c.normal >= normal.size()))
-      fail(fmt::format("has a face with texture coordinate {} of {} or normal {} of {}", c.uv + 1,
-                       uv.size(), c.normal + 1, normal.size()));
     if (has_uv && c.uv == none) ++without_uv_;
     const Imath::V2f t = c.uv != none ? uv[c.uv] : Imath::V2f(0);
     const Imath::V3f n = has_normal && c.normal != none ? normal[c.normal] : Imath::V3f(0);
@@ -202,6 +214,12 @@ void MeshBuilder::warn() const {
         fmt::format("{} faces of fewer than three corners were left out, the first at {}; they "
                     "enclose nothing",
                     short_faces_, place_of_(first_short_face_)));
+  }
+  if (lost_corners_ > 0) {
+    say(
+        fmt::format("{} of {} corners name a texture coordinate or normal that is not there; they "
+                    "are taken as without one. Export the mesh again if a texture shows there",
+                    lost_corners_, corner_.size()));
   }
   if (without_uv_ > 0) {
     say(

@@ -174,7 +174,8 @@ WrittenFile write_obj(const fs::path& path, const TriangleMesh& mesh) {
   return write_file_whole(path, text.text());
 }
 
-TriangleMesh read_mesh(const fs::path& path, CornerData corners) {
+TriangleMesh read_mesh(const fs::path& path, CornerData corners,
+                       std::span<const Imath::V3f> cut_by) {
   std::string kind = path.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) {
     return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : char(c);
@@ -184,7 +185,8 @@ TriangleMesh read_mesh(const fs::path& path, CornerData corners) {
         fmt::format("{}: meshes are read from .ply and .obj files, not '{}'", path.string(), kind));
   }
   const std::string text = plain_text(path, read_text(path, uint64_t(1) << 34));
-  return kind == ".obj" ? read_obj(path, text, corners) : read_ply(path, text, corners);
+  return kind == ".obj" ? read_obj(path, text, corners, cut_by)
+                        : read_ply(path, text, corners, cut_by);
 }
 
 }  // namespace drench

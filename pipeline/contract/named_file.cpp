@@ -14,7 +14,8 @@ namespace fs = std::filesystem;
 namespace {
 
 fs::path absolute(const fs::path& folder, const std::string& word) {
-  return fs::absolute(folder / fs::path(word)).lexically_normal();
+  // The folder of a shot that is given as a bare name is empty, and nothing has no absolute path.
+  return (fs::absolute(folder.empty() ? "." : folder) / fs::path(word)).lexically_normal();
 }
 
 /// Of the pattern of a sequence its folder is looked for.

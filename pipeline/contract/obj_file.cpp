@@ -19,19 +19,15 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(const fs::path& path, std::string_view text, CornerData corners)
-      : path_(path), text_(text), builder_(path, corners, [&path](uint64_t line) {
+  ObjReader(const fs::path& path, std::string_view text, CornerData corners,
+            std::span<const Imath::V3f> cut_by)
+      : path_(path), text_(text), builder_(path, corners, cut_by, [&path](uint64_t line) {
           return fmt::format("{}:{}", path.string(), line);
         }) {}
 
   TriangleMesh read() {
-    // Lines of old Macintoshes end with a carriage return alone.
-    if (text_.find('\n') == std::string_view::npos) end_of_line_ = '\r';
     std::string joined;
-    while (!text_.empty()) {
-      const std::string_view line = next_line(joined);
-      read_line(line.substr(0, line.find('#')));
-    }
+    while (!is_at_end()) read_line(next_line(joined));
     if (faces_ == 0) fail("has no faces; a triangle mesh is expected");
     warn();
     return builder_.finish();
@@ -42,22 +38,39 @@ class ObjReader {
     throw Error(fmt::format("{}:{}: {}. Export the mesh again", path_.string(), line_, why));
   }
 
+  bool is_at_end() const { return text_.empty() && block_.empty(); }
+
+  /// Ends with a line feed, a carriage return or both; without its comment and blanks at its end.
+  std::string_view take_line() {
+    if (block_.empty()) {
+      block_ = text_.substr(0, text_.find('\n'));
+      text_.remove_prefix(std::min(block_.size() + 1, text_.size()));
+    }
+    ++line_;
+    std::string_view line = block_.substr(0, block_.find('\r'));
+    block_.remove_prefix(std::min(line.size() + 1, block_.size()));
+    line = line.substr(0, line.find('#'));
+    return line.substr(0, line.find_last_not_of(" \t") + 1);
+  }
+
+  /// Whether what follows says something of the mesh; names may end with a backslash of their own.
+  static bool is_read(std::string_view line) {
+    const std::string_view keyword = take_word(line);
+    return keyword == "v" || keyword == "vt" || keyword == "vn" || keyword == "f" ||
+           keyword == "fo";
+  }
+
   /// One logical line: a backslash at the end joins the next.
   std::string_view next_line(std::string& joined) {
+    std::string_view line = take_line();
+    if (!line.ends_with('\\') || !is_read(line)) return line;
     joined.clear();
-    while (true) {
-      ++line_;
-      std::string_view line = text_.substr(0, text_.find(end_of_line_));
-      text_.remove_prefix(std::min(line.size() + 1, text_.size()));
-      while (line.ends_with('\r')) line.remove_suffix(1);
-      if (!line.ends_with('\\') || text_.empty()) {
-        if (joined.empty()) return line;
-        return joined += line;
-      }
+    for (; line.ends_with('\\'); line = is_at_end() ? std::string_view() : take_line()) {
       line.remove_suffix(1);
       joined += line;
       joined += ' ';
     }
+    return joined += line;
   }
 
   static std::string_view take_word(std::string_view& line) {
@@ -102,7 +115,8 @@ class ObjReader {
                            "place and a point in another could mean two things"));
   }
 
-  /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far.
+  /// Zero-based index from OBJ's: from 1, or negative counting back from the last one so far; one
+  /// that no file has if it counts back too far.
   uint32_t index_of(std::string_view word, size_t count) const {
     int64_t index = 0;
     const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), index);
@@ -111,10 +125,8 @@ class ObjReader {
                        word.substr(0, 40)));
     }
     index += index < 0 ? int64_t(count) : -1;
-    if (index < 0 || index >= int64_t(MeshBuilder::none)) {
-      fail(fmt::format("has an index '{}' outside the file's vertices", word.substr(0, 40)));
-    }
-    return uint32_t(index);
+    const bool is_possible = index >= 0 && index < int64_t(MeshBuilder::nowhere);
+    return is_possible ? uint32_t(index) : MeshBuilder::nowhere;
   }
 
   MeshBuilder::Corner read_corner(std::string_view word) {
@@ -124,7 +136,10 @@ class ObjReader {
       word.remove_prefix(std::min(part.size() + 1, word.size()));
       return part;
     };
-    corner.vertex = index_of(next_part(), builder_.mesh.position.size());
+    const std::string_view vertex = next_part();
+    corner.vertex = index_of(vertex, builder_.mesh.position.size());
+    if (corner.vertex == MeshBuilder::nowhere)
+      fail(fmt::format("has an index '{}' outside the file's vertices", vertex.substr(0, 40)));
     if (const auto part = next_part(); !part.empty())
       corner.uv = index_of(part, builder_.uv.size());
     if (const auto part = next_part(); !part.empty())
@@ -152,8 +167,7 @@ class ObjReader {
   }
 
   const fs::path& path_;
-  std::string_view text_;
-  char end_of_line_ = '\n';
+  std::string_view text_, block_;  // what is left; of it up to a line feed
   int line_ = 0;
   uint64_t faces_ = 0, curved_ = 0;
   NumberReader number_;
@@ -163,8 +177,9 @@ class ObjReader {
 
 }  // namespace
 
-TriangleMesh read_obj(const fs::path& path, std::string_view text, CornerData corners) {
-  return ObjReader(path, text, corners).read();
+TriangleMesh read_obj(const fs::path& path, std::string_view text, CornerData corners,
+                      std::span<const Imath::V3f> cut_by) {
+  return ObjReader(path, text, corners, cut_by).read();
 }
 
 }  // namespace drench

@@ -12,6 +12,7 @@ namespace drench {
 /// of corners. Velocity is zero. Groups, materials, lines and points are left out.
 /// @throws Error naming file, line and reason.
 TriangleMesh read_obj(const std::filesystem::path& path, std::string_view text,
-                      CornerData corners = CornerData::none);
+                      CornerData corners = CornerData::none,
+                      std::span<const Imath::V3f> cut_by = {});
 
 }  // namespace drench

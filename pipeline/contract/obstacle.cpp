@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -21,6 +22,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 using Triangle = Imath::Vec3<uint32_t>;
+using OpenEdges = std::vector<std::pair<uint32_t, uint32_t>>;
 
 /// Turns the axes about x, then y, then z of the world.
 void turn(V3d (&axis)[3], const V3d& degrees) {
@@ -48,8 +50,7 @@ Field frame_field(const std::string& name) {
 }
 
 /// Between two corners of open edges, of the first thousand.
-double narrowest_gap(const TriangleMesh& mesh,
-                     const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+double narrowest_gap(const TriangleMesh& mesh, const OpenEdges& open) {
   std::set<uint32_t> rim;
   for (const auto& [a, b] : open) {
     rim.insert({a, b});
@@ -62,8 +63,32 @@ double narrowest_gap(const TriangleMesh& mesh,
   return gap;
 }
 
+/// What is wrong at the first open edge, and what to do.
+std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& first,
+                     const OpenEdges& open) {
+  std::multiset<std::array<uint32_t, 3>> faces;  // at the edge, their corners in order
+  for (const Triangle& t : mesh.triangle) {
+    std::array<uint32_t, 3> corner{first[t.x], first[t.y], first[t.z]};
+    std::sort(corner.begin(), corner.end());
+    const auto has = [&](uint32_t v) { return std::count(corner.begin(), corner.end(), v) == 1; };
+    if (has(open.front().first) && has(open.front().second)) faces.insert(corner);
+  }
+  for (const auto& face : faces)
+    if (faces.count(face) > 1) return "A face lies there more than once: remove doubled faces";
+  if (faces.size() == 2)
+    return "Both triangles there pass it the same way: one of them is turned; orient all faces in "
+           "one way";
+  if (faces.size() > 2)
+    return fmt::format("{} triangles meet there: remove faces within the solid", faces.size());
+  return fmt::format(
+      "The nearest of their corners are {:.3g} apart, in the file's unit; gaps up to {:.3g} are "
+      "closed. It needs an inside: close its holes, merge its vertices by distance, and orient it "
+      "in one way",
+      narrowest_gap(mesh, open), weld_share * diagonal_of(mesh));
+}
+
 [[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
-                              const std::vector<std::pair<uint32_t, uint32_t>>& open) {
+                              const std::vector<uint32_t>& first, const OpenEdges& open) {
   // Nine digits tell any two floats apart.
   const auto corner = [&](uint32_t v) {
     const V3f& p = mesh.position[v];
@@ -72,24 +97,19 @@ double narrowest_gap(const TriangleMesh& mesh,
   const auto [a, b] = open.front();
   throw Error(fmt::format(
       "{}: the mesh is not closed: the edge from {} to {} has not as many triangles one way as the "
-      "other, and so have {} edges in all. The nearest of their corners are {:.3g} apart, in the "
-      "file's unit; gaps up to {:.3g} are closed. It needs an inside: close its holes, merge its "
-      "vertices by distance, and orient it in one way",
-      file.string(), corner(a), corner(b), open.size(), narrowest_gap(mesh, open),
-      weld_share * diagonal_of(mesh)));
+      "other, and so have {} edges in all. {}",
+      file.string(), corner(a), corner(b), open.size(), fault_at(mesh, first, open)));
 }
 
 /// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
 void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
-  if (mesh.triangle.empty())
-    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
   const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
   const auto open = free_edges(mesh, welded.first);
-  if (!open.empty()) refuse_open(mesh, file, open);
+  if (!open.empty()) refuse_open(mesh, file, welded.first, open);
   size_t moved = 0;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     const V3f& first = mesh.position[welded.first[v]];
-    if (mesh.position[v] == first) continue;
+    if (welded.first[v] == v || mesh.position[v] == first) continue;
     mesh.position[v] = first;
     ++moved;
   }
@@ -100,6 +120,20 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
                                  "distance",
                                  moved, welded.widest));
   }
+}
+
+/// Leaves out triangles of which two corners are at one place: they enclose nothing.
+void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
+  const auto& at = mesh.position;
+  const size_t dropped = std::erase_if(mesh.triangle, [&](const Triangle& t) {
+    return at[t.x] == at[t.y] || at[t.y] == at[t.z] || at[t.z] == at[t.x];
+  });
+  if (dropped == 0) return;
+  mesh.contact.clear();
+  log_file_warning("mesh", file,
+                   fmt::format("{} triangles with two corners at one place were left out; they "
+                               "enclose nothing. Merge its vertices by distance",
+                               dropped));
 }
 
 /// Leaves out vertices that no triangle has: they are no places of a solid.
@@ -142,6 +176,12 @@ void turn_normals(TriangleMesh& mesh) {
   }
   for (size_t v = 0; v < face.size(); ++v)
     if (face[v].dot(V3d(mesh.normal[v])) < 0) mesh.normal[v] = -mesh.normal[v];
+}
+
+bool is_glass(const Shot& shot, const Obstacle& obstacle) {
+  return std::any_of(shot.material.begin(), shot.material.end(), [&](const Material& m) {
+    return m.name == obstacle.material && m.type == MaterialType::dielectric;
+  });
 }
 
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
@@ -200,7 +240,8 @@ TriangleMesh sphere_mesh(double radius) {
   return mesh;
 }
 
-TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
+TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
+                      const SequenceShape& shape) {
   switch (obstacle.type) {
     case ObstacleType::plane:
       return plane_mesh((shot.domain.max - shot.domain.min).length());
@@ -209,7 +250,7 @@ TriangleMesh own_mesh(const Shot& shot, const Obstacle& obstacle, int frame) {
     case ObstacleType::sphere:
       return sphere_mesh(obstacle.radius);
     case ObstacleType::mesh:
-      return read_obstacle_mesh(shot, obstacle, frame, CornerData::uv_and_normal);
+      return read_obstacle_mesh(shot, obstacle, frame, shape, CornerData::uv_and_normal);
   }
   throw std::logic_error("own_mesh: no such type");
 }
@@ -276,10 +317,19 @@ std::filesystem::path sequence_file(const std::filesystem::path& pattern, int fr
   return pattern.parent_path() / name;
 }
 
-TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners) {
-  TriangleMesh mesh = read_mesh(file, corners);
-  drop_unused_vertices(mesh, file);
+SequenceShape read_sequence_shape(const Shot& shot, const Obstacle& obstacle) {
+  if (!is_sequence(obstacle.mesh_file)) return {};
+  return read_mesh(sequence_file(obstacle.mesh_file, shot.timeline.first)).position;
+}
+
+TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, CornerData corners,
+                              const SequenceShape& shape) {
+  TriangleMesh mesh = read_mesh(file, corners, shape);
   close_gaps(mesh, file);
+  if (shape.empty()) drop_collapsed(mesh, file);
+  if (mesh.triangle.empty())
+    throw Error(file.string() + ": has no triangles; a solid or volume needs some");
+  drop_unused_vertices(mesh, file);
   orient_shells(mesh);
   turn_normals(mesh);
   for (V3f& p : mesh.position) p *= float(scale);
@@ -287,21 +337,41 @@ TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale, C
 }
 
 TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
-                                CornerData corners) {
+                                const SequenceShape& shape, CornerData corners) {
   const bool sequence = is_sequence(obstacle.mesh_file);
   const int known = std::clamp(frame, shot.timeline.first, shot.timeline.last);
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
-  return read_closed_mesh(file, obstacle.scale, corners);
+  TriangleMesh mesh = read_closed_mesh(file, obstacle.scale, corners, shape);
+  if (corners == CornerData::uv_and_normal && is_glass(shot, obstacle) && shells_meet(mesh))
+    log_file_warning("mesh", file,
+                     "shells of this glass cross or touch, and a picture takes each of their faces "
+                     "for the glass's end: it is too thin there. Unite them where they are "
+                     "modelled, or give each an obstacle, overlapping");
+  return mesh;
+}
+
+void check_obstacle_meshes(const Shot& shot) {
+  for (const Obstacle& o : shot.obstacle) {
+    if (o.type != ObstacleType::mesh) continue;
+    const SequenceShape shape = read_sequence_shape(shot, o);
+    const int first = shot.timeline.first;
+    const TriangleMesh mesh = read_obstacle_mesh(shot, o, first, shape, CornerData::uv_and_normal);
+    for (int frame = first + 1; !shape.empty() && frame <= shot.timeline.last; ++frame) {
+      check_same_topology(mesh,
+                          read_obstacle_mesh(shot, o, frame, shape, CornerData::uv_and_normal), o);
+    }
+  }
 }
 
 TriangleMesh obstacle_surface(const Shot& shot, const Obstacle& obstacle, int frame) {
-  TriangleMesh mesh = own_mesh(shot, obstacle, frame);
   const bool deforms = obstacle.type == ObstacleType::mesh && is_sequence(obstacle.mesh_file);
+  const SequenceShape shape = deforms ? read_sequence_shape(shot, obstacle) : SequenceShape{};
+  TriangleMesh mesh = own_mesh(shot, obstacle, frame, shape);
   TriangleMesh before, after;
   if (deforms) {
-    before = read_obstacle_mesh(shot, obstacle, frame - 1);
-    after = read_obstacle_mesh(shot, obstacle, frame + 1);
+    before = read_obstacle_mesh(shot, obstacle, frame - 1, shape);
+    after = read_obstacle_mesh(shot, obstacle, frame + 1, shape);
     check_same_topology(mesh, before, obstacle), check_same_topology(mesh, after, obstacle);
   }
   const int between =
@@ -334,9 +404,11 @@ void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
   // Where vertices are split depends on a frame's normals; points do not.
   const std::vector<uint32_t> point = points_of(mesh), other_point = points_of(other);
   bool same = mesh.triangle.size() == other.triangle.size();
-  for (size_t k = 0; same && k < mesh.triangle.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      same &= point[mesh.triangle[k][c]] == other_point[other.triangle[k][c]];
+  for (size_t k = 0; same && k < mesh.triangle.size(); ++k) {
+    const Triangle &t = mesh.triangle[k], &u = other.triangle[k];
+    const uint32_t y = point[t.y], z = point[t.z], v = other_point[u.y], w = other_point[u.z];
+    same = point[t.x] == other_point[u.x] && ((y == v && z == w) || (y == w && z == v));
+  }
   if (same) return;
   throw Error(fmt::format(
       "obstacle \"{}\": the files of {} do not have the same triangles in every frame, so that "

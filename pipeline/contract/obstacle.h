@@ -37,19 +37,35 @@ bool is_sequence(const std::filesystem::path& mesh_file);
 /// The file of a film frame. @throws std::logic_error if the name is no sequence.
 std::filesystem::path sequence_file(const std::filesystem::path& pattern, int frame);
 
+/// Where the vertices of a sequence are in its first frame, as the file has them: its polygons are
+/// cut by these in every frame, so that all have the same triangles. Empty if it is no sequence.
+using SequenceShape = std::vector<V3f>;
+SequenceShape read_sequence_shape(const Shot& shot, const Obstacle& obstacle);
+
 /// A closed mesh in its own coordinates times `scale`, m, turned away from what is solid: see
-/// shells.h. Gaps of less than weld_share of its diagonal are closed with a warning.
+/// shells.h. Gaps of less than weld_share of its diagonal are closed, and triangles of which two
+/// corners are at one place left out, with a warning; the latter are kept in a sequence, where they
+/// may open in another frame.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
-                              CornerData corners = CornerData::none);
+                              CornerData corners = CornerData::none,
+                              const SequenceShape& shape = {});
 
 /// The mesh of a frame in its own coordinates, m, from the file or the file of a sequence; frames
 /// beyond the shot's are those of its ends.
+/// @param shape  that of the obstacle
+/// @param corners  with normals: for a picture, which cannot show glass of shells that meet; a
+/// warning
 /// @throws Error if the file cannot be read or is not closed.
 TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int frame,
-                                CornerData corners = CornerData::none);
+                                const SequenceShape& shape, CornerData corners = CornerData::none);
 
-/// @throws Error if two meshes of a sequence differ in more than where their vertices are.
+/// Reads the meshes of all frames as pictures need them, so that what is wrong with one or warned
+/// of is known before anything runs. @throws Error as read_obstacle_mesh and check_same_topology.
+void check_obstacle_meshes(const Shot& shot);
+
+/// @throws Error if two meshes of a sequence differ in more than where their vertices are and which
+/// way their triangles are turned.
 void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
                          const Obstacle& obstacle);
 

@@ -61,10 +61,14 @@ constexpr std::array<std::string_view, 2> uv_names[] = {
 
 class PlyReader {
  public:
-  PlyReader(const fs::path& path, std::string_view text, CornerData corners)
-      : path_(path), text_(text), corners_(corners), builder_(path, corners, [&path](uint64_t row) {
-          return fmt::format("{}: face {}", path.string(), row);
-        }) {}
+  PlyReader(const fs::path& path, std::string_view text, CornerData corners,
+            std::span<const Imath::V3f> cut_by)
+      : path_(path),
+        text_(text),
+        corners_(corners),
+        builder_(path, corners, cut_by,
+                 [&path](uint64_t row) { return fmt::format("{}: face {}", path.string(), row); }) {
+  }
 
   TriangleMesh read() {
     const PlyHeader header = read_header();
@@ -165,21 +169,30 @@ class PlyReader {
     return {std::string(words[4]), type_of(words[3]), count};
   }
 
-  PlyHeader read_header() const {
+  /// A line of the header; empty if it is a comment.
+  std::string_view header_line(size_t& at, char end_of_line) const {
+    const size_t end = text_.find(end_of_line, at);
+    if (end == std::string_view::npos) fail("has no whole PLY header");
+    std::string_view line = text_.substr(at, end - at);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    at = end + 1;
+    if (line.starts_with("comment") || line.starts_with("obj_info")) return {};
     constexpr size_t longest = 1 << 16;
-    const std::string_view head = text_.substr(0, longest);
+    if (line.size() > longest) fail("has a header line that is too long to be one");
+    return line;
+  }
+
+  PlyHeader read_header() const {
     PlyHeader header;
+    // Binary data may begin with a line feed: the first line says how those of the header end.
+    const char end_of_line =
+        text_.starts_with("ply\r") && !text_.starts_with("ply\r\n") ? '\r' : '\n';
+    if (words_of(header_line(header.body, end_of_line)) != std::vector<std::string_view>{"ply"})
+      fail("is not a PLY file");
     bool format = false;
-    size_t at = 0;
-    for (int line_number = 0;; ++line_number) {
-      const size_t end = head.find('\n', at);
-      if (end == std::string_view::npos) fail("has no whole PLY header");
-      const auto words = words_of(head.substr(at, end - at));
-      at = end + 1;
-      if (line_number == 0 && (words.size() != 1 || words[0] != "ply")) fail("is not a PLY file");
-      if (words.empty() || words[0] == "comment" || words[0] == "obj_info" || line_number == 0) {
-        continue;
-      }
+    while (true) {
+      const auto words = words_of(header_line(header.body, end_of_line));
+      if (words.empty()) continue;
       if (words[0] == "end_header") break;
       if (words[0] == "format") {
         read_format(words, header);
@@ -193,7 +206,6 @@ class PlyReader {
       }
     }
     if (!format) fail("has no format line");
-    header.body = at;
     return header;
   }
 
@@ -263,8 +275,12 @@ class PlyReader {
 
   uint64_t next_count(Type type) {
     const double count = next_value(type);
-    if (!(count >= 0) || count != std::floor(count) || count > double(rest_.size()) + 1) {
-      fail("has a list with an impossible length");
+    if (!(count >= 0) || count != std::floor(count)) fail("has a list with an impossible length");
+    if (count > double(rest_.size())) {
+      fail(
+          fmt::format("has a list of {} numbers, but the file is too short for them: cut off or "
+                      "damaged",
+                      count));
     }
     return uint64_t(count);
   }
@@ -374,7 +390,7 @@ class PlyReader {
           if (p.name == "contact") contact_.push_back(value != 0);
         }
       }
-      if (uv > 0) name_texcoord(corner, uv, row);
+      if (uv > 0) name_texcoord(corner, uv);
       builder_.add_face(corner, row);
     }
   }
@@ -392,12 +408,11 @@ class PlyReader {
     return n;
   }
 
-  void name_texcoord(std::vector<MeshBuilder::Corner>& corner, size_t n, uint64_t row) const {
-    if (n != 2 * corner.size())
-      fail(fmt::format("has a face {} of {} vertices with {} numbers of texcoord, {} are expected",
-                       row, corner.size(), n, 2 * corner.size()));
+  /// @param n  numbers that were read of the face's coordinates; two a corner, or none is taken.
+  void name_texcoord(std::vector<MeshBuilder::Corner>& corner, size_t n) const {
+    const bool fits = n == 2 * corner.size();
     for (size_t k = 0; k < corner.size(); ++k)
-      corner[k].uv = uint32_t(builder_.uv.size() - corner.size() + k);
+      corner[k].uv = fits ? uint32_t(builder_.uv.size() - corner.size() + k) : MeshBuilder::nowhere;
   }
 
   // Of polygons that were cut into triangles nobody knows which lies where.
@@ -454,8 +469,9 @@ class PlyReader {
 
 }  // namespace
 
-TriangleMesh read_ply(const fs::path& path, std::string_view text, CornerData corners) {
-  return PlyReader(path, text, corners).read();
+TriangleMesh read_ply(const fs::path& path, std::string_view text, CornerData corners,
+                      std::span<const Imath::V3f> cut_by) {
+  return PlyReader(path, text, corners, cut_by).read();
 }
 
 }  // namespace drench

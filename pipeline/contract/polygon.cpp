@@ -43,20 +43,39 @@ Triangles fan(size_t n) {
   return triangles;
 }
 
-/// Turns left at every corner, and once around in all: no star either.
+/// Less than this share of the square of its longest edge, twice the area of a triangle is that of
+/// a sliver: its corners are on a line but for rounding.
+constexpr double sliver = 1e-5;
+
+bool is_sliver(const V2d& a, const V2d& b, const V2d& c) {
+  const double longest = std::max({(b - a).length2(), (c - b).length2(), (a - c).length2()});
+  return !(turn(a, b, c) > sliver * longest);
+}
+
+/// Turns left or goes on at every corner, and once around in all: no star either. Corners at the
+/// place of the one before do not count.
 bool is_convex(const std::vector<V2d>& p) {
   const size_t n = p.size();
+  size_t last = n - 1;
+  while (last > 0 && p[last] == p[0]) --last;
+  V2d before = p[0] - p[last];
   int changes = 0;  // of the sign of an edge's x
   double sign = 0;
   for (size_t k = 0; k < n; ++k) {
-    const V2d &a = p[k], &b = p[(k + 1) % n], &c = p[(k + 2) % n];
-    if (turn(a, b, c) < 0) return false;
-    const double x = b.x - a.x;
-    if (x == 0) continue;
-    if (sign != 0 && (x > 0) != (sign > 0)) ++changes;
-    sign = x;
+    const V2d edge = p[(k + 1) % n] - p[k];
+    if (edge == V2d(0)) continue;
+    if (before.cross(edge) < 0) return false;
+    before = edge;
+    if (edge.x == 0) continue;
+    if (sign != 0 && (edge.x > 0) != (sign > 0)) ++changes;
+    sign = edge.x;
   }
   return changes <= 2;
+}
+
+bool has_sliver(const std::vector<V2d>& p, const Triangles& triangles) {
+  return std::any_of(triangles.begin(), triangles.end(),
+                     [&](const auto& t) { return is_sliver(p[t[0]], p[t[1]], p[t[2]]); });
 }
 
 bool cross_each_other(const V2d& a, const V2d& b, const V2d& c, const V2d& d) {
@@ -91,49 +110,62 @@ class EarCutter {
   }
 
   std::optional<Triangles> cut() {
-    Triangles triangles;
+    size_t left = p_.size();
     uint32_t at = 0;
-    for (size_t left = p_.size(); left > 3; --left) {
+    for (uint32_t k = 0; k < p_.size() && left > 3; ++k) {
+      if (p_[k] != p_[next_[k]]) continue;
+      at = clip(k), --left;  // two corners at one place
+    }
+    for (; left > 3; --left) {
       const std::optional<uint32_t> ear = find_ear(at, left);
       if (!ear) return {};
-      triangles.push_back({previous_[*ear], *ear, next_[*ear]});
-      next_[previous_[*ear]] = next_[*ear];
-      previous_[next_[*ear]] = previous_[*ear];
-      at = next_[next_[*ear]];  // not the same corner again: slivers would share it
+      at = next_[clip(*ear)];  // not the same corner again: slivers would share it
     }
-    triangles.push_back({previous_[at], at, next_[at]});
-    return triangles;
+    triangles_.push_back({previous_[at], at, next_[at]});
+    return std::move(triangles_);
   }
 
  private:
   double turn_at(uint32_t k) const { return turn(p_[previous_[k]], p_[k], p_[next_[k]]); }
 
-  /// An ear with an area if there is one; else a corner on a straight line, which covers nothing.
+  /// Cuts corner k off. @return the one behind it.
+  uint32_t clip(uint32_t k) {
+    triangles_.push_back({previous_[k], k, next_[k]});
+    next_[previous_[k]] = next_[k];
+    return previous_[next_[k]] = previous_[k], next_[k];
+  }
+
+  /// An ear that is no sliver and leaves none if there is one; else any with an area; else a corner
+  /// on a straight line, which covers nothing.
   std::optional<uint32_t> find_ear(uint32_t start, size_t left) const {
-    std::optional<uint32_t> straight;
+    std::optional<uint32_t> thin, straight;
     uint32_t k = start;
     for (size_t tried = 0; tried < left; ++tried, k = next_[k]) {
       const double area = turn_at(k);
-      if (area > 0 && is_empty(k)) return k;
       if (area == 0 && !straight) straight = k;
+      if (!(area > 0)) continue;
+      if (!is_sliver(p_[previous_[k]], p_[k], p_[next_[k]]) && is_empty(k, sliver)) return k;
+      if (!thin && is_empty(k, 0)) thin = k;
     }
-    return straight;
+    return thin ? thin : straight;
   }
 
-  /// Whether no corner lies in the triangle at k. Corners at the place of one of its own do not
-  /// count: a slit comes back there.
-  bool is_empty(uint32_t k) const {
+  /// Whether no corner lies in the triangle at k, or beyond its cut by a share `beyond` of the
+  /// cut's length. Corners at the place of one of its own do not count: a slit comes back there.
+  bool is_empty(uint32_t k, double beyond) const {
     const V2d &a = p_[previous_[k]], &b = p_[k], &c = p_[next_[k]];
+    const double outside = -beyond * (c - a).length2();
     for (uint32_t j = next_[next_[k]]; j != previous_[k]; j = next_[j]) {
       const V2d& q = p_[j];
       if (q == a || q == b || q == c) continue;
-      if (turn(a, b, q) >= 0 && turn(b, c, q) >= 0 && turn(c, a, q) >= 0) return false;
+      if (turn(a, b, q) >= 0 && turn(b, c, q) >= 0 && turn(c, a, q) >= outside) return false;
     }
     return true;
   }
 
   const std::vector<V2d>& p_;
   std::vector<uint32_t> next_, previous_;
+  Triangles triangles_;
 };
 
 }  // namespace
@@ -149,9 +181,13 @@ std::optional<Triangles> triangulate(std::span<const Imath::V3f> corner) {
       if (n <= most_corners && crosses_itself(projected(corner, axis))) return {};
     return fan(n);
   }
-  if (is_convex(flat)) return fan(n);
-  if (n > most_corners || crosses_itself(flat)) return {};
-  return EarCutter(flat).cut();
+  if (!is_convex(flat)) {
+    if (n > most_corners || crosses_itself(flat)) return {};
+    return EarCutter(flat).cut();
+  }
+  Triangles triangles = fan(n);
+  if (n > most_corners || !has_sliver(flat, triangles)) return triangles;
+  return EarCutter(flat).cut().value_or(std::move(triangles));
 }
 
 }  // namespace drench

@@ -12,10 +12,10 @@
 namespace drench {
 
 /// Triangles of a simple polygon, as indices of its corners, oriented as it is. A polygon that is
-/// convex along its normal becomes a fan around corner 0; any other loses its ears one by one
-/// (Meisters 1975, "Polygons have ears"). Corners off its mean plane are projected onto it
-/// (Newell's normal: Tampieri 1992). Corners may coincide, so that a hole can be joined to the rim
-/// by a slit. A polygon without area becomes a fan.
+/// convex along its normal becomes a fan around corner 0 if none of its triangles is a sliver; any
+/// other loses its ears one by one (Meisters 1975, "Polygons have ears"), slivers last. Corners off
+/// its mean plane are projected onto it (Newell's normal: Tampieri 1992). Corners may coincide, so
+/// that a hole can be joined to the rim by a slit. A polygon without area becomes a fan.
 /// @param corner  n >= 3 positions, m, in order; every one finite.
 /// @return n - 2 triangles; none if the polygon crosses itself, or is not convex and has more than
 /// most_corners.

@@ -150,25 +150,36 @@ Bounds common(const Bounds& a, const Bounds& b) {
 constexpr int rays_a_side = 32;
 constexpr double all_but = 1e-3;  // of a volume, that may stick out of what holds it
 
+/// Of a shell's volume, what lies in another: by rays along each of the axes.
+struct Share {
+  double least = 1, most = 0;
+  bool is_all() const { return std::min(least, most) > 1 - all_but; }
+  void add(double share) { least = std::min(least, share), most = std::max(most, share); }
+};
+
 /// Relations of the shells of a mesh, by lengths along rays.
 class Nesting {
  public:
   Nesting(const TriangleMesh& mesh, Shells& shells);
   void find_bodies();
   void find_depths();
+  /// A shell of itself.
+  bool winds_twice(int shell) const;
+  /// Face to face, on either side.
+  bool touch(int one, int other) const;
 
  private:
-  void measure_own_rays(int shell);
-  double share(int of, int in) const;
+  void measure_own_rays(int shell, int axis);
+  Share share(int of, int in) const;
   bool overlap(int one, int other) const;
-  ShellRays rays_through(const Bounds& box, const std::vector<int>& of) const;
+  ShellRays rays_through(const Bounds& box, const std::vector<int>& of, int axis) const;
 
   const TriangleMesh& mesh_;
   Shells& shells_;
   std::vector<std::vector<uint32_t>> triangles_;  // of a shell
   std::vector<Bounds> bounds_;
-  std::vector<std::vector<std::pair<int, double>>> shares_;  // of a shell, in those around it
-  std::vector<std::pair<int, int>> within_;                  // the first lies in the second
+  std::vector<std::vector<std::pair<int, Share>>> shares_;  // of a shell, in those around it
+  std::vector<std::pair<int, int>> within_;                 // the first lies in the second
 };
 
 Nesting::Nesting(const TriangleMesh& mesh, Shells& shells)
@@ -184,13 +195,15 @@ Nesting::Nesting(const TriangleMesh& mesh, Shells& shells)
   }
 }
 
-ShellRays Nesting::rays_through(const Bounds& box, const std::vector<int>& of) const {
+ShellRays Nesting::rays_through(const Bounds& box, const std::vector<int>& of, int axis) const {
   ShellRays::Grid grid;
+  grid.axis = axis;
   for (int k = 0; k < 2; ++k) {
     // Off the middles of cells, which symmetric meshes have corners on.
-    const double size = box.high[k + 1] - box.low[k + 1];
+    const int across = (axis + k + 1) % 3;
+    const double size = box.high[across] - box.low[across];
     grid.step[k] = size / rays_a_side, grid.count[k] = rays_a_side;
-    grid.low[k] = box.low[k + 1] + (k == 0 ? 0.4729 : 0.5381) * grid.step[k];
+    grid.low[k] = box.low[across] + (k == 0 ? 0.4729 : 0.5381) * grid.step[k];
   }
   std::vector<uint32_t> triangles;
   for (const int s : of)
@@ -213,7 +226,7 @@ void along(const ShellRays& rays, const Shells& shells, const Visit& visit) {
   }
 }
 
-void Nesting::measure_own_rays(int shell) {
+void Nesting::measure_own_rays(int shell, int axis) {
   std::vector<int> of{shell};
   const Bounds& own = bounds_[size_t(shell)];
   for (int other = 0; other < shells_.count(); ++other) {
@@ -224,45 +237,87 @@ void Nesting::measure_own_rays(int shell) {
   if (of.size() == 1) return;
   double whole = 0;
   std::vector<double> in(of.size(), 0);
-  along(rays_through(own, of), shells_, [&](double length, const BodyCount& count) {
+  along(rays_through(own, of, axis), shells_, [&](double length, const BodyCount& count) {
     if (!count.in_shell(shell)) return;
     whole += length;
     for (size_t k = 1; k < of.size(); ++k) in[k] += count.in_shell(of[k]) ? length : 0;
   });
-  for (size_t k = 1; k < of.size(); ++k)
-    shares_[size_t(shell)].emplace_back(of[k], whole > 0 ? in[k] / whole : 0);
+  auto& shares = shares_[size_t(shell)];
+  for (size_t k = 1; k < of.size(); ++k) {
+    if (axis == 0) shares.emplace_back(of[k], Share{});
+    if (whole > 0) shares[k - 1].second.add(in[k] / whole);
+  }
 }
 
-double Nesting::share(int of, int in) const {
+Share Nesting::share(int of, int in) const {
   for (const auto& [other, share] : shares_[size_t(of)])
     if (other == in) return share;
-  return 0;
+  return {0, 0};
 }
 
 /// Rays through the part that the bounds of two shells have in common see overlaps that are small
 /// beside either.
 bool Nesting::overlap(int one, int other) const {
   const Bounds &a = bounds_[size_t(one)], &b = bounds_[size_t(other)];
-  const double least = 1e-4 * std::min(a.high.x - a.low.x, b.high.x - b.low.x);
   bool found = false;
-  along(rays_through(common(a, b), {one, other}), shells_,
-        [&](double length, const BodyCount& count) {
-          found |= length > least && count.in_shell(one) && count.in_shell(other);
-        });
+  for (int axis = 0; axis < 3 && !found; ++axis) {
+    const double least = 1e-4 * std::min(a.high[axis] - a.low[axis], b.high[axis] - b.low[axis]);
+    along(rays_through(common(a, b), {one, other}, axis), shells_,
+          [&](double length, const BodyCount& count) {
+            found |= length > least && count.in_shell(one) && count.in_shell(other);
+          });
+  }
   return found;
+}
+
+bool Nesting::winds_twice(int shell) const {
+  const Bounds& own = bounds_[size_t(shell)];
+  const double least = 1e-4 * (own.high.x - own.low.x);
+  bool found = false;
+  along(rays_through(own, {shell}, 0), shells_, [&](double length, const BodyCount& count) {
+    found |= length > least && std::abs(count.winding(shell)) > 1;
+  });
+  return found;
+}
+
+bool Nesting::touch(int one, int other) const {
+  const Bounds &a = bounds_[size_t(one)], &b = bounds_[size_t(other)];
+  for (int axis = 0; axis < 3; ++axis) {
+    Bounds both;
+    bool meet = true;
+    double slack = 0;  // m, along the axis
+    for (int k = 0; k < 3; ++k) {
+      both.low[k] = std::max(a.low[k], b.low[k]), both.high[k] = std::min(a.high[k], b.high[k]);
+      const double size = std::min(a.high[k] - a.low[k], b.high[k] - b.low[k]);
+      if (k == axis) slack = 1e-6 * size;
+      meet &= both.high[k] - both.low[k] >= (k == axis ? -1e-6 : 1e-5) * size;
+    }
+    if (!meet) continue;
+    const ShellRays rays = rays_through(both, {one, other}, axis);
+    for (int ray = 0; ray < rays_a_side * rays_a_side; ++ray) {
+      const auto* const first = rays.begin(ray % rays_a_side, ray / rays_a_side);
+      const auto* const last = rays.end(ray % rays_a_side, ray / rays_a_side);
+      const auto* const at = std::adjacent_find(first, last, [&](const auto& p, const auto& q) {
+        return p.shell != q.shell && q.x - p.x <= slack;
+      });
+      if (at != last) return true;
+    }
+  }
+  return false;
 }
 
 void Nesting::find_bodies() {
   Unions bodies{size_t(shells_.count())};
-  for (int s = 0; s < shells_.count(); ++s) measure_own_rays(s);
+  for (int s = 0; s < shells_.count(); ++s)
+    for (int axis = 0; axis < 3; ++axis) measure_own_rays(s, axis);
   for (int a = 0; a < shells_.count(); ++a) {
     for (const auto& [b, share_of_a] : shares_[size_t(a)]) {
       if (b < a) continue;
-      const double share_of_b = share(b, a);
-      const bool a_in_b = share_of_a > 1 - all_but, b_in_a = share_of_b > 1 - all_but;
+      const Share share_of_b = share(b, a);
+      const bool a_in_b = share_of_a.is_all(), b_in_a = share_of_b.is_all();
       if (a_in_b != b_in_a) {
         within_.emplace_back(a_in_b ? a : b, a_in_b ? b : a);
-      } else if (a_in_b || std::max(share_of_a, share_of_b) > all_but || overlap(a, b)) {
+      } else if (a_in_b || std::max(share_of_a.most, share_of_b.most) > all_but || overlap(a, b)) {
         bodies.unite(uint32_t(a), uint32_t(b));
       }
     }
@@ -323,8 +378,8 @@ struct FlatTriangle {
   FlatTriangle(const TriangleMesh& mesh, const Triangle& t, const ShellRays::Grid& grid) {
     for (int c = 0; c < 3; ++c) {
       const V3f& p = mesh.position[t[c]];
-      x[c] = p.x;
-      corner[c] = {fixed(p.y, grid, 0), fixed(p.z, grid, 1)};
+      x[c] = p[grid.axis];
+      corner[c] = {fixed(p[(grid.axis + 1) % 3], grid, 0), fixed(p[(grid.axis + 2) % 3], grid, 1)};
     }
     for (int k = 0; k < 2; ++k) {
       Fixed low = INT64_MAX, high = INT64_MIN;
@@ -408,6 +463,25 @@ Shells find_shells(const TriangleMesh& mesh) {
   nesting.find_bodies();
   nesting.find_depths();
   return shells;
+}
+
+bool holds_twice(const TriangleMesh& mesh) {
+  Shells shells = find_shells(mesh);
+  if (shells.bodies() < shells.count()) return true;
+  const Nesting nesting(mesh, shells);
+  for (int s = 0; s < shells.count(); ++s)
+    if (nesting.winds_twice(s)) return true;
+  return false;
+}
+
+bool shells_meet(const TriangleMesh& mesh) {
+  Shells shells = find_shells(mesh);
+  if (shells.bodies() < shells.count()) return true;
+  const Nesting nesting(mesh, shells);
+  for (int a = 0; a < shells.count(); ++a)
+    for (int b = a + 1; b < shells.count(); ++b)
+      if (nesting.touch(a, b)) return true;
+  return false;
 }
 
 void orient_shells(TriangleMesh& mesh) {

@@ -26,33 +26,42 @@ struct Shells {
 
 /// @param mesh  closed: every edge has as many triangles one way as the other, where vertices at
 /// one place are one; any orientation, m or any unit. Shells lie in another body if all but a
-/// thousandth of their volume does, and cross if neither lies in the other so.
+/// thousandth of their volume does by rays along each axis, and cross if neither lies in the other
+/// so.
 Shells find_shells(const TriangleMesh& mesh);
+
+/// Whether a part of space is held more than once: by shells that cross, or by one that winds twice
+/// around it. The mesh's triangles then do not tell what its solid takes up.
+bool holds_twice(const TriangleMesh& mesh);
+
+/// Whether shells cross, or lie face to face. Then they do not bound their solid one by one.
+bool shells_meet(const TriangleMesh& mesh);
 
 /// Turns triangles so that they face away from the solid: each shell outward by itself, cavities
 /// inward. Normals stay as they are.
 void orient_shells(TriangleMesh& mesh);
 
-/// Where rays along x meet the shells of a mesh. Rays go through the places (j, k) of a grid in y
-/// and z; corners and edges that lie on a ray count for one side of it throughout, so that sums of
-/// turns are exact.
+/// Where rays along an axis meet the shells of a mesh. Rays go through the places (j, k) of a grid
+/// in the next two axes; corners and edges that lie on a ray count for one side of it throughout,
+/// so that sums of turns are exact.
 class ShellRays {
  public:
   struct Grid {
-    double low[2] = {0, 0};   // m, y and z of ray (0, 0)
+    double low[2] = {0, 0};   // m, of ray (0, 0) along the next axes
     double step[2] = {1, 1};  // m
     int count[2] = {0, 0};
+    int axis = 0;  // x
   };
   struct Crossing {
-    double x = 0;  // m
+    double x = 0;  // m, along the axis
     int shell = 0;
-    int turn = 0;  // what the shell's winding number changes by in the direction of x
+    int turn = 0;  // what the shell's winding number changes by in the direction of the axis
   };
   /// @param triangles  those that may be met.
   ShellRays(const TriangleMesh& mesh, const std::vector<int>& shell,
             const std::vector<uint32_t>& triangles, const Grid& grid);
 
-  /// Of ray (j, k), by rising x.
+  /// Of ray (j, k), from low to high.
   const Crossing* begin(int j, int k) const { return crossing_.data() + start_[ray(j, k)]; }
   const Crossing* end(int j, int k) const { return crossing_.data() + start_[ray(j, k) + 1]; }
 
@@ -73,7 +82,8 @@ class BodyCount {
         holders_(size_t(shells.bodies()), 0) {}
   void pass(const ShellRays::Crossing& crossing);
   bool inside() const { return holding_ % 2 == 1; }
-  bool in_shell(int shell) const { return winding_[size_t(shell)] != 0; }
+  bool in_shell(int shell) const { return winding(shell) != 0; }
+  int winding(int shell) const { return winding_[size_t(shell)]; }
 
  private:
   const Shells& shells_;

@@ -62,12 +62,31 @@ TEST_F(ForeignMesh, Utf16IsReadInEitherByteOrder) {
   }
 }
 
+std::string with_line_ends(const std::string& text, const std::string& end) {
+  std::string with;
+  for (const char c : text) with += c == '\n' ? end : std::string(1, c);
+  return with;
+}
+
 TEST_F(ForeignMesh, LinesMayEndWithACarriageReturn) {
   for (const std::string end : {"\r", "\r\n"}) {
-    std::string text;
-    for (const char* c = triangle; *c; ++c) text += *c == '\n' ? end : std::string(1, *c);
+    const std::string text = with_line_ends(triangle, end);
     EXPECT_EQ(read("lines.obj", text).triangle.size(), 1u);
+    EXPECT_EQ(read("mixed.obj", text + "\n" + triangle).triangle.size(), 2u);
+    EXPECT_NE(error_of([&] { read("bad.obj", text + "v 1 x 2" + end); }).find("bad.obj:5:"),
+              std::string::npos);
   }
+}
+
+TEST_F(ForeignMesh, ABackslashJoinsLinesThatAreRead) {
+  const TriangleMesh mesh =
+      read("joined.obj",
+           "# by C:\\tools\\\nv 0 0 0 # origin \\\nv 1 0 0\ng C:\\\nv 0 \\ \t\n1 0\n"
+           "f 1 \\\r\n2 \\\n3\nf 1 3 \\\n2\\");
+  ASSERT_EQ(mesh.position.size(), 3u);
+  EXPECT_EQ(mesh.position[2], Imath::V3f(0, 1, 0));
+  ASSERT_EQ(mesh.triangle.size(), 2u);
+  EXPECT_EQ(mesh.triangle[1], Imath::Vec3<uint32_t>(0, 2, 1));
 }
 
 TEST_F(ForeignMesh, DecimalCommasAreTakenAndSaid) {
@@ -86,12 +105,12 @@ TEST_F(ForeignMesh, CommasBesidePointsAreRefused) {
 }
 
 /// A PLY of a right triangle, of one byte order.
-std::string binary_ply(bool big) {
+std::string binary_ply(bool big, const std::string& more = "") {
   std::string text = fmt::format(
-      "ply\nformat binary_{}_endian 1.0\nelement vertex 3\nproperty double x\n"
+      "ply\nformat binary_{}_endian 1.0\n{}element vertex 3\nproperty double x\n"
       "property float y\nproperty short z\nelement face 1\n"
       "property list uchar int vertex_indices\nend_header\n",
-      big ? "big" : "little");
+      big ? "big" : "little", more);
   const auto put = [&](auto value) {
     std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
     if (big) std::reverse(bytes.begin(), bytes.end());
@@ -109,6 +128,38 @@ TEST_F(ForeignMesh, BothByteOrdersOfPlyAreOneMesh) {
   EXPECT_EQ(little.position[1], Imath::V3f(1.5f, 0, -3));
   EXPECT_EQ(big.position, little.position);
   EXPECT_EQ(big.triangle, little.triangle);
+}
+
+// The first byte of the data is a line feed.
+TEST_F(ForeignMesh, HeadersOfPlyMayEndLinesWithACarriageReturn) {
+  const std::string head =
+      "ply\nformat binary_little_endian 1.0\ncomment x\nelement vertex 3\nproperty char x\n"
+      "property char y\nproperty char z\nelement face 1\n"
+      "property list uchar uchar vertex_indices\nend_header\n";
+  const std::string body("\n\0\0\1\0\0\0\r\0\3\0\1\2", 13);
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    const TriangleMesh mesh = read("lines.ply", with_line_ends(head, end) + body);
+    EXPECT_EQ(mesh.position[0], Imath::V3f(10, 0, 0));
+    EXPECT_EQ(mesh.position[2], Imath::V3f(0, 13, 0));
+    EXPECT_EQ(mesh.triangle.size(), 1u);
+  }
+}
+
+TEST_F(ForeignMesh, CommentsOfPlyMayBeLong) {
+  std::string many = "comment " + std::string(100'000, 'x') + "\n";
+  for (int k = 0; k < 20'000; ++k) many += "obj_info 1 2 3\n";
+  EXPECT_EQ(read("long.ply", binary_ply(false, many)).triangle.size(), 1u);
+}
+
+TEST_F(ForeignMesh, AnAsciiPlyThatIsCutOffIsSaidToBe) {
+  const std::string whole =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0\n1 0 0\n0 1 0\n";
+  for (const std::string rest : {"", "3", "3 ", "3 0", "3 0 1 "}) {
+    const std::string error = error_of([&] { read("cut.ply", whole + rest); });
+    EXPECT_NE(error.find("cut off"), std::string::npos) << rest << ": " << error;
+  }
 }
 
 TEST_F(ForeignMesh, TextureCoordinatesOfVerticesHaveThreeNames) {
@@ -185,6 +236,26 @@ TEST_F(ForeignMesh, WhatNobodyNeedsRefusesNothing) {
   EXPECT_NE(error.find("vertex 2 that is not finite"), std::string::npos) << error;
 }
 
+TEST_F(ForeignMesh, ATextureCoordinateThatIsNotThereIsNone) {
+  for (const std::string face : {"f 1/9 2/1 3/-7", "f 1//9 2//9 3//9", "f 1/9/9 2/1/1 3/1/1"}) {
+    forget_warnings();
+    const TriangleMesh mesh =
+        read("lost.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvn 0 1 0\n" + face + "\n");
+    EXPECT_EQ(mesh.triangle.size(), 1u);
+    EXPECT_NE(warnings().find("of 3 corners name a texture coordinate or normal that is not there"),
+              std::string::npos)
+        << warnings();
+    for (const Imath::V2f& uv : mesh.uv) EXPECT_TRUE(uv == Imath::V2f(0) || uv == Imath::V2f(0.5f));
+  }
+  forget_warnings();
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+      "property list uchar float texcoord\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 4 1 1 1 1\n";
+  EXPECT_TRUE(read("lost.ply", ply).uv.empty());
+  EXPECT_NE(warnings().find("3 of 3 corners"), std::string::npos) << warnings();
+}
+
 TEST_F(ForeignMesh, AFaceThatCrossesItselfIsNamed) {
   const std::string bow = "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 3 4\n";
   const std::string error = error_of([&] { read("bow.obj", bow); });
@@ -227,6 +298,22 @@ TEST_F(ForeignMesh, AWiderGapIsRefusedWithItsWidth) {
   EXPECT_NE(error.find("corners are 0.000866 apart"), std::string::npos) << error;
 }
 
+TEST_F(ForeignMesh, ADoubledOrTurnedFaceOfASolidIsNoGap) {
+  test::write_box(folder_ / "box.obj", Imath::V3f(1));
+  const std::string box = read_text(folder_ / "box.obj"), face = "f 1 5 7\n";
+  std::string turned = box;
+  turned.replace(turned.find(face), face.size(), "f 1 7 5\n");
+  for (const auto& [text, reason] :
+       {std::pair<std::string, std::string>{box + face, "more than once"},
+        {turned, "one of them is turned"},
+        {box + "v 0.5 0.5 0.5\nf 1 5 9\n", "3 triangles meet there"}}) {
+    test::write_quickly(folder_ / "fault.obj", text);
+    const std::string error = error_of([&] { read_closed_mesh(folder_ / "fault.obj", 1); });
+    EXPECT_NE(error.find(reason), std::string::npos) << error;
+    EXPECT_EQ(error.find("gaps"), std::string::npos) << error;
+  }
+}
+
 TEST_F(ForeignMesh, NormalsAreTurnedWithTheirFaces) {
   TriangleMesh inward = test::box_mesh(Imath::V3f(-1), Imath::V3f(1));
   for (auto& t : inward.triangle) std::swap(t.y, t.z);
@@ -247,6 +334,8 @@ TEST_F(ForeignMesh, NamesOfWindowsAndPercentSignsAreFound) {
   EXPECT_EQ(named_file(folder, "meshes\\box.obj"), folder / "meshes/box.obj");
   EXPECT_NE(warnings().find("write paths with slashes"), std::string::npos);
   EXPECT_EQ(named_file(folder, "none\\box.obj"), folder / "none\\box.obj");
+  EXPECT_EQ(named_file("", "box.obj"), std::filesystem::current_path() / "box.obj");
+  EXPECT_NO_THROW(named_file("", ""));
   EXPECT_FALSE(is_sequence(folder / "100%done.obj"));
   EXPECT_TRUE(is_sequence(folder / "box.%04d.obj"));
   EXPECT_NE(hint_on_name("box.####.obj").find("%04d"), std::string::npos);

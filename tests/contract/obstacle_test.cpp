@@ -4,12 +4,16 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
 #include "pipeline/contract/mesh_file.h"
 #include "pipeline/contract/shot_file.h"
-#include "tests/contract/sphere_mesh.h"
+#include "tests/contract/shells_mesh.h"
 #include "tests/temporary_folder.h"
 
 namespace drench {
@@ -144,6 +148,122 @@ TEST(ObstacleSequence, HasAFileForEveryFrameAndVelocityBetweenThem) {
   EXPECT_THROW(obstacle_surface(shot, ball, 1003), Error);
 }
 
+/// A prism from z = 0 to 1 over a house whose roof's middle is `top` high and whose eaves are 1.
+std::string house(float top) {
+  std::string text;
+  for (const int z : {0, 1})
+    text += fmt::format("v 0 0 {0}\nv 2 0 {0}\nv 2 1 {0}\nv 1 {1} {0}\nv 0 1 {0}\n", z, top);
+  text += "f 5 4 3 2 1\nf 6 7 8 9 10\n";
+  for (int k = 0; k < 5; ++k)
+    text += fmt::format("f {} {} {} {}\n", k + 1, (k + 1) % 5 + 1, (k + 1) % 5 + 6, k + 6);
+  return text;
+}
+
+class HouseSequence : public testing::Test {
+ protected:
+  HouseSequence() {
+    // A gable, flat, a valley: cut by itself each would have triangles of its own.
+    for (int k = 0; k < 4; ++k) set(1001 + k, house(std::array{1.5f, 1.f, 0.5f, 0.1f}[size_t(k)]));
+  }
+  void set(int frame, const std::string& text) {
+    test::write_quickly(folder_ / fmt::format("house.{}.obj", frame), text);
+  }
+  TemporaryFolder folder_;
+  Shot shot() const {
+    return shot_of(
+        "[shot]\nframes = [1001, 1004]\n[[obstacle]]\ntype = \"mesh\"\n"
+        "mesh = \"house.%04d.obj\"\n",
+        folder_.path());
+  }
+};
+
+TEST_F(HouseSequence, IsCutInEveryFrameAsInTheFirst) {
+  const Shot shot = this->shot();
+  check_obstacle_meshes(shot);
+  const SequenceShape shape = read_sequence_shape(shot, shot.obstacle[0]);
+  const TriangleMesh first = read_obstacle_mesh(shot, shot.obstacle[0], 1001, shape),
+                     last = read_obstacle_mesh(shot, shot.obstacle[0], 1004, shape);
+  EXPECT_EQ(first.triangle, last.triangle);
+  EXPECT_EQ(last.position[3], V3f(1, 0.1f, 0));
+  // The roof sinks by 1 m from 1001 to 1003.
+  const TriangleMesh surface = obstacle_surface(shot, shot.obstacle[0], 1002);
+  for (size_t v = 0; v < surface.position.size(); ++v)
+    EXPECT_NEAR(surface.velocity[v].y, surface.position[v].x == 1 ? -0.5 * 24 : 0, 1e-3);
+}
+
+TEST_F(HouseSequence, IsRefusedForAnyOfItsFrames) {
+  for (const auto& [text, reason] :
+       {std::pair<std::string, std::string>{house(1) + "f 1 2 3\n", "not closed"},
+        {"", "no faces"},
+        {house(1) + "f 1 2 3\nf 3 2 1\n", "do not have the same triangles"},
+        {house(1) + "f 1 2 3 17\n", "without its vertex"},
+        {house(1) + "v 0 0 9\nf 1 2 3 11\n", "first frame does not have"}}) {
+    set(1003, text);
+    try {
+      check_obstacle_meshes(shot());
+      ADD_FAILURE() << reason;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("house."), std::string::npos) << error.what();
+    }
+  }
+}
+
+// The eave at (0, 1) sinks to the ground in one frame: its wall opens again in the next.
+TEST_F(HouseSequence, KeepsTrianglesThatCollapseInAFrame) {
+  std::string flat = house(1.5f);
+  for (const int z : {0, 1}) {
+    const std::string eave = fmt::format("v 0 1 {}\n", z);
+    flat.replace(flat.find(eave), eave.size(), fmt::format("v 0 0 {}\n", z));
+  }
+  for (const int collapsed : {1001, 1002}) {
+    set(1001, house(1.5f));
+    set(collapsed, flat);
+    check_obstacle_meshes(shot());
+  }
+}
+
+TEST(ObstacleMesh, HasNoTrianglesWithTwoCornersAtOnePlace) {
+  const TemporaryFolder folder;
+  test::write_box(folder / "box.obj", V3f(1));
+  const std::string box = read_text(folder / "box.obj");
+  // Of one vertex twice; of two at one place, also as the poles of spheres are split.
+  for (const std::string more : {"f 1 1 2\n", "f 3 3 3\n", "v 0 0 0\nf 1 9 2\nf 9 1 2\n",
+                                 "v 5 5 5\nf 9 9 9\n", "v nan 0 0\nf 1 1 2\n"}) {
+    forget_warnings();
+    test::write_quickly(folder / "more.obj", box + more);
+    const TriangleMesh mesh = read_closed_mesh(folder / "more.obj", 1);
+    EXPECT_EQ(mesh.triangle.size(), 12u) << more;
+    EXPECT_EQ(mesh.position.size(), 8u) << more;
+    ASSERT_FALSE(logged_warnings().empty()) << more;
+    EXPECT_NE(logged_warnings()[0].text.find("with two corners at one place"), std::string::npos);
+  }
+  forget_warnings();
+  test::write_quickly(folder / "point.obj", "v 0 0 0\nv 1 0 0\nf 1 1 2\n");
+  EXPECT_THROW(read_closed_mesh(folder / "point.obj", 1), Error);
+  forget_warnings();
+}
+
+// What the simulation takes as one body is no glass of one piece: a picture counts faces.
+TEST(ObstacleMesh, OfGlassIsWarnedOfWhereShellsMeet) {
+  const TemporaryFolder folder;
+  write_mesh(folder / "one.ply", test::box_mesh(V3f(0), V3f(1)));
+  write_mesh(folder / "two.ply", test::joined(test::box_mesh(V3f(0), V3f(1)),
+                                              test::box_mesh(V3f(1, 0, 0), V3f(2, 1, 1))));
+  for (const std::string file : {"one", "two"}) {
+    for (const std::string type : {"diffuse", "dielectric"}) {
+      forget_warnings();
+      check_obstacle_meshes(shot_of("[[material]]\nname = \"m\"\ntype = \"" + type +
+                                        "\"\n[[obstacle]]\ntype = \"mesh\"\nmaterial = \"m\"\n"
+                                        "mesh = \"" +
+                                        file + ".ply\"\n",
+                                    folder.path()));
+      EXPECT_EQ(logged_warnings().size(), file == "two" && type == "dielectric" ? 1u : 0u);
+    }
+  }
+  forget_warnings();
+}
+
 TEST(ObstacleMesh, IsTurnedOutward) {
   const TemporaryFolder folder;
   TriangleMesh inward = test::unit_sphere(6, 8);
@@ -159,7 +279,7 @@ TEST(ObstacleMesh, MustBeClosed) {
   write_mesh(folder / "open.ply", open);
   const Shot shot = shot_of("[[obstacle]]\ntype = \"mesh\"\nmesh = \"open.ply\"\n", folder.path());
   try {
-    read_obstacle_mesh(shot, shot.obstacle[0], 1001);
+    read_obstacle_mesh(shot, shot.obstacle[0], 1001, {});
     ADD_FAILURE() << "an open mesh was taken";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("not closed"), std::string::npos);

@@ -38,16 +38,24 @@ bool covers(const std::vector<V3f>& p, float x, float y) {
   return false;
 }
 
+/// From each of its corners on in turn.
+std::vector<std::vector<V3f>> rotations_of(const std::vector<V3f>& p) {
+  std::vector<std::vector<V3f>> all;
+  for (size_t start = 0; start < p.size(); ++start) {
+    all.emplace_back(p.begin() + long(start), p.end());
+    all.back().insert(all.back().end(), p.begin(), p.begin() + long(start));
+  }
+  return all;
+}
+
 // A U of 3 x 3 with a mouth of 1 x 2: area 7, and the mouth stays open, whichever corner is first.
 TEST(Polygon, AConcaveOneIsCoveredOnce) {
   const std::vector<V3f> u{{0, 0, 0}, {3, 0, 0}, {3, 3, 0}, {2, 3, 0},
                            {2, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}};
-  for (size_t start = 0; start < u.size(); ++start) {
-    std::vector<V3f> turned(u.begin() + long(start), u.end());
-    turned.insert(turned.end(), u.begin(), u.begin() + long(start));
-    EXPECT_NEAR(area_of(turned), 7, 1e-6) << start;
-    EXPECT_FALSE(covers(turned, 1.5f, 2.f)) << start;
-    EXPECT_TRUE(covers(turned, 0.5f, 2.5f)) << start;
+  for (const auto& turned : rotations_of(u)) {
+    EXPECT_NEAR(area_of(turned), 7, 1e-6);
+    EXPECT_FALSE(covers(turned, 1.5f, 2.f));
+    EXPECT_TRUE(covers(turned, 0.5f, 2.5f));
   }
 }
 
@@ -100,6 +108,40 @@ TEST(Polygon, CornersOnALineAreNoTrouble) {
       1e-6);
   // Nothing but a line: a fan of triangles without area, so that a closed mesh stays closed.
   EXPECT_NEAR(area_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {1, 0, 0}}), 0, 1e-9);
+}
+
+// A square of 1 whose lower side has corners in it, on the line or off it by rounding; a triangle
+// with all sides split. No triangle needs to be without area.
+TEST(Polygon, CornersOnASideMakeNoSlivers) {
+  for (const float off : {0.f, -1e-9f, 1e-9f, -1e-7f, 1e-7f}) {
+    const std::vector<V3f> square{{0, 0, 0}, {0.25f, off, 0}, {0.5f, off, 0}, {0.8f, off, 0},
+                                  {1, 0, 0}, {1, 1, 0},       {0, 1, 0}};
+    const std::vector<V3f> triangle{{0, 0, 0}, {1, off, 0}, {2, off, 0}, {3, 0, 0},  {2, 1, 0},
+                                    {1, 2, 0}, {0, 3, 0},   {off, 2, 0}, {off, 1, 0}};
+    for (const auto& [whole, area] : {std::pair{square, 1.}, {triangle, 4.5}}) {
+      for (const auto& p : rotations_of(whole)) {
+        EXPECT_NEAR(area_of(p), area, 1e-5);
+        const auto triangles = triangulate(p).value();
+        for (const auto& t : triangles)
+          EXPECT_GT((p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).length(), 0.01f) << off;
+      }
+    }
+  }
+}
+
+// An L of 2 x 2 with its inner corner, or all of them, twice at one place: area 3, and its notch
+// stays open.
+TEST(Polygon, ADoubledCornerOfAConcaveOneIsNoTrouble) {
+  const std::vector<V3f> l{{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 2, 0}, {0, 2, 0}};
+  for (size_t doubled = 0; doubled <= l.size(); ++doubled) {
+    std::vector<V3f> twice;
+    for (size_t k = 0; k < l.size(); ++k)
+      twice.insert(twice.end(), doubled == k || doubled == l.size() ? 2 : 1, l[k]);
+    for (const auto& p : rotations_of(twice)) {
+      EXPECT_NEAR(area_of(p), 3, 1e-6);
+      EXPECT_FALSE(covers(p, 1.4f, 1.6f));
+    }
+  }
 }
 
 TEST(Polygon, OneThatCrossesItselfIsRefused) {

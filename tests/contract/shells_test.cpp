@@ -73,9 +73,6 @@ int wrong_places(const TriangleMesh& mesh, double voxel, const Holds& holds) {
   return wrong;
 }
 
-Holds in_ball(double radius, const V3d& centre = V3d(0)) {
-  return [=](const V3d& p) { return (p - centre).length() < radius; };
-}
 Holds in_box(const V3d& low, const V3d& high) {
   return [=](const V3d& p) {
     return p.x > low.x && p.y > low.y && p.z > low.z && p.x < high.x && p.y < high.y &&
@@ -118,6 +115,22 @@ TEST(Shells, ApartEachIsTurnedOutwardByItself) {
               1e-5);
 }
 
+// A box in a box that sticks out of one of its sides, by a thousandth of its own volume or more, is
+// one body with it; by less it is a cavity. Which side makes no difference.
+TEST(Shells, StickOutAlongAnyAxisAlike) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool low : {false, true}) {
+      for (const float out : {0.0002f, 0.001f, 0.004f}) {
+        V3f from(-0.19f), to(0.19f);
+        (low ? from : to)[axis] = (0.2f + out) * (low ? -1.f : 1.f);
+        const Shells shells =
+            find_shells(joined(box_mesh(V3f(-0.2f), V3f(0.2f)), box_mesh(from, to)));
+        EXPECT_EQ(shells.bodies(), out / 0.39f > 1e-3f ? 1 : 2) << axis << " " << out;
+      }
+    }
+  }
+}
+
 // Two boxes that cross are their union, turned either way, also with faces in common planes, where
 // no edge crosses the inside of a face, and where they share a small corner of two long bars.
 TEST(Shells, CrossingOnesAreUnited) {
@@ -142,6 +155,31 @@ TEST(Shells, CrossingOnesAreUnited) {
   }
 }
 
+TEST(Shells, HoldTwiceWhatIsDoubled) {
+  const TriangleMesh one = box_mesh(V3f(0), V3f(1));
+  TriangleMesh doubled = one;
+  doubled.triangle.insert(doubled.triangle.end(), one.triangle.begin(), one.triangle.end());
+  EXPECT_TRUE(holds_twice(doubled));
+  EXPECT_TRUE(holds_twice(joined(one, one)));
+  EXPECT_TRUE(holds_twice(joined(one, box_mesh(V3f(0.5f), V3f(1.5f)))));
+  EXPECT_FALSE(holds_twice(one));
+  EXPECT_FALSE(holds_twice(joined(one, box_mesh(V3f(0.2f), V3f(0.8f)))));
+}
+
+TEST(Shells, MeetWhereTheyCrossOrTouch) {
+  const TriangleMesh one = box_mesh(V3f(0), V3f(1));
+  EXPECT_FALSE(shells_meet(one));
+  EXPECT_FALSE(shells_meet(joined(one, box_mesh(V3f(0.2f), V3f(0.8f)))));  // a cavity
+  EXPECT_FALSE(shells_meet(joined(one, box_mesh(V3f(1.001f), V3f(2)))));   // apart
+  EXPECT_TRUE(shells_meet(joined(one, box_mesh(V3f(0.5f), V3f(1.5f)))));   // crossing
+  for (int axis = 0; axis < 3; ++axis) {
+    V3f beside(0), within(0.2f);
+    beside[axis] = 1, within[axis] = 0;
+    EXPECT_TRUE(shells_meet(joined(one, box_mesh(beside, beside + V3f(1)))));
+    EXPECT_TRUE(shells_meet(joined(one, box_mesh(within, V3f(0.8f)))));  // a flush cavity
+  }
+}
+
 // What the solid hides of a shell is no surface: distances within are to what can be seen.
 TEST(Shells, HiddenFacesAreAtNoDistance) {
   const TriangleMesh mesh =
@@ -161,6 +199,44 @@ TEST(Shells, HiddenFacesAreAtNoDistance) {
       }
     }
   }
+}
+
+// Two cavities that cross are one: no wall is left between them. A plate in it that is thinner than
+// a voxel stays.
+TEST(Shells, CavitiesThatCrossAreOneWithoutAWall) {
+  const TriangleMesh outer = box_mesh(V3f(-1.2f, -0.6f, -0.6f), V3f(1.2f, 0.6f, 0.6f));
+  const TriangleMesh mesh =
+      joined(outer, joined(box_mesh(V3f(-1, -0.4f, -0.4f), V3f(0.3f, 0.4f, 0.4f)),
+                           box_mesh(V3f(-0.3f, -0.4f, -0.4f), V3f(1, 0.4f, 0.4f))));
+  constexpr double voxel = 0.05;
+  const LevelSet set = make_level_set(mesh, voxel, 4 * voxel);
+  for (int x = -18; x <= 18; ++x) {
+    for (int y = -7; y <= 7; ++y) {
+      for (int z = -7; z <= 7; ++z) {
+        const double depth = voxel * std::min({20 - std::abs(x), 8 - std::abs(y), 8 - std::abs(z)});
+        const V3d p = V3d(x, y, z) * voxel;
+        EXPECT_GT(value_at(set, p), std::min(depth - 1.5 * voxel, 4 * voxel) - 1e-4) << p;
+      }
+    }
+  }
+  const TriangleMesh plate = box_mesh(V3f(-0.01f, -0.3f, -0.3f), V3f(0.01f, 0.3f, 0.3f));
+  EXPECT_LT(std::abs(value_at(make_level_set(joined(mesh, plate), voxel, 4 * voxel), V3d(0))),
+            0.011);
+}
+
+// Two chambers, with a wall of 0.02 between them, that a third below joins.
+TEST(Shells, AThinWallBetweenCavitiesThatCrossStays) {
+  TriangleMesh mesh = box_mesh(V3f(-0.7f), V3f(0.7f));
+  for (const auto& [low, high] : {std::pair{V3f(-0.5f, -0.2f, -0.3f), V3f(-0.01f, 0.5f, 0.3f)},
+                                  {V3f(0.01f, -0.2f, -0.3f), V3f(0.5f, 0.5f, 0.3f)},
+                                  {V3f(-0.5f, -0.5f, -0.3f), V3f(0.5f, -0.1f, 0.3f)}})
+    mesh = joined(mesh, box_mesh(low, high));
+  EXPECT_EQ(find_shells(mesh).depth, (std::vector<int>{0, 1}));
+  constexpr double voxel = 0.05;
+  const LevelSet set = make_level_set(mesh, voxel, 4 * voxel);
+  EXPECT_NEAR(value_at(set, V3d(0, 0.2, 0)), -0.01, 1e-4);
+  EXPECT_NEAR(value_at(set, V3d(0.1, 0.2, 0)), 0.09, 1e-4);
+  EXPECT_GT(value_at(set, V3d(0, -0.3, 0)), 0.2 - 1.5 * voxel);
 }
 
 // A cavity in a body of two crossing boxes, and a ball in it; the cavity is wholly in both boxes,

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/files.h"
+#include "tests/contract/box_mesh.h"
 #include "tests/driver/tiny_shot.h"
 #include "tests/temporary_folder.h"
 
@@ -94,6 +95,29 @@ TEST(PlanScene, ReadsThePicturesThatAreUsed) {
   EXPECT_EQ(refused.code, 1);
   EXPECT_NE(refused.err.find("dark.hdr"), std::string::npos) << refused.err;
   EXPECT_EQ(planned("ground", "no picture").code, 0);
+}
+
+// What only a later frame or the picture would meet.
+TEST(PlanScene, ReadsTheMeshesOfAllFrames) {
+  const TinyShot shot;
+  const auto planned = [&](int frame, const std::string& corner) {
+    for (int k = 1001; k <= 1004; ++k)
+      test::write_box(shot.folder() / ("box." + std::to_string(k) + ".obj"), Imath::V3f(0.01f));
+    const std::filesystem::path file = shot.folder() / ("box." + std::to_string(frame) + ".obj");
+    std::string text = read_text(file);
+    write_file_whole(file, text.replace(text.find("f 1 "), 4, "f " + corner + " "));
+    return run_with(shot, "plan",
+                    "[[obstacle]]\ntype = \"mesh\"\nmesh = \"box.%04d.obj\"\n"
+                    "position = [0, 50, 0]\n",
+                    {"--strict", "--set", "shot.frames=[1001, 1004]"});
+  };
+  EXPECT_EQ(planned(1001, "1").code, 0);
+  const test::Ended open = planned(1003, "2");
+  EXPECT_EQ(open.code, 1);
+  EXPECT_NE(open.err.find("box.1003.obj"), std::string::npos) << open.err;
+  const test::Ended lost = planned(1004, "1/9");
+  EXPECT_EQ(lost.code, 1);
+  EXPECT_NE(lost.err.find("texture coordinate"), std::string::npos) << lost.err;
 }
 
 TEST(PlanScene, RefusesAFluidThatIsAllInAnObstacle) {
