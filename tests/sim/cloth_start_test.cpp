@@ -30,6 +30,23 @@ std::string refusal(const Shot& shot) {
   return "";
 }
 
+// Vertices stand on floats: springs have the lengths between these, whatever the compiler inlines,
+// so that a sheet starts without tension.
+TEST(ClothStart, HasTheRestLengthsThatItsVerticesStandAt) {
+  Shot shot = empty_shot();
+  Cloth& sheet = add_sheet(shot, 0.4, 0.1, 12);
+  sheet.u = V3d(0.4, 0.1, 0), sheet.v = V3d(0, -0.2, 0.3);
+  const sim::Scene scene = sim::build_scene(shot);
+  const sim::ClothTopology& t = scene.cloth;
+  for (size_t v = 0; v + 1 < t.spring_start.size(); ++v) {
+    for (int s = t.spring_start[v]; s < t.spring_start[v + 1]; ++s) {
+      const V3d d = at(scene.start.cloth_position, size_t(t.spring_end[size_t(s)])) -
+                    at(scene.start.cloth_position, v);
+      ASSERT_EQ(t.rest_length[size_t(s)], float(d.length())) << v << " " << s;
+    }
+  }
+}
+
 // Walls would sweep it in within the first step.
 TEST(ClothStart, BeyondAWallIsRefused) {
   Shot shot = empty_shot();
