@@ -40,26 +40,36 @@ std::vector<Triangle> images_of(const Triangle& triangle, float reach, const Par
   return images;
 }
 
-/// Refuses sheets that walls would sweep in: half a spacing is what a wall is known to.
-void check_cloth_within_walls(const Shot& shot, const Scene& scene) {
+/// The first place of a sheet that walls would sweep in, half a spacing beyond one or more; empty
+/// if there is none.
+std::string place_beyond_walls(const Shot& shot, const Sheet& sheet) {
   const Domain& domain = shot.domain;
   const double slack = 0.5 * shot.fluid.spacing + 1e-9;
-  for (size_t s = 0; s < scene.sheet.size(); ++s) {
-    const Sheet& sheet = scene.sheet[s];
-    for (size_t v = 0; v < sheet.point.size(); ++v) {
-      const V3d& p = sheet.position[sheet.point[v]];
-      for (int k = 0; k < 3; ++k) {
-        if (domain.axis[size_t(k)] != Axis::walls) continue;
-        if (p[k] >= domain.min[k] - slack && p[k] <= domain.max[k] + slack) continue;
-        const std::string guess = guess_of_unit(domain, shot.cloth[s], sheet);
-        throw Error(
-            fmt::format("{}: cloth \"{}\" starts beyond the domain's walls: vertex {} is at {:.6g} "
-                        "m in {}, they stand at {:.6g} and {:.6g} m. Move it, widen [domain], or "
-                        "open the side ({} = \"open\"){}{}",
-                        shot.file.string(), sheet.name, sheet.point[v], p[k], "xyz"[k],
-                        domain.min[k], domain.max[k], "xyz"[k], guess.empty() ? "" : ": ", guess));
-      }
+  for (size_t v = 0; v < sheet.point.size(); ++v) {
+    const V3d& p = sheet.position[sheet.point[v]];
+    for (int k = 0; k < 3; ++k) {
+      if (domain.axis[size_t(k)] != Axis::walls) continue;
+      if (p[k] >= domain.min[k] - slack && p[k] <= domain.max[k] + slack) continue;
+      return fmt::format(
+          "vertex {} is at {:.6g} m in {}, they stand at {:.6g} and {:.6g} m. Move it, widen "
+          "[domain], or open the side ({} = \"open\")",
+          sheet.point[v], p[k], "xyz"[k], domain.min[k], domain.max[k], "xyz"[k]);
     }
+  }
+  return "";
+}
+
+/// Walls sweep cloth in within the first step: that is refused beside fluid, which it would throw.
+void check_cloth_within_walls(const Shot& shot, Scene& scene) {
+  for (size_t s = 0; s < scene.sheet.size(); ++s) {
+    const std::string place = place_beyond_walls(shot, scene.sheet[s]);
+    if (place.empty()) continue;
+    const std::string guess = guess_of_unit(shot.domain, shot.cloth[s], scene.sheet[s]);
+    const std::string text =
+        fmt::format("cloth \"{}\" starts beyond the domain's walls, which sweep it in: {}{}{}",
+                    scene.sheet[s].name, place, guess.empty() ? "" : ": ", guess);
+    if (shot.fluid.present()) throw Error(fmt::format("{}: {}", shot.file.string(), text));
+    scene.report.notes.push_back(text);
   }
 }
 

@@ -5,8 +5,9 @@
 
 namespace drench::sim {
 
-/// @throws Error with cloth, place, and what to move if a sheet starts beyond walls or in an
-/// obstacle, or fluid starts nearer to a sheet than a quarter spacing.
+/// Notes sheets alone that start beyond walls.
+/// @throws Error with cloth, place, and what to move if a sheet beside fluid does so, a sheet
+/// starts in an obstacle, or fluid starts nearer to a sheet than a quarter spacing.
 void check_cloth_start(const Shot& shot, Scene& scene);
 
 }  // namespace drench::sim
