@@ -79,10 +79,23 @@ drench_install() {
   fi
 }
 
-# Configures once and builds; a second time this takes as long as ninja needs to see that nothing changed.
+# Whether a GPU is there that the CUDA simulator could run on.
+drench_has_device() { compgen -G '/dev/nvidia[0-9]*' > /dev/null; }
+
+# Configures once and builds; a second time this takes as long as ninja needs to see that nothing
+# changed. `drench_cuda` is what DRENCH_CUDA becomes where the build does not say it yet, the
+# environment's DRENCH_CUDA what it becomes in any case.
 drench_build() {
-  if [[ ! -f $root/build/build.ninja ]]; then
-    cmake --preset release -S "$root" >&2
+  local cuda=${DRENCH_CUDA:-} before=
+  if [[ -f $root/build/CMakeCache.txt ]]; then
+    before=$(sed -n 's/^DRENCH_CUDA:STRING=//p' "$root/build/CMakeCache.txt")
+  fi
+  # What ./run left out ./test needs; what was asked for by name stays.
+  if [[ -z $cuda && ( -z $before || ($before == OFF && ${drench_cuda:-AUTO} == AUTO) ) ]]; then
+    cuda=${drench_cuda:-AUTO}
+  fi
+  if [[ ! -f $root/build/build.ninja || (-n $cuda && $cuda != "$before") ]]; then
+    cmake --preset release -S "$root" ${cuda:+-DDRENCH_CUDA=$cuda} >&2
   fi
   cmake --build "$root/build" -j"$(nproc)" --target "$@" >&2
 }

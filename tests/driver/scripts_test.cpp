@@ -50,6 +50,34 @@ TEST(Scripts, SayWhatToInstallWhenTheyCannot) {
   EXPECT_NE(ended.err.find("gone"), std::string::npos) << ended.err;
 }
 
+// What cmake is called with, of a build that was configured with `before` or not yet.
+std::string configured(const std::string& before, const std::string& wish) {
+  const Ended ended = bash(
+      "source '" + root +
+      "/cmake/setup.sh'; root=$(mktemp -d); cd \"$root\"; trap 'rm -r \"$root\"' EXIT; "
+      "mkdir build; before='" +
+      before + "'; " +
+      "if [[ -n $before ]]; then echo DRENCH_CUDA:STRING=$before > build/CMakeCache.txt; "
+      "touch build/build.ninja; fi; "
+      "cmake() { if [[ $1 == --preset ]]; then echo \"${@:5}\" > called; fi; }; touch called; " +
+      wish + " drench_build drench; cat called");
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  return ended.out;
+}
+
+// The CUDA simulator is left out by `./run` where no device is, and brought back by what needs it.
+TEST(Scripts, BuildTheCudaSimulatorWhereItIsOfUse) {
+  const std::string run = "drench_cuda=OFF;", test = "", forced = "DRENCH_CUDA=ON;";
+  EXPECT_EQ(configured("", run), "-DDRENCH_CUDA=OFF\n");
+  EXPECT_EQ(configured("", test), "-DDRENCH_CUDA=AUTO\n");
+  EXPECT_EQ(configured("OFF", run), "");
+  EXPECT_EQ(configured("OFF", test), "-DDRENCH_CUDA=AUTO\n");
+  EXPECT_EQ(configured("AUTO", run), "");
+  EXPECT_EQ(configured("AUTO", test), "");
+  EXPECT_EQ(configured("OFF", forced), "-DDRENCH_CUDA=ON\n");
+  EXPECT_EQ(configured("ON", run + forced), "");
+}
+
 TEST(Scripts, ExplainThemselvesWithoutAShot) {
   const Ended ended = bash("\"$root/run\"");
   EXPECT_EQ(ended.code, 1);
