@@ -61,8 +61,8 @@ std::string obstacles_that_take_room(const Shot& shot, Scene& scene, const HostS
     names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", scene.obstacles.obstacle(k).name);
   }
   return fmt::format(
-      "The domain is closed, and what moves in it leaves room for {:.0f} of its {:.0f} particles: "
-      "obstacle {}. Stop it earlier, or leave the fluid a way out",
+      "The domain is closed, and what moves in it leaves room for {:.0f} particles, of which there "
+      "are {:.0f}: obstacle {}. Stop it earlier, or leave the fluid a way out",
       room, held, names);
 }
 

@@ -46,6 +46,7 @@ std::string place_beyond_walls(const Shot& shot, const Sheet& sheet) {
   const Domain& domain = shot.domain;
   const double slack = 0.5 * shot.fluid.spacing + 1e-9;
   for (size_t v = 0; v < sheet.point.size(); ++v) {
+    if (sheet.pinned[v]) continue;  // stays where it is
     const V3d& p = sheet.position[sheet.point[v]];
     for (int k = 0; k < 3; ++k) {
       if (domain.axis[size_t(k)] != Axis::walls) continue;
@@ -121,18 +122,22 @@ class ParticleCells {
   std::unordered_multimap<uint64_t, int> particle_;
 };
 
-/// A triangle of the sheets where the first step has it, m local: walls keep cloth off.
+/// A triangle of the sheets where the first step has it, m local: walls keep off what is not
+/// pinned.
 Triangle held_triangle(const Scene& scene, int t) {
   const Parameters& p = scene.parameters;
   const HostVec &v = scene.start.cloth_position, &shift = scene.cloth.corner_shift;
-  const auto held = [&](int axis, float x) {
+  const auto held = [&](int vertex, int axis, float x) {
     const float margin = cloth_wall_margin * p.spacing;
-    return p.wall[axis] ? std::max(std::min(x, p.high[axis] - margin), p.low[axis] + margin) : x;
+    const bool moves = scene.cloth.inverse_mass[size_t(vertex)] > 0;
+    return moves && p.wall[axis]
+               ? std::max(std::min(x, p.high[axis] - margin), p.low[axis] + margin)
+               : x;
   };
   Triangle corner;
   for (int k = 0; k < 3; ++k) {
     const int c = scene.cloth.corner[3 * t + k];
-    corner[k] = {held(0, v.x[c]), held(1, v.y[c]), held(2, v.z[c])};
+    corner[k] = {held(c, 0, v.x[c]), held(c, 1, v.y[c]), held(c, 2, v.z[c])};
     if (shift.size() > 0)
       corner[k] = corner[k] + Point{shift.x[3 * t + k], shift.y[3 * t + k], shift.z[3 * t + k]};
   }

@@ -10,7 +10,7 @@
 namespace drench::sim {
 
 FrameMotion::FrameMotion(const Shot& shot, const LocalFrame& frame)
-    : angle_(shot.frame_rotation_deg), timeline_(shot.timeline) {
+    : angle_(shot.frame_rotation_deg) {
   shot_.timeline = shot.timeline;
   shot_.gravity = shot.gravity, shot_.frame_rotation_deg = shot.frame_rotation_deg;
   shot_.frame_axis = shot.frame_axis;
@@ -55,7 +55,7 @@ double FrameMotion::carried(double time) const {
 double FrameMotion::largest_speed() const {
   double most = 0;
   for (const auto& [frame, angle] : angle_.keys)
-    most = std::max(most, std::abs(rate((frame - timeline_.first) / timeline_.fps)));
+    most = std::max(most, std::abs(rate((frame - shot_.timeline.first) / shot_.timeline.fps)));
   return most * reach_;
 }
 

@@ -36,12 +36,11 @@ class FrameMotion {
   double largest_speed() const;
 
  private:
-  double frame_at(double time) const { return timeline_.first + time * timeline_.fps; }
+  double frame_at(double time) const { return shot_.timeline.first + time * shot_.timeline.fps; }
 
-  Shot shot_;                  // of which gravity_at reads its keys
+  Shot shot_;                  // of which gravity_at reads keys and frames
   Animated<double> angle_{0};  // rad
   V3d axis_{0, 1, 0}, centre_{0};
-  Timeline timeline_;
   double reach_ = 0;  // m, of the domain's farthest corner from the axis
   bool moves_ = false, turns_ = false;
 };

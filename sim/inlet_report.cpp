@@ -58,10 +58,11 @@ struct Count {
 std::string where_of(const Shot& shot, const Count& count) {
   const auto most = std::max_element(count.obstacle.begin(), count.obstacle.end());
   const size_t by_obstacle = most == count.obstacle.end() ? 0 : *most;
-  if (count.wall > by_obstacle && count.wall >= count.open_side) return "beyond the domain's walls";
-  if (count.sink > by_obstacle && count.sink >= count.open_side) return "in a sink";
-  if (count.open_side > by_obstacle) return "beyond the domain's open sides";
-  if (by_obstacle == 0) return "";
+  const size_t largest = std::max({by_obstacle, count.wall, count.open_side, count.sink});
+  if (largest == 0) return "";
+  if (largest == count.wall) return "beyond the domain's walls";
+  if (largest == count.open_side) return "beyond the domain's open sides";
+  if (largest == count.sink) return "in a sink";
   return fmt::format("inside obstacle \"{}\" or nearer to it than half a spacing",
                      shot.obstacle[size_t(most - count.obstacle.begin())].name);
 }
@@ -154,10 +155,10 @@ InletReport report_of_inlet(const Shot& shot, Scene& scene, size_t e) {
                    (of_mesh ? double(count.places) / (looks + 1)
                             : inlet_area(emitter) * emitter.speed * (end - begin) / (a * a * a));
   if (!report.never() || !report.fixed) return report;
-  throw Error(fmt::format(
-      "{}: {} can never send a particle: every place of it is {} through the whole shot. Move it "
-      "more than half a spacing ({:.3g} m) out, or remove it",
-      shot.file.string(), report.name, report.where, 0.5 * a));
+  throw Error(
+      fmt::format("{}: {} can never send a particle: it is {} through the whole shot. Move it "
+                  "more than half a spacing ({:.3g} m) out, or remove it",
+                  shot.file.string(), report.name, report.where, 0.5 * a));
 }
 
 }  // namespace drench::sim

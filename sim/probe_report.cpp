@@ -50,7 +50,9 @@ std::string why_never(const Shot& shot, Scene& scene, const Probe& probe) {
     const int carrier = *obstacle_named(shot, probe.on);
     if (scene.obstacles.moves(carrier)) return "";
     p = obstacle_pose(scene.obstacles.obstacle(carrier), shot.timeline.first).to_world(p);
-    if (beyond(shot.domain, p, probe.radius + a)) {
+    V3d within = p;  // a height is read over all of its line
+    if (probe.type == ProbeType::height) within.y = shot.domain.min.y;
+    if (beyond(shot.domain, within, probe.radius + a)) {
       return fmt::format(
           "on \"{}\" its position is ({:.4g}, {:.4g}, {:.4g}) m in the world, beyond the domain: "
           "give it in the obstacle's own coordinates",
@@ -75,7 +77,7 @@ void note_probes(const Shot& shot, Scene& scene) {
     if (probe.type == ProbeType::force) {
       const auto target = obstacle_named(shot, probe.target);
       if (target && !scene.obstacles.moves(*target) &&
-          lies_beyond(shot.domain, scene.obstacles, *target))
+          lies_beyond(shot.domain, shot.fluid.spacing, scene.obstacles, *target))
         why = fmt::format("obstacle \"{}\" lies wholly beyond the domain: move it", probe.target);
     } else if (probe.type == ProbeType::velocity || probe.type == ProbeType::pressure ||
                probe.type == ProbeType::height) {

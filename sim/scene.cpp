@@ -12,8 +12,8 @@
 #include "sim/cloth_start.h"
 #include "sim/geometry.h"
 #include "sim/kernels.h"
-#include "sim/probe_report.h"
 #include "sim/periodic.h"
+#include "sim/probe_report.h"
 
 namespace drench::sim {
 

@@ -25,9 +25,8 @@ struct LocalFrame {
   double origin[3];
   double spacing;
 
-  /// Not inlined: where it was, g++ 12 left the rounding to float out of differences, and a sheet
-  /// had other rest lengths than its vertices' distances, by the chance of what else stood in the
-  /// file.
+  /// Not inlined: within differences g++ 12 may leave the rounding to float out, and a sheet would
+  /// have other rest lengths than the distances of its vertices.
   [[gnu::noinline]] float to_local(int axis, double world) const;
   double to_world(int axis, float local) const { return origin[axis] + double(local); }
 };

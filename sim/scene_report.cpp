@@ -74,7 +74,7 @@ double steps_a_frame(const Shot& shot, Scene& scene) {
 void check_anything_starts(const Shot& shot, const SceneReport& report) {
   const bool never = std::all_of(report.inlet.begin(), report.inlet.end(),
                                  [](const InletReport& inlet) { return !inlet.in_time; });
-  if (!shot.fluid.present() || !shot.cloth.empty() || report.particles > 0 || !never) return;
+  if (report.inlet.empty() || !shot.cloth.empty() || report.particles > 0 || !never) return;
   throw Error(fmt::format(
       "{}: there is never any fluid: {} sends its first layer after the last frame or after its "
       "stop. Change its start and stop, which count from the start of the simulation, pre-roll "
@@ -96,7 +96,7 @@ double SourceReport::rounding(double spacing) const {
   return volume > 0 ? double(asked) * spacing * spacing * spacing / volume - 1 : 0;
 }
 
-bool lies_beyond(const Domain& domain, const ObstacleSet& solids, int k) {
+bool lies_beyond(const Domain& domain, double spacing, const ObstacleSet& solids, int k) {
   const Obstacle& shape = solids.obstacle(k);
   const Pose pose = obstacle_pose(shape, 0);
   const bool plane = shape.type == ObstacleType::plane;
@@ -116,7 +116,9 @@ bool lies_beyond(const Domain& domain, const ObstacleSet& solids, int k) {
   if (plane) return lowest > 0;
   for (int c = 0; c < 3; ++c) {
     if (domain.axis[size_t(c)] == Axis::periodic) continue;
-    if (high[c] < domain.min[c] || low[c] > domain.max[c]) return true;
+    // Fluid is dropped a spacing beyond an open side.
+    const double more = domain.axis[size_t(c)] == Axis::open ? spacing : 0;
+    if (high[c] < domain.min[c] - more || low[c] > domain.max[c] + more) return true;
   }
   return false;
 }
@@ -204,7 +206,8 @@ void note_sinks(const Shot& shot, Scene& scene) {
           "sink \"{}\" takes nothing: it starts after the last frame. Change its start, which "
           "counts from the start of the simulation, pre-roll included",
           shape.name));
-    } else if (!scene.sinks.moves(k) && lies_beyond(shot.domain, scene.sinks, k)) {
+    } else if (!scene.sinks.moves(k) &&
+               lies_beyond(shot.domain, shot.fluid.spacing, scene.sinks, k)) {
       scene.report.notes.push_back(fmt::format(
           "sink \"{}\" takes nothing: it lies wholly beyond the domain. Look at its position",
           shape.name));

@@ -79,7 +79,7 @@ std::vector<std::string> warnings_of(const SceneReport& report);
 void note_meshes(const Shot& shot, Scene& scene);
 
 /// Whether the bounds of a solid that stands, or the solid side of a plane, miss the domain.
-bool lies_beyond(const Domain& domain, const ObstacleSet& solids, int k);
+bool lies_beyond(const Domain& domain, double spacing, const ObstacleSet& solids, int k);
 
 /// Notes sheets whose unit may be another.
 void note_cloth(const Shot& shot, Scene& scene);

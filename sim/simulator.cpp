@@ -302,6 +302,13 @@ struct Simulator::Implementation {
     return {shot.time_step, "fixed"};
   }
 
+  /// Of each emitter: whether it is shut.
+  std::vector<bool> crowded() const {
+    std::vector<bool> now;
+    for (const uint64_t particles : shut) now.push_back(particles > 0);
+    return now;
+  }
+
   /// @throws Error if anything is not finite or absurdly fast after a step of dt: what, where,
   /// when, why, and what is safe.
   void check_state(double dt) {
@@ -322,7 +329,7 @@ struct Simulator::Implementation {
         scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
         scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
-        sim::cause_of_blow_up(shot, scene, state, solver->density(), told_full, {particle, i}, time,
+        sim::cause_of_blow_up(shot, scene, state, solver->density(), crowded(), {particle, i}, time,
                               dt)));
   }
 

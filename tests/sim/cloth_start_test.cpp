@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/error.h"
+#include "tests/sim/said.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -19,15 +19,6 @@ Shot tank_shot() {
   shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
   add_box(shot, V3d(-0.25, 0, -0.25), {20, 8, 20});
   return shot;
-}
-
-std::string refusal(const Shot& shot) {
-  try {
-    sim::build_scene(shot);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 // Vertices stand on floats: springs have the lengths between these, whatever the compiler inlines,
@@ -52,13 +43,16 @@ TEST(ClothStart, BeyondAWallIsRefusedBesideFluidAndSaidWithout) {
   Shot shot = empty_shot();
   shot.domain.axis[0] = Axis::walls;  // at 1 m
   Cloth& sheet = add_sheet(shot, 0.4, 0, 8);
-  const auto notes = [&] { return sim::warnings_of(sim::build_scene(shot).report); };
-  EXPECT_EQ(notes(), std::vector<std::string>{});
+  EXPECT_EQ(warnings(shot), std::vector<std::string>{});
   sheet.corner.x = 0.61;
-  ASSERT_EQ(notes().size(), 1u);
-  EXPECT_NE(notes()[0].find("starts beyond the domain's walls"), std::string::npos);
-  EXPECT_NE(notes()[0].find("1.01 m in x"), std::string::npos) << notes()[0];
+  ASSERT_EQ(warnings(shot).size(), 1u);
+  expect_words(warnings(shot)[0], {"starts beyond the domain's walls", "1.01 m in x"});
   add_box(shot, V3d(-0.5), {4, 4, 4});
+  ClothPin all;
+  all.box = {V3d(-2), V3d(2)};
+  shot.cloth[0].pin = {all};  // what is pinned stays
+  EXPECT_EQ(refusal(shot), "");
+  shot.cloth[0].pin.clear();
   EXPECT_NE(refusal(shot).find("starts beyond the domain's walls"), std::string::npos);
   shot.domain.axis[0] = Axis::open;
   EXPECT_EQ(refusal(shot), "");

@@ -12,6 +12,7 @@
 #include "sim/simulator.h"
 #include "tests/sim/crossings.h"
 #include "tests/sim/periodic_scenes.h"
+#include "tests/sim/said.h"
 #include "tests/sim/same_state.h"
 #include "tests/temporary_folder.h"
 #include "tests/validation/strip_pool.h"
@@ -97,15 +98,6 @@ TEST(JoinedSheet, AMeshFileIsJoinedAsAGridIs) {
   // Each of its 5 x 6 squares has a diagonal edge; the other diagonal is the bend across it, and
   // edges inside have a bend as well: 6 x 6 along z, 5 x 6 along x, less 2 x 6 at the rim.
   EXPECT_EQ(mesh.spring_end.size() / 2, size_t(30 + 30 + 36 + 30 + (36 - 12) + 30));
-}
-
-std::string refusal(const Shot& shot) {
-  try {
-    sim::build_scene(shot);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(JoinedSheet, RefusesASlitAndTooFewCells) {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/sim/obstacle_scenes.h"
+#include "tests/sim/said.h"
 #include "tests/sim/support.h"
-#include "tests/temporary_folder.h"
 
 namespace drench::sim_tests {
 namespace {
@@ -34,18 +34,6 @@ FluidEmitter& add_disc(Shot& shot, const V3d& centre) {
   disc.center = centre, disc.radius = 0.06, disc.speed = 1;
   shot.fluid.emitter.push_back(disc);
   return shot.fluid.emitter.back();
-}
-
-std::vector<std::string> warnings(const Shot& shot) {
-  return sim::warnings_of(sim::build_scene(shot).report);
-}
-std::string refusal(const Shot& shot) {
-  return test::error_of([&] { sim::build_scene(shot); });
-}
-
-void expect_words(const std::string& text, const std::vector<std::string>& words) {
-  for (const std::string& word : words)
-    EXPECT_NE(text.find(word), std::string::npos) << word << " in: " << text;
 }
 
 TEST(SceneReport, CountsWhatSourcesLoseToObstacles) {
