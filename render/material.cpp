@@ -136,9 +136,11 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name, Picture
 }
 
 void check_pictures(const Shot& shot, PictureMemory memory) {
-  std::set<std::string> used{shot.fluid.material};
+  std::set<std::string> used;
+  if (shot.fluid.present()) used.insert(shot.fluid.material);
   if (shot.ground.present) used.insert(shot.ground.material);
-  for (const Obstacle& obstacle : shot.obstacle) used.insert(obstacle.material);
+  for (const Obstacle& obstacle : shot.obstacle)
+    if (obstacle.visible) used.insert(obstacle.material);
   for (const Cloth& cloth : shot.cloth) used.insert(cloth.material);
   for (const std::string& name : used) find_material(shot, name, memory);
   for (const Light& light : shot.light)

@@ -178,10 +178,11 @@ void turn_normals(TriangleMesh& mesh) {
     if (face[v].dot(V3d(mesh.normal[v])) < 0) mesh.normal[v] = -mesh.normal[v];
 }
 
-bool is_glass(const Shot& shot, const Obstacle& obstacle) {
-  return std::any_of(shot.material.begin(), shot.material.end(), [&](const Material& m) {
-    return m.name == obstacle.material && m.type == MaterialType::dielectric;
-  });
+bool is_drawn_as_glass(const Shot& shot, const Obstacle& obstacle) {
+  return obstacle.visible &&
+         std::any_of(shot.material.begin(), shot.material.end(), [&](const Material& m) {
+           return m.name == obstacle.material && m.type == MaterialType::dielectric;
+         });
 }
 
 void add_quad(TriangleMesh& mesh, const V3d& corner, const V3d& u, const V3d& v) {
@@ -343,7 +344,8 @@ TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int 
   const std::filesystem::path file =
       sequence ? sequence_file(obstacle.mesh_file, known) : obstacle.mesh_file;
   TriangleMesh mesh = read_closed_mesh(file, obstacle.scale, corners, shape);
-  if (corners == CornerData::uv_and_normal && is_glass(shot, obstacle) && shells_meet(mesh))
+  if (corners == CornerData::uv_and_normal && is_drawn_as_glass(shot, obstacle) &&
+      shells_meet(mesh))
     log_file_warning("mesh", file,
                      "shells of this glass cross or touch, and a picture takes each of their faces "
                      "for the glass's end: it is too thin there. Unite them where they are "

@@ -237,7 +237,7 @@ void plan_command(const ShotArguments& arguments) {
     text += scene_text(scene.report);
     scene_object = json_line(scene_json(scene.report));
   }
-  if (!plan.nothing_to_do()) check_obstacle_meshes(job.shot);
+  if (plan.simulation.needed || renders(plan)) check_obstacle_meshes(job.shot);
   if (renders(plan)) check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);

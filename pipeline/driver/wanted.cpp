@@ -88,10 +88,17 @@ void add_source_meshes(const Shot& shot, StageKeyBuilder& builder) {
   for (const Sink& sink : shot.sink) builder.file(sink.shape.mesh_file);
 }
 
+/// Of the files of a frame, and of the first, by whose polygons all are cut.
 std::map<int, Digest> sequence_digests(const Shot& shot) {
   std::map<int, Digest> digests;
+  Hasher first;
+  for (const Obstacle& obstacle : shot.obstacle)
+    if (is_sequence(obstacle.mesh_file))
+      first.digest(hash_file(sequence_file(obstacle.mesh_file, shot.timeline.first)));
+  const Digest of_first = first.finish();
   for (int frame = shot.timeline.first; frame <= shot.timeline.last; ++frame) {
     Hasher hasher;
+    hasher.digest(of_first);
     bool any = false;
     for (const Obstacle& obstacle : shot.obstacle) {
       if (!is_sequence(obstacle.mesh_file)) continue;
