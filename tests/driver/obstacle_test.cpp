@@ -134,6 +134,23 @@ TEST(MeshObstacle, OfASequenceLetsNoParticleInWhereItSwells) {
   EXPECT_GT(top(), before);  // water made room
 }
 
+// Every frame is cut by the polygons of the first, so that this is an input of all of them.
+TEST(MeshObstacle, OfASequenceDependsOnItsFrameAndTheFirst) {
+  const TemporaryFolder folder;
+  Shot shot = falling_on(swelling_ball(folder, [](int) { return 0.05; }));
+  shot.timeline = {1001, 1013, 24};
+  const auto inputs = [&](int frame) {
+    return sequence_inputs(want(shot, {1001}, {Step::mesh}, "cpu"), frame, frame);
+  };
+  const InputDigests third = inputs(1003), last = inputs(1013);
+  EXPECT_EQ(third, inputs(1003));
+  write_mesh(folder / "ball.1003.ply", test::unit_sphere(8, 16));
+  EXPECT_NE(third, inputs(1003));
+  EXPECT_EQ(last, inputs(1013));
+  write_mesh(folder / "ball.1001.ply", test::unit_sphere(8, 16));
+  EXPECT_NE(last, inputs(1013));
+}
+
 // A sheet that bears water is lifted as a ball of a sequence swells below it: no vertex and no
 // particle is in the ball, and a run that is taken up has the same bits.
 TEST(MeshObstacle, OfASequenceLiftsTheSheetAboveIt) {
