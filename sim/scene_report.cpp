@@ -15,8 +15,7 @@ namespace drench::sim {
 
 namespace {
 
-// Shares. Obstacles in a pool displace some of it in most shots; an inlet is to send all.
-constexpr double worth_a_word_of_source = 0.5, worth_a_word_of_inlet = 0.05;
+constexpr double worth_a_word = 0.05;  // share of a source or inlet
 constexpr double worth_a_word_of_rounding = 0.2;
 
 /// "2400 particles (0.3 litres)".
@@ -268,7 +267,7 @@ std::vector<std::string> warnings_of(const SceneReport& report) {
                       amount(double(source.asked), report.spacing), 100 * rounding));
     }
     const double gone = double(source.gone());
-    if (gone < worth_a_word_of_source * double(source.asked)) continue;
+    if (gone < worth_a_word * double(source.asked)) continue;
     all.push_back(fmt::format(
         "{} loses {} of {}, {:.0f} %: they would start {}. If that is not meant, move it, or look "
         "at the size (scale) and the place of what is in its way",
@@ -287,7 +286,7 @@ std::vector<std::string> warnings_of(const SceneReport& report) {
           fmt::format("{} probably sends nothing: in every frame that was looked at all "
                       "of it is {}. Move it out of there",
                       inlet.name, inlet.where));
-    } else if (inlet.blocked >= worth_a_word_of_inlet) {
+    } else if (inlet.blocked >= worth_a_word) {
       all.push_back(
           fmt::format("{:.0f} % of {} sends nothing: it is {}. Move it, or make it "
                       "smaller, for the flow that was asked for",

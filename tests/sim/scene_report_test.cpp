@@ -47,12 +47,10 @@ TEST(SceneReport, CountsWhatSourcesLoseToObstacles) {
   EXPECT_EQ(few.source[0].in_obstacles(), 32u);
   EXPECT_EQ(few.particles, 968u);
   EXPECT_EQ(sim::warnings_of(few), std::vector<std::string>{});
-  shot.obstacle[0].size = V3d(0.16);  // four layers of eight by eight, as a rock in a pool
-  EXPECT_EQ(warnings(shot), std::vector<std::string>{});
-  shot.obstacle[0].size = V3d(0.24);  // six layers of ten by ten: 4.8 of 8 litres
+  shot.obstacle[0].size = V3d(0.16);  // four layers of eight by eight: 2.05 of 8 litres
   const std::vector<std::string> said = warnings(shot);
   ASSERT_EQ(said.size(), 1u);
-  expect_words(said[0], {"fluid.box[0]", "600 particles", "4.8 litres", "60 %", "\"solid\""});
+  expect_words(said[0], {"fluid.box[0]", "256 particles", "2.05 litres", "26 %", "\"solid\""});
 }
 
 TEST(SceneReport, RefusesASourceThatIsAllInAnObstacle) {
