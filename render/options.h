@@ -2,8 +2,8 @@
 // How an image is estimated, for tests and measurements: every choice gives the same mean.
 
 #include "pipeline/contract/hash.h"
+#include "render/integrator/sampler.h"
 #include "render/renderer.h"
-#include "render/sampler.h"
 
 namespace drench {
 

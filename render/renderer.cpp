@@ -11,13 +11,13 @@
 #include <mutex>
 
 #include "pipeline/contract/error.h"
-#include "render/filter.h"
-#include "render/frame_checkpoint.h"
-#include "render/noisy_frame.h"
+#include "render/denoise/noisy_frame.h"
+#include "render/film/filter.h"
+#include "render/film/frame_checkpoint.h"
+#include "render/integrator/path.h"
+#include "render/integrator/photons.h"
+#include "render/integrator/sampler.h"
 #include "render/options.h"
-#include "render/path.h"
-#include "render/photons.h"
-#include "render/sampler.h"
 
 namespace drench {
 

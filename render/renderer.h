@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/frames.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench {
 

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "sim/room.h"
+#include "sim/setup/room.h"
 
 namespace drench::sim {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 
 namespace drench::sim {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "pipeline/contract/files.h"
-#include "sim/births.h"
+#include "pipeline/contract/files/files.h"
+#include "sim/setup/births.h"
 #include "sim/solver.h"
 
 namespace drench::sim {

@@ -75,11 +75,11 @@ inline bool viscosity_is_implicit(const Parameters& p, double dt) {
   return p.incompressible && (viscous_strength(p, dt) > 0.01f || p.no_slip_sheets);
 }
 
-/// Room for a particle (passes/move.h) that walls leave before cloth, spacings.
+/// Room for a particle (passes/coupling/move.h) that walls leave before cloth, spacings.
 constexpr float cloth_wall_margin = 0.25f;
 
-/// Whether sheets make implicit steps (sim/passes/cloth_implicit.h), or explicit substeps: these
-/// have nothing that holds a vertex at an obstacle.
+/// Whether sheets make implicit steps (sim/passes/cloth/cloth_implicit.h), or explicit substeps:
+/// these have nothing that holds a vertex at an obstacle.
 inline bool sheets_are_implicit(const Parameters& p) {
   return p.fluid ? p.incompressible : p.obstacles > 0;
 }

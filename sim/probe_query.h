@@ -1,6 +1,6 @@
 #pragma once
 // What a probe asks of the state that a step ended with: places in the local frame, numbers worked
-// out once. Host and device, both builds. What is measured: sim/passes/probe.h.
+// out once. Host and device, both builds. What is measured: sim/passes/probe/probe.h.
 
 namespace drench::sim {
 
@@ -23,11 +23,11 @@ struct ProbeQuery {
   float place[3] = {0, 0, 0};   // m: the line, the disc's centre, where potential energy is zero
   float normal[3] = {0, 1, 0};  // of the disc, or where the front is looked for; unit
   float radius = 0,
-        rim = 0;  // m: of the disc or ball, and half the width over which its weight falls
-  float extent = 1;             // m^2 on a wall, m^3 inside: the weights' integral over the domain
-  int axis = 0, side = 0;       // of the wall; 0 the low one, 1 the high one
-  int begin = 0, end = 0;       // vertices; begin: the obstacle
-  int on = -1;                  // the one obstacle whose surface the disc may lie on; -1: any
+        rim = 0;           // m: of the disc or ball, and half the width over which its weight falls
+  float extent = 1;        // m^2 on a wall, m^3 inside: the weights' integral over the domain
+  int axis = 0, side = 0;  // of the wall; 0 the low one, 1 the high one
+  int begin = 0, end = 0;  // vertices; begin: the obstacle
+  int on = -1;             // the one obstacle whose surface the disc may lie on; -1: any
 };
 
 }  // namespace drench::sim

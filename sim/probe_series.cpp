@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/probe_check.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/shot/probe_check.h"
 
 namespace drench::sim {
 

@@ -9,13 +9,13 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "sim/blow_up.h"
 #include "sim/checkpoint.h"
-#include "sim/inlet_report.h"
 #include "sim/probe_series.h"
-#include "sim/room.h"
-#include "sim/scene.h"
+#include "sim/setup/inlet_report.h"
+#include "sim/setup/room.h"
+#include "sim/setup/scene.h"
 
 namespace drench {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/frames.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench {
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <map>
 
-#include "sim/passes/body_drag.h"
-#include "sim/passes/measure_density.h"
-#include "sim/passes/obstacle_impulse.h"
-#include "sim/passes/probe.h"
-#include "sim/passes/viscosity_solve.h"
+#include "sim/passes/obstacle/obstacle_impulse.h"
+#include "sim/passes/pressure/measure_density.h"
+#include "sim/passes/probe/probe.h"
+#include "sim/passes/viscosity/body_drag.h"
+#include "sim/passes/viscosity/viscosity_solve.h"
 #include "sim/state_memory.h"
 #include "sim/step_plan.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/level_set.h"
+#include "pipeline/contract/geometry/level_set.h"
 #include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"

@@ -4,14 +4,14 @@
 #include <functional>
 #include <vector>
 
+#include "sim/backend/sort.h"
 #include "sim/frame_now.h"
-#include "sim/geometry.h"
-#include "sim/grid.h"
-#include "sim/neighbours.h"
-#include "sim/obstacle_view.h"
+#include "sim/neighbours/grid.h"
+#include "sim/neighbours/neighbours.h"
 #include "sim/parameters.h"
-#include "sim/sort.h"
-#include "sim/wall_table.h"
+#include "sim/passes/coupling/geometry.h"
+#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/setup/wall_table.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -86,7 +86,7 @@ struct ClothState {
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
   std::vector<VertexRange> loose;    // of the sheets without a pin
-  // where a sheet is joined to itself across a seam, else empty (passes/polygon_grid.h)
+  // where a sheet is joined to itself across a seam, else empty (passes/coupling/polygon_grid.h)
   bool joined = false;
   VecColumn corner_shift;           // m, of a triangle's corner from its vertex
   VecColumn spring_shift;           // m, of a spring's other end from its vertex, slot by slot
@@ -120,7 +120,7 @@ struct ClothControl {
   Vec3<float> shift{0.f, 0.f, 0.f};                      // m, of a whole sheet
 };
 
-/// Columns of the implicit step of the sheets (passes/cloth_implicit.h), rebuilt every step.
+/// Columns of the implicit step of the sheets (passes/cloth/cloth_implicit.h), rebuilt every step.
 struct ClothSystem {
   Column<float> tension;  // kg, across a spring, slot by slot as ClothState::spring_end
   VecColumn axis;         // sqrt(kg), along a spring: the rest of its stiffness is axis axis^T
@@ -178,12 +178,13 @@ struct ViscousControl {
   double sheet_square = 0, sheet_product = 0, sheet_curvature = 0;  // what sheets add to the sums
 };
 
-/// Columns of the implicit viscosity (passes/viscosity_solve.h), allocated by the first step that
-/// needs them.
+/// Columns of the implicit viscosity (passes/viscosity/viscosity_solve.h), allocated by the first
+/// step that needs them.
 struct ViscosityState {
   Column<Float4> solution, residual, direction, product;  // m/s
   Column<Float4> diagonal, cross;  // inverse blocks: xx, yy, zz and xy, yz, zx
-  // What brakes a particle, see WallDrag; only where obstacles or sheets do (passes/body_drag.h).
+  // What brakes a particle, see WallDrag; only where obstacles or sheets do
+  // (passes/viscosity/body_drag.h).
   Column<Float4> body_rate, body_cross, body_source;
   Column<ViscousControl> control;
 };
@@ -207,7 +208,7 @@ struct NodeAxis {
   }
 };
 
-/// Nodes of a coarse level of the pressure solve (passes/multilevel.h), x fastest.
+/// Nodes of a coarse level of the pressure solve (passes/pressure/multilevel.h), x fastest.
 struct NodeLevel {
   NodeAxis x, y, z;
   int first;  // place of the first node in the columns
@@ -227,8 +228,8 @@ struct Hierarchy {
   Column<float> answer, inverse;  // of the nodes of all levels: z, and 1 / stiffness
 };
 
-/// Columns of the incompressible solver, rebuilt every step (passes/pressure_rows.h). Its warm
-/// start is FluidState::pressure_term.
+/// Columns of the incompressible solver, rebuilt every step (passes/pressure/pressure_rows.h). Its
+/// warm start is FluidState::pressure_term.
 struct PressureState {
   NeighbourLists lists;
   Column<Float4> place;   // m, position; w: a pressure
@@ -249,10 +250,11 @@ struct PressureState {
   }
 };
 
-/// Columns of surface tension (passes/surface_tension.h), rebuilt every step.
+/// Columns of surface tension (passes/tension/surface_tension.h), rebuilt every step.
 struct TensionState {
-  Column<Float4> normal;   // unit, outwards; w: 0 inside
-  Column<Float4> wetting;  // unit normal of a wall; w: its surface (passes/wetting.h). Or empty
+  Column<Float4> normal;  // unit, outwards; w: 0 inside
+  Column<Float4>
+      wetting;  // unit normal of a wall; w: its surface (passes/tension/wetting.h). Or empty
 };
 
 /// Obstacles and their images as the step has them (obstacle_placement.h) and the level sets they

@@ -27,8 +27,8 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("cells and sorting", f.cell, f.order, f.cell_start, state.swap_float,
                           state.scratch.histogram, state.scratch.order_in, state.scratch.key_out,
                           state.scratch.bytes));
-  all.push_back(memory_of("neighbour lists", p.lists.block, p.lists.base, p.lists.begin,
-                          p.lists.blocks));
+  all.push_back(
+      memory_of("neighbour lists", p.lists.block, p.lists.base, p.lists.begin, p.lists.blocks));
   all.push_back(memory_of("rows of the pressure solve", p.place, p.vector, p.wall, p.correction,
                           p.correction_cross, p.push, p.way));
   all.push_back(memory_of("unknowns of the pressure solve", p.inverse_diagonal, p.source, p.before,

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "surfacing/cloth_solid.h"
 #include "surfacing/extract.h"
-#include "surfacing/sheets.h"
 #include "surfacing/smooth.h"
 
 namespace drench::surfacing {

@@ -11,8 +11,8 @@
 
 #include "pipeline/contract/error.h"
 #include "surfacing/anisotropy.h"
+#include "surfacing/cloth_solid.h"
 #include "surfacing/pack.h"
-#include "surfacing/sheets.h"
 #include "surfacing/spline.h"
 
 namespace drench::surfacing {

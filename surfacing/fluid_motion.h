@@ -2,7 +2,7 @@
 // The fluid between two cached frames, sorted so that foam finds what is around it.
 
 #include "pipeline/contract/frames.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 #include "surfacing/particle_bins.h"
 
 namespace drench::surfacing {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/gravity.h"
+#include "pipeline/contract/shot/gravity.h"
 #include "surfacing/foam_source.h"
 #include "surfacing/foam_walls.h"
 

@@ -2,8 +2,8 @@
 // Spray, foam and bubbles: particles that fluid in commotion makes, and that move with it.
 
 #include "pipeline/contract/frames.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench {
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "pipeline/contract/gravity.h"
+#include "pipeline/contract/shot/gravity.h"
 
 namespace drench::surfacing {
 namespace {

@@ -8,7 +8,7 @@
 // that flies makes no foam. Both count ways in spacings in place of time, so that the amount of
 // foam does not depend on the spacing; and only particles that see air can take it in.
 
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 #include "surfacing/fluid_motion.h"
 
 namespace drench::surfacing {

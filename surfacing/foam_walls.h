@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench::surfacing {
 

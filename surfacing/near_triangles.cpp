@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/triangle.h"
+#include "pipeline/contract/geometry/triangle.h"
 
 namespace drench::surfacing {
 

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "pipeline/contract/frames.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench {
 

@@ -9,7 +9,7 @@
 #include <mutex>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/printable.h"
+#include "pipeline/contract/shot/printable.h"
 
 namespace drench {
 

@@ -14,9 +14,9 @@
 
 #include "build_id.h"
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/printable.h"
+#include "pipeline/contract/shot/printable.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/process.h"
 

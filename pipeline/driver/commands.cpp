@@ -9,12 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/level_set.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/printable.h"
-#include "pipeline/contract/shot_file.h"
-#include "pipeline/contract/view_check.h"
+#include "pipeline/contract/shot/printable.h"
+#include "pipeline/contract/shot/shot_file.h"
+#include "pipeline/contract/shot/view_check.h"
 #include "pipeline/driver/device.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/frame_range.h"
@@ -25,9 +25,9 @@
 #include "pipeline/driver/scene_text.h"
 #include "pipeline/driver/standard_output.h"
 #include "pipeline/driver/stats_file.h"
-#include "render/material.h"
+#include "render/bsdf/material.h"
 #include "sim/probe_series.h"
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 
 namespace drench {
 

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/contract/files.h"
-#include "render/view_transform.h"
+#include "pipeline/contract/files/files.h"
+#include "render/color/view_transform.h"
 
 namespace drench {
 

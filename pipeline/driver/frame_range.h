@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench {
 

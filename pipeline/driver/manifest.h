@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/hash.h"
 
 namespace drench {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/driver/contact_sheet.h"
 
 namespace drench {

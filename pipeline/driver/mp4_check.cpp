@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 
 namespace drench {
 

@@ -1,10 +1,10 @@
 #include "pipeline/driver/readable.h"
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/foam_file.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/particles_file.h"
-#include "render/noisy_frame.h"
+#include "pipeline/contract/files/foam_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/files/particles_file.h"
+#include "render/denoise/noisy_frame.h"
 #include "render/renderer.h"
 
 namespace drench {

@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "sim/scene_report.h"
+#include "sim/setup/scene_report.h"
 
 namespace drench {
 

@@ -5,19 +5,19 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/foam_file.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/particles_file.h"
+#include "pipeline/contract/files/foam_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/files/particles_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "pipeline/driver/readable.h"
-#include "render/kept_parts.h"
-#include "render/noisy_frame.h"
+#include "render/color/view_transform.h"
+#include "render/denoise/noisy_frame.h"
 #include "render/renderer.h"
-#include "render/view_transform.h"
+#include "render/scene/scene_cache.h"
 #include "surfacing/foam.h"
 #include "surfacing/surface.h"
 

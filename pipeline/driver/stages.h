@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/files/files.h"
+#include "pipeline/contract/shot/shot.h"
 #include "pipeline/driver/plan.h"
 #include "sim/simulator.h"
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/driver/standard_output.h"
 
 namespace drench {

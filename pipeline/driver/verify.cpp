@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/printable.h"
+#include "pipeline/contract/shot/printable.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/output_folder.h"

@@ -7,12 +7,12 @@
 #include <sstream>
 
 #include "build_id.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
-#include "render/oidn.h"
-#include "render/view_transform.h"
+#include "render/color/view_transform.h"
+#include "render/denoise/oidn.h"
 
 namespace drench {
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 #include "pipeline/driver/manifest.h"
 
 namespace drench {

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <string>
 
-#include "pipeline/contract/particles_file.h"
+#include "pipeline/contract/files/particles_file.h"
 #include "sim/simulator.h"
 #include "tests/bench/bench.h"
 #include "tests/surfacing/scenes.h"

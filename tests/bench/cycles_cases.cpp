@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/files/mesh_file.h"
 #include "surfacing/surface.h"
 #include "tests/bench/render_scenes.h"
 #include "tests/contract/sphere_mesh.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "render/noisy_frame.h"
+#include "render/denoise/noisy_frame.h"
 #include "render/options.h"
 #include "tests/bench/render_scenes.h"
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
 #include "tests/validation/fluid.h"

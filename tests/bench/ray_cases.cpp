@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/mesh_file.h"
-#include "render/sampler.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "render/integrator/sampler.h"
 #include "render/sampling.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
 #include "tests/bench/render_scenes.h"
 #include "tests/render/closed_body.h"
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
 

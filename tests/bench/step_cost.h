@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
 

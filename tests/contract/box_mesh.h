@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/frames.h"
 
 namespace drench::test {

@@ -1,4 +1,4 @@
-#include "pipeline/contract/colour.h"
+#include "pipeline/contract/shot/colour.h"
 
 #include <gtest/gtest.h>
 

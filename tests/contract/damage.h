@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::test {

@@ -1,4 +1,4 @@
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 
 #include <fcntl.h>
 #include <signal.h>

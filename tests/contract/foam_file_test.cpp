@@ -1,11 +1,11 @@
-#include "pipeline/contract/foam_file.h"
+#include "pipeline/contract/files/foam_file.h"
 
 #include <tbb/global_control.h>
 
 #include <limits>
 #include <random>
 
-#include "pipeline/contract/particles_file.h"
+#include "pipeline/contract/files/particles_file.h"
 #include "tests/contract/damage.h"
 #include "tests/same_bits.h"
 #include "tests/temporary_folder.h"

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <set>
 
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/files/named_file.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/geometry/weld.h"
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/named_file.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/weld.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/temporary_folder.h"
 

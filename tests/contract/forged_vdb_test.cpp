@@ -14,9 +14,9 @@
 #include <new>
 #include <stdexcept>
 
-#include "pipeline/contract/foam_file.h"
+#include "pipeline/contract/files/foam_file.h"
+#include "pipeline/contract/files/particles_file.h"
 #include "pipeline/contract/hash.h"
-#include "pipeline/contract/particles_file.h"
 #include "tests/temporary_folder.h"
 
 namespace drench {

@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/obj_file.h"
-#include "pipeline/contract/ply_file.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/files/obj_file.h"
+#include "pipeline/contract/files/ply_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {

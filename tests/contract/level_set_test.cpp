@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/contract/particles_file.h"
-#include "pipeline/contract/triangle.h"
+#include "pipeline/contract/files/particles_file.h"
+#include "pipeline/contract/geometry/triangle.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/files/mesh_file.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "pipeline/contract/ply_file.h"
+#include "pipeline/contract/files/ply_file.h"
 #include "tests/same_bits.h"
 #include "tests/temporary_folder.h"
 

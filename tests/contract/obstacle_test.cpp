@@ -1,6 +1,6 @@
 // Obstacles of a shot: where they stand, what is drawn of them, their files and level sets.
 
-#include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/geometry/obstacle.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/mesh_file.h"
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "tests/contract/shells_mesh.h"
 #include "tests/temporary_folder.h"
 

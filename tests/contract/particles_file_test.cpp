@@ -1,4 +1,4 @@
-#include "pipeline/contract/particles_file.h"
+#include "pipeline/contract/files/particles_file.h"
 
 #include <tbb/global_control.h>
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {

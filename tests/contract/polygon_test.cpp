@@ -1,4 +1,4 @@
-#include "pipeline/contract/polygon.h"
+#include "pipeline/contract/geometry/polygon.h"
 
 #include <gtest/gtest.h>
 

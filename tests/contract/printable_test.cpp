@@ -1,4 +1,4 @@
-#include "pipeline/contract/printable.h"
+#include "pipeline/contract/shot/printable.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // What closed shells bound: nested, crossing, touching, either way round.
 
-#include "pipeline/contract/shells.h"
+#include "pipeline/contract/geometry/shells.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
 #include "tests/contract/shells_mesh.h"
 #include "tests/temporary_folder.h"
 

@@ -3,8 +3,8 @@
 #include <cstring>
 #include <set>
 
-#include "pipeline/contract/shot_file.h"
-#include "pipeline/contract/shot_table.h"
+#include "pipeline/contract/shot/shot_file.h"
+#include "pipeline/contract/shot/shot_table.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {

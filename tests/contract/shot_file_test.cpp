@@ -1,13 +1,13 @@
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <sstream>
 
-#include "pipeline/contract/colour.h"
-#include "pipeline/contract/shot_table.h"
-#include "pipeline/contract/shot_value.h"
+#include "pipeline/contract/shot/colour.h"
+#include "pipeline/contract/shot/shot_table.h"
+#include "pipeline/contract/shot/shot_value.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {

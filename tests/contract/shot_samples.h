@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::test {

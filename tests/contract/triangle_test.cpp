@@ -1,4 +1,4 @@
-#include "pipeline/contract/triangle.h"
+#include "pipeline/contract/geometry/triangle.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Lights and cameras that can show nothing, and those that only look so.
 
-#include "pipeline/contract/view_check.h"
+#include "pipeline/contract/shot/view_check.h"
 
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/log.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 
 namespace drench {
 namespace {

@@ -5,10 +5,10 @@
 #include <algorithm>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/foam_file.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/files/foam_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "surfacing/foam.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/driver/folder.h"

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "sim/scene.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "sim/setup/scene.h"
 #include "sim/simulator.h"
 #include "tests/contract/shells_mesh.h"
 #include "tests/temporary_folder.h"

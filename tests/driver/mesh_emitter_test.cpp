@@ -8,10 +8,10 @@
 #include <set>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "sim/scene.h"
+#include "pipeline/contract/files/files.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "sim/setup/scene.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"

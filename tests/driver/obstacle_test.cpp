@@ -7,12 +7,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/obstacle.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/wanted.h"
-#include "sim/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_view.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"

@@ -7,8 +7,8 @@
 
 #include <cmath>
 
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
 #include "sim/simulator.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/sim/obstacle_scenes.h"

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/driver/tiny_shot.h"
 #include "tests/temporary_folder.h"

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "pipeline/contract/files/mesh_file.h"
 #include "pipeline/contract/hash.h"
-#include "pipeline/contract/mesh_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/output_folder.h"
 #include "tests/driver/child.h"

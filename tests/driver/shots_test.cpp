@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/shot_file.h"
-#include "sim/scene.h"
+#include "pipeline/contract/files/files.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/shot/shot_file.h"
+#include "sim/setup/scene.h"
 
 namespace drench {
 namespace {

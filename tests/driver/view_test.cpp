@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/wanted.h"
 #include "tests/driver/folder.h"

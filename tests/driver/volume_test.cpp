@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/level_set.h"
-#include "pipeline/contract/mesh_file.h"
-#include "pipeline/contract/obstacle.h"
-#include "sim/scene.h"
+#include "pipeline/contract/files/files.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/geometry/obstacle.h"
+#include "sim/setup/scene.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"

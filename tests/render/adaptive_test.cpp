@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "render/sample_plan.h"
+#include "render/integrator/sample_plan.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "render/camera.h"
-#include "render/filter.h"
-#include "render/sampler.h"
+#include "render/film/filter.h"
+#include "render/integrator/sampler.h"
 #include "render/sampling.h"
+#include "render/scene/camera.h"
 #include "tests/render/support.h"
 
 namespace drench::test {

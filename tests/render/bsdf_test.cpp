@@ -4,11 +4,11 @@
 
 #include <random>
 
-#include "render/bsdf_cloth.h"
-#include "render/bsdf_dielectric.h"
-#include "render/bsdf_fabric.h"
-#include "render/material.h"
-#include "render/sampler.h"
+#include "render/bsdf/bsdf_cloth.h"
+#include "render/bsdf/bsdf_dielectric.h"
+#include "render/bsdf/bsdf_fabric.h"
+#include "render/bsdf/material.h"
+#include "render/integrator/sampler.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "render/camera.h"
-#include "render/filter.h"
-#include "render/path.h"
-#include "render/scene.h"
+#include "render/film/filter.h"
+#include "render/integrator/path.h"
+#include "render/scene/camera.h"
+#include "render/scene/scene.h"
 #include "tests/render/strip.h"
 
 namespace drench::test {

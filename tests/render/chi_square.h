@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "render/bsdf.h"
+#include "render/bsdf/bsdf.h"
 
 namespace drench::test {
 

@@ -1,9 +1,9 @@
 #pragma once
 // Rays that must not leave a closed body.
 
-#include "render/sampler.h"
+#include "render/integrator/sampler.h"
 #include "render/sampling.h"
-#include "render/scene.h"
+#include "render/scene/scene.h"
 
 namespace drench::test {
 

@@ -7,9 +7,9 @@
 #include <functional>
 #include <random>
 
-#include "render/denoise.h"
-#include "render/motion_match.h"
-#include "render/noisy_frame.h"
+#include "render/denoise/denoise.h"
+#include "render/denoise/noisy_frame.h"
+#include "render/scene/motion_match.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "render/denoise.h"
+#include "render/denoise/denoise.h"
 #include "tests/render/support.h"
 
 namespace drench::test {

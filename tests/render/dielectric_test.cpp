@@ -4,10 +4,10 @@
 
 #include <random>
 
-#include "render/bsdf_cloth.h"
-#include "render/guide.h"
-#include "render/kept_parts.h"
-#include "render/scene.h"
+#include "render/bsdf/bsdf_cloth.h"
+#include "render/integrator/guide.h"
+#include "render/scene/scene.h"
+#include "render/scene/scene_cache.h"
 #include "tests/render/chi_square.h"
 #include "tests/render/closed_body.h"
 #include "tests/render/puddle.h"

@@ -13,7 +13,7 @@
 #include <deque>
 #include <limits>
 
-#include "render/environment.h"
+#include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
 namespace drench::test {

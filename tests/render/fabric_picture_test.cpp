@@ -4,10 +4,10 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "pipeline/contract/mesh_file.h"
-#include "render/bsdf_fabric.h"
-#include "render/path.h"
-#include "render/scene.h"
+#include "pipeline/contract/files/mesh_file.h"
+#include "render/bsdf/bsdf_fabric.h"
+#include "render/integrator/path.h"
+#include "render/scene/scene.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -1,7 +1,7 @@
 // Fabric by itself: wet colours against a layer added up from thin ones, and its lobes' densities,
 // energy, reciprocity and limits.
 
-#include "render/bsdf_fabric.h"
+#include "render/bsdf/bsdf_fabric.h"
 
 #include <fmt/format.h>
 

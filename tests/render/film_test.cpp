@@ -13,9 +13,9 @@
 #include <fstream>
 #include <random>
 
-#include "render/color.h"
-#include "render/texture.h"
-#include "render/view_transform.h"
+#include "render/color/color.h"
+#include "render/color/view_transform.h"
+#include "render/texture/texture.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

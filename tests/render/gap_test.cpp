@@ -6,8 +6,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "render/bsdf_dielectric.h"
-#include "render/scene.h"
+#include "render/bsdf/bsdf_dielectric.h"
+#include "render/scene/scene.h"
 #include "tests/render/support.h"
 
 namespace drench::test {

@@ -5,8 +5,8 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include "render/path.h"
-#include "render/scene.h"
+#include "render/integrator/path.h"
+#include "render/scene/scene.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -1,6 +1,6 @@
 // Radiance HDR, written by the test byte by byte.
 
-#include "render/environment.h"
+#include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
 namespace drench::test {

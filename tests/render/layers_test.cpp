@@ -15,7 +15,7 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
-#include "render/cryptomatte.h"
+#include "render/film/cryptomatte.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -1,13 +1,13 @@
 // Many lights drawn from a tree, against asking each of them.
 
-#include "render/light_tree.h"
+#include "render/light/light_tree.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "render/kept_parts.h"
-#include "render/lights.h"
+#include "render/light/lights.h"
+#include "render/scene/scene_cache.h"
 #include "tests/render/chi_square.h"
 #include "tests/render/puddle.h"
 

@@ -1,14 +1,14 @@
 // Walks to lamps through calm water, against Snell's law in closed form, against differences of
 // rays, and the pictures that paths and photons give.
 
-#include "render/manifold.h"
+#include "render/integrator/manifold.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "render/bsdf_dielectric.h"
-#include "render/photons.h"
+#include "render/bsdf/bsdf_dielectric.h"
+#include "render/integrator/photons.h"
 #include "tests/render/puddle.h"
 
 namespace drench::test {

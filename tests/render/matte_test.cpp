@@ -1,7 +1,7 @@
 // Frames that go over a plate: clear backgrounds, see-through water, holdouts and shadow catchers
 // against closed forms and against the picture itself.
 
-#include "render/matte.h"
+#include "render/film/matte.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,12 +1,12 @@
 // Objects that shine, against closed forms, other lights and the estimators against each other.
 
-#include "render/mesh_light.h"
+#include "render/light/mesh_light.h"
 
 #include <gtest/gtest.h>
 
-#include "render/photons.h"
-#include "render/sampler.h"
-#include "render/scene.h"
+#include "render/integrator/photons.h"
+#include "render/integrator/sampler.h"
+#include "render/scene/scene.h"
 #include "tests/render/puddle.h"
 
 namespace drench::test {

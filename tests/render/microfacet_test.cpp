@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "render/bsdf_coated.h"
-#include "render/bsdf_metal.h"
-#include "render/bsdf_rough.h"
+#include "render/bsdf/bsdf_coated.h"
+#include "render/bsdf/bsdf_metal.h"
+#include "render/bsdf/bsdf_rough.h"
 #include "tests/render/lobes.h"
 
 namespace drench::test {

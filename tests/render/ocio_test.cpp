@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "render/color.h"
-#include "render/view_transform.h"
+#include "render/color/color.h"
+#include "render/color/view_transform.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <random>
 
-#include "render/oidn.h"
+#include "render/denoise/oidn.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -1,6 +1,6 @@
 // Photons in rounds, and their error as a frame tells it.
 
-#include "render/photon_rounds.h"
+#include "render/integrator/photon_rounds.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

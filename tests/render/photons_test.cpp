@@ -1,13 +1,13 @@
 // Photons against closed forms and against paths, which share nothing with them beyond Fresnel.
 
-#include "render/photons.h"
+#include "render/integrator/photons.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <random>
 
-#include "render/bsdf_dielectric.h"
+#include "render/bsdf/bsdf_dielectric.h"
 #include "tests/render/puddle.h"
 
 namespace drench::test {

@@ -15,8 +15,8 @@
 
 #include <png.h>
 
-#include "render/color.h"
-#include "render/texture.h"
+#include "render/color/color.h"
+#include "render/texture/texture.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::test {

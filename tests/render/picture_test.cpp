@@ -1,6 +1,6 @@
 // What a picture is, is found in its bytes; what it takes is known before it is taken.
 
-#include "render/environment.h"
+#include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
 namespace drench::test {

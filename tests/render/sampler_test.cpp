@@ -7,12 +7,12 @@
 #include <random>
 #include <set>
 
-#include "render/environment.h"
-#include "render/filter.h"
-#include "render/kept_parts.h"
-#include "render/lights.h"
-#include "render/sampler.h"
+#include "render/film/filter.h"
+#include "render/integrator/sampler.h"
+#include "render/light/environment.h"
+#include "render/light/lights.h"
 #include "render/sampling.h"
+#include "render/scene/scene_cache.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

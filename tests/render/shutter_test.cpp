@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "render/camera.h"
-#include "render/filter.h"
-#include "render/sampler.h"
+#include "render/film/filter.h"
+#include "render/integrator/sampler.h"
+#include "render/scene/camera.h"
 #include "tests/render/strip.h"
 
 namespace drench::test {

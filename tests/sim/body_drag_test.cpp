@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/passes/body_drag.h"
+#include "sim/passes/viscosity/body_drag.h"
 #include "tests/sim/obstacle_scenes.h"
 #include "tests/sim/same_state.h"
 #include "tests/validation/body_drag.h"

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 #include "sim/solver.h"
 
 namespace drench {

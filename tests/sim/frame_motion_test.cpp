@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "pipeline/contract/gravity.h"
+#include "pipeline/contract/shot/gravity.h"
 #include "tests/sim/probed.h"
 #include "tests/sim/support.h"
 

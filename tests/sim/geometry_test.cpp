@@ -1,14 +1,14 @@
 // Point, segment and path against triangles, by brute force and by hand.
 
-#include "sim/geometry.h"
+#include "sim/passes/coupling/geometry.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "sim/parallel.h"
-#include "sim/passes/move.h"
+#include "sim/backend/parallel.h"
+#include "sim/passes/coupling/move.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <numeric>
 
-#include "sim/passes/measure_density.h"
+#include "sim/passes/pressure/measure_density.h"
 #include "tests/sim/listed.h"
 #include "tests/sim/same_state.h"
 

@@ -1,13 +1,13 @@
 // SPH kernels and wall functions against integrals done here and the closed forms of the data.
 
-#include "sim/kernels.h"
+#include "sim/neighbours/kernels.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "sim/wall_table.h"
+#include "sim/setup/wall_table.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {

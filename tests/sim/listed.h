@@ -1,8 +1,8 @@
 #pragma once
 // An incompressible fluid with its neighbour lists, open to tests of rows.
 
-#include "sim/passes/incompressible.h"
-#include "sim/passes/sort_particles.h"
+#include "sim/neighbours/sort_particles.h"
+#include "sim/passes/pressure/incompressible.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {

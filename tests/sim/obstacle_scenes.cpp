@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/geometry/obstacle.h"
 
 namespace drench::sim_tests {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/passes/obstacle_guard.h"
+#include "sim/passes/obstacle/obstacle_guard.h"
 #include "tests/sim/obstacle_scenes.h"
 
 namespace drench::sim_tests {

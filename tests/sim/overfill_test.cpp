@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "sim/blow_up.h"
-#include "sim/room.h"
+#include "sim/setup/room.h"
 #include "sim/simulator.h"
 #include "tests/sim/obstacle_scenes.h"
 #include "tests/temporary_folder.h"

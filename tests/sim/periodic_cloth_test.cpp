@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/files/files.h"
 #include "sim/probe_series.h"
 #include "sim/simulator.h"
 #include "tests/sim/crossings.h"

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/files.h"
-#include "sim/passes/incompressible.h"
-#include "sim/passes/measure_density.h"
+#include "pipeline/contract/files/files.h"
+#include "sim/passes/pressure/incompressible.h"
+#include "sim/passes/pressure/measure_density.h"
 #include "sim/simulator.h"
 #include "tests/sim/listed.h"
 #include "tests/sim/periodic_scenes.h"

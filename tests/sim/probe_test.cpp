@@ -198,7 +198,7 @@ target = "ball"
 }
 
 // Without gravity and walls the only force on a block is the sheet's, but for what vertices that
-// had to be stopped (path_test.h) give to the particles themselves.
+// had to be stopped (continuous_collision.h) give to the particles themselves.
 TEST(ClothForce, IsWhatTheMomentumOfTheFluidLacks) {
   Shot shot = empty_shot();
   add_box(shot, V3d(-0.04, 0.02, -0.04), {8, 8, 8}, V3d(0.3, -1, 0));

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "sim/simulator.h"
 
 namespace drench::sim_tests {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/error.h"
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 
 namespace drench::sim_tests {
 

@@ -1,6 +1,6 @@
 // What of a scene comes to nothing, and what it costs, before anything runs.
 
-#include "sim/scene_report.h"
+#include "sim/setup/scene_report.h"
 
 #include <gtest/gtest.h>
 

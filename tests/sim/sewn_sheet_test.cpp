@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "pipeline/contract/log.h"
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 #include "sim/simulator.h"
 #include "tests/sim/support.h"
 #include "tests/temporary_folder.h"

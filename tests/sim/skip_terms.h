@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "pipeline/contract/shot.h"
+#include "pipeline/contract/shot/shot.h"
 
 namespace drench::sim_tests {
 

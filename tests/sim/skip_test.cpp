@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <set>
 
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "sim/probe_series.h"
 #include "sim/step_plan.h"
 #include "tests/sim/same_state.h"

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/shot.h"
-#include "sim/scene.h"
+#include "pipeline/contract/shot/shot.h"
+#include "sim/setup/scene.h"
 #include "sim/solver.h"
 
 namespace drench::sim_tests {

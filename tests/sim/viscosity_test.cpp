@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/passes/viscosity_solve.h"
+#include "sim/passes/viscosity/viscosity_solve.h"
 #include "tests/sim/listed.h"
 #include "tests/sim/same_state.h"
 

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "sim/passes/wind_on_cloth.h"
-#include "sim/wind.h"
+#include "sim/passes/air/wind_on_cloth.h"
+#include "sim/setup/wind.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {

@@ -12,7 +12,7 @@
 #include <iostream>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "sim/simulator.h"
 #include "tests/stress/chance.h"
 #include "tests/stress/report.h"

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "sim/simulator.h"
 #include "tests/stress/report.h"
 #include "tests/stress/scenes.h"

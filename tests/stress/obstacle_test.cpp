@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/shot_file.h"
+#include "pipeline/contract/shot/shot_file.h"
 #include "tests/sim/obstacle_scenes.h"
 #include "tests/stress/report.h"
 #include "tests/stress/scenes.h"

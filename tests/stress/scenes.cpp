@@ -3,7 +3,7 @@
 #include <set>
 #include <string>
 
-#include "pipeline/contract/mesh_file.h"
+#include "pipeline/contract/files/mesh_file.h"
 
 namespace drench::stress_tests {
 

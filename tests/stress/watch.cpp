@@ -16,7 +16,7 @@ double half_space(double q) {
   return t2 * t2 * t2 * (3.5 - t * (4.5 - 1.5 * t));
 }
 
-/// Share of the walls, which are mirrors: sim/passes/image_walls.h has the derivation.
+/// Share of the walls, which are mirrors: sim/passes/pressure/image_walls.h has the derivation.
 double wall_share(const sim::Parameters& p, const V3d& x) {
   double open = 1;
   for (int k = 0; k < 3; ++k) {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "surfacing/sheets.h"
+#include "surfacing/cloth_solid.h"
 #include "surfacing/surface.h"
 #include "tests/same_bits.h"
 #include "tests/surfacing/mesh_checks.h"

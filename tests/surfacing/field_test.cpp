@@ -1,7 +1,7 @@
 // The colour field itself, against a sum in double over all pairs.
 
 #include "surfacing/field.h"
-#include "surfacing/sheets.h"
+#include "surfacing/cloth_solid.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/geometry/obstacle.h"
 #include "surfacing/fluid_motion.h"
 #include "tests/surfacing/foam_scenes.h"
 

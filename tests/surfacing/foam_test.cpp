@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/obstacle.h"
+#include "pipeline/contract/geometry/obstacle.h"
 #include "surfacing/foam_source.h"
 #include "tests/same_bits.h"
 #include "tests/surfacing/foam_scenes.h"

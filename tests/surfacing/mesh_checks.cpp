@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "pipeline/contract/triangle.h"
+#include "pipeline/contract/geometry/triangle.h"
 
 namespace drench::surfacing_checks {
 namespace {

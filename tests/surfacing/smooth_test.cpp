@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "surfacing/sheets.h"
+#include "surfacing/cloth_solid.h"
 #include "surfacing/slivers.h"
 #include "surfacing/smooth.h"
 #include "tests/surfacing/mesh_checks.h"

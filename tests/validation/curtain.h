@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "pipeline/contract/shot.h"
-#include "sim/scene.h"
+#include "pipeline/contract/shot/shot.h"
+#include "sim/setup/scene.h"
 
 namespace drench::validation {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/kernels.h"
+#include "sim/neighbours/kernels.h"
 #include "tests/sim/support.h"
 
 namespace drench::validation {

@@ -1,7 +1,7 @@
 #pragma once
 // Viscous flows with a known answer, run with the incompressible solver: see fluid.h.
 
-#include "sim/scene.h"
+#include "sim/setup/scene.h"
 
 namespace drench::validation {
 

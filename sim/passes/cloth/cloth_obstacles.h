@@ -1,0 +1,321 @@
+#pragma once
+// Sheets on obstacles. A vertex keeps a distance to every surface; one that forces would take
+// nearer is held in the solve of the sheets (cloth_implicit.h): it may go along the surface, and
+// along its normal goes where the surface does. Who is held is found twice: before the pressures by
+// what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
+// what still comes too near is held. Vertices are held, not triangles: between two of them, e
+// apart, a surface of radius R comes e^2 / 8R nearer. The force that holds a vertex is in the
+// solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one
+// that it cannot feels it as a force. Last comes the guard that particles have: no path passes
+// through a surface, whatever the solve says.
+
+#include "sim/passes/cloth/cloth_implicit.h"
+#include "sim/passes/coupling/polygon_grid.h"
+#include "sim/passes/obstacle/obstacle_path.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// What holds vertices at obstacles reads.
+struct ClothHold {
+  ObstacleViews obstacles;
+  ClothWalls walls;
+  const float* half_thickness;
+  const int *fan_start, *fan_entry;
+  VecView free, normal;
+  BlockInverse block, free_block;
+  const float* inertia;
+  int* grip;
+  StopSums stopped;
+  float room;                      // m, between sheet and surface beyond what particles keep
+  float inverse_dt, inverse_mass;  // 1/s, of a particle, 1/kg
+  Vec3<float> low, period;         // m; 0 where an axis is not periodic
+
+  /// What takes a vertex, which nothing wraps, into the domain, where the images of obstacles are.
+  /// Paths take that of their start. m
+  DRENCH_HD Vec3<float> home(Vec3<float> x) const {
+    const auto along = [](float x, float low, float length) {
+      return length > 0.f ? -length * floorf((x - low) / length) : 0.f;
+    };
+    return {along(x.x, low.x, period.x), along(x.y, low.y, period.y), along(x.z, low.z, period.z)};
+  }
+  /// m, of a vertex to a surface: as to a wall of the domain, and half the thickness.
+  DRENCH_HD float distance_to(const ObstacleView& o, int vertex) const {
+    return o.clearance + room + half_thickness[fan_entry[fan_start[vertex]] / 3];
+  }
+
+  /// Where the first obstacle stops a vertex that would go from x0 to x1, both at home; -1 if none
+  /// does.
+  /// @param slack  share of the distance that may be missing
+  DRENCH_HD int stop(int vertex, Vec3<float> x0, Vec3<float> x1, float slack,
+                     Vec3<float>& own) const {
+    for (int k = 0; k < obstacles.count; ++k) {
+      const ObstacleView& o = obstacles.obstacle[k];
+      const float keep = distance_to(o, vertex);
+      if (PathStop{0, (1.f - slack) * keep, keep}.stops(o, x0, x1, own)) return k;
+    }
+    return -1;
+  }
+
+  /// Holds a vertex, straight way `straight`, where an obstacle stops it from going to `to`.
+  DRENCH_HD bool hold(int vertex, Vec3<float> from, Vec3<float> straight, Vec3<float> to,
+                      Vec3<float>& w) const {
+    Vec3<float> own;
+    const Vec3<float> in = home(from);
+    const int k = stop(vertex, from + in, to + in, 0.f, own);
+    if (k < 0) return false;
+    const ObstacleView& o = obstacles.obstacle[k];
+    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), may = along(free[vertex], n);
+    const float size2 = length2(may);
+    if (size2 < 0.01f) return false;  // a wall holds it that way
+    const Vec3<float> way = may * (1.f / sqrtf(size2));
+    w = w + way * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, way));
+    normal.set(vertex, way);
+    free_block.put_free(vertex, block, free[vertex], way, inertia[vertex]);
+    grip[vertex] = k;
+    return true;
+  }
+
+  /// The velocity that the surface has along its normal at x, which is at home, and the solid's own
+  /// across it, m/s.
+  DRENCH_HD Vec3<float> surface_velocity(const ObstacleView& o, Vec3<float> x,
+                                         Vec3<float> n) const {
+    const Vec3<float> own = o.to_own(1, x);
+    const Vec3<float> carried = (x - o.to_frame(0, own)) * inverse_dt;
+    const float grown = o.distance(own, o.blend[0]) - o.distance(own, o.blend[1]);
+    return carried + n * (grown * inverse_dt);
+  }
+
+  /// @param given  kg m/s, to the vertex
+  DRENCH_HD void react(int k, Vec3<float> given) const {
+    stopped.add(obstacles.obstacle[k].of, given * -inverse_mass);
+  }
+
+  /// The last guard: where a vertex ends that would go from x0 to x1 with velocity u.
+  DRENCH_HD void guard(int vertex, float mass, Vec3<float> x0, Vec3<float>& x1,
+                       Vec3<float>& u) const {
+    const Vec3<float> in = home(x0);
+    for (int round = 0; round < 4; ++round) {
+      Vec3<float> own, unused{0.f, 0.f, 0.f};
+      const int k = stop(vertex, x0 + in, x1 + in, 0.02f, own);
+      if (k < 0) return;
+      const ObstacleView& o = obstacles.obstacle[k];
+      const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
+      const Vec3<float> out = o.to_frame(1, own);
+      x1 = out - in;
+      const float inward = dot(u - surface_velocity(o, out, n), n);
+      if (inward < 0.f) {
+        react(k, n * (-inward * mass));
+        u = u - n * inward;
+      }
+      walls.stop(x1, unused);
+    }
+  }
+};
+
+inline ClothHold cloth_hold_of(const State& state) {
+  const ClothState& c = state.cloth;
+  const ClothSystem& s = state.cloth_system;
+  const Parameters& p = state.parameters;
+  return {state.obstacles.views(),
+          cloth_walls_of(p),
+          c.half_thickness.data(),
+          c.fan_start.data(),
+          c.fan_entry.data(),
+          s.free.view(),
+          s.normal.view(),
+          block_inverse(state),
+          free_block_inverse(state),
+          s.inertia.data(),
+          s.grip.data(),
+          {state.obstacles.stopped.data()},
+          0.15f * p.spacing,
+          float(1 / state.dt),
+          1.f / p.particle_mass,
+          {p.low[0], p.low[1], p.low[2]},
+          periods_of(p)};
+}
+
+/// As hold_at_walls, whose axes it takes into account.
+inline void hold_at_obstacles(State& state) {
+  const ClothState& c = state.cloth;
+  const ClothSystem& s = state.cloth_system;
+  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
+                right = s.right.view(), change = s.change.view();
+  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  float* slides = s.slides.data();
+  const BlockInverse block = block_inverse(state);
+  const ClothHold hold = cloth_hold_of(state);
+  state.cloth_system.normal.clear();
+  state.cloth_system.rub.clear();  // what is held in a later round would feel the last step's
+  parallel_for(
+      "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        hold.grip[i] = -1, slides[i] = 1.f;
+        hold.free_block.copy(i, hold.block);
+        if (inverse_mass[i] == 0.f) return;
+        const Vec3<float> straight = x[i] + v[i] * dt;
+        Vec3<float> w = change[i];
+        const Vec3<float> to = straight + block.times(i, base[i] + right[i]);
+        if (hold.hold(i, x[i], straight, to, w)) change.set(i, w);
+      });
+}
+
+/// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
+struct HoldRevision {
+  ClothHold hold;
+  VecView position, velocity, change, given, right, reaction, rub;
+  float* slides;
+  const float *mass, *inverse_mass;
+  float dt;
+  int round;
+
+  DRENCH_HD bool free_too_near(int i) const {
+    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    Vec3<float> w = change[i];
+    if (!hold.hold(i, position[i], straight, straight + w, w)) return false;
+    change.set(i, w);
+    return true;
+  }
+  DRENCH_HD bool let_go(int i) const {
+    hold.grip[i] = -2, slides[i] = 1.f;
+    hold.normal.set(i, {0.f, 0.f, 0.f});
+    hold.free_block.copy(i, hold.block);
+    right.set(i, given[i]);
+    return true;
+  }
+  /// The obstacle takes the vertex with it.
+  DRENCH_HD bool stick(int i, const ObstacleView& o, Vec3<float> n) const {
+    const Vec3<float> x = position[i], straight = x + velocity[i] * dt, w = change[i];
+    const Vec3<float> in = hold.home(x), carried = o.to_frame(1, o.to_own(0, x + in)) - in;
+    const Vec3<float> off = along(hold.free[i], carried - straight - w);
+    slides[i] = 0.f;
+    right.set(i, given[i]);
+    change.set(i, w + off - n * dot(n, off));
+    return true;
+  }
+  DRENCH_HD bool slide(int i, Vec3<float> friction) const {
+    slides[i] = 1.f;
+    rub.set(i, friction), right.set(i, given[i] + friction);
+    return true;
+  }
+
+  /// Whether anything is to change.
+  DRENCH_HD bool operator()(int i) const {
+    const int k = hold.grip[i];
+    if (k < 0) return k == -1 && inverse_mass[i] > 0.f && free_too_near(i);
+    const ObstacleView& o = hold.obstacles.obstacle[k];
+    const Vec3<float> n = hold.normal[i], all = reaction[i];
+    const float normal = dot(n, all), most = o.friction * normal;
+    if (normal < 0.f) return let_go(i);
+    if (o.friction == 0.f) return round == 0;
+    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);
+    if (round == 0) {  // hold what is slow enough for friction to stop it
+      const Vec3<float> slip = across(velocity[i] - solid, n);
+      const float size = length(slip);
+      if (size * mass[i] * dt <= most) return stick(i, o, n);
+      return slide(i, slip * (-most / size));
+    }
+    if (slides[i] == 0.f) {
+      const Vec3<float> pull = across(all, n);
+      const float size = length(pull);
+      return size > most && slide(i, pull * (most / size));
+    }
+    const Vec3<float> slip = across(velocity[i] + change[i] * (1.f / dt) - solid, n);
+    const float now = length(rub[i]);
+    if (round < 3 && dot(slip, rub[i]) > 0.f) return stick(i, o, n);
+    return fabsf(now - most) > 0.02f * most && now > 0.f && slide(i, rub[i] * (most / now));
+  }
+  DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
+};
+
+/// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
+/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
+/// the guard stops it.
+inline bool revise_holds(State& state, const VecView& given, int round) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const ClothMatrix matrix = cloth_matrix(state);
+  const VecView change = s.change.view(), reaction = s.residual.view();
+  // The springs of a vertex reach others, whose ways must not change meanwhile.
+  parallel_for(
+      "cloth: reactions", c.vertices,
+      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
+  const HoldRevision revise{cloth_hold_of(state),
+                            c.position.view(),
+                            c.velocity.view(),
+                            change,
+                            given,
+                            s.answer.view(),
+                            reaction,
+                            s.rub.view(),
+                            s.slides.data(),
+                            c.mass.data(),
+                            c.inverse_mass.data(),
+                            float(state.dt),
+                            round};
+  return parallel_reduce(
+             "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
+             Larger{}) > 0;
+}
+
+/// The solve of the sheets was made: on with friction and with other vertices held, until these are
+/// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
+/// momentum of a sheet that is held.
+inline void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance) {
+  constexpr int most_rounds = 6;
+  ClothSystem& s = state.cloth_system;
+  const VecView change = s.change.view(), right = s.answer.view();
+  parallel_for(
+      "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
+  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
+    sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
+}
+
+/// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
+/// and their own impulse.
+inline void finish_at_obstacles(State& state, const VecView& given) {
+  const ClothState& c = state.cloth;
+  const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
+                velocity = c.next_velocity.view(), predicted = c.predicted.view(),
+                change = state.cloth_system.change.view();
+  const float inverse_dt = 1.f / float(state.dt), *mass = c.mass.data(),
+              *inverse_mass = c.inverse_mass.data();
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        const int k = hold.grip[i];
+        if (k >= 0) {
+          const Vec3<float> n = hold.normal[i], w = change[i];
+          u = v[i] + w * inverse_dt;
+          const ObstacleView& o = hold.obstacles.obstacle[k];
+          const Vec3<float> solid = hold.surface_velocity(o, to + hold.home(x[i]), n);
+          const Vec3<float> kick = n * dot(solid - u, n);
+          const Vec3<float> reaction = along(hold.free[i], matrix.whole(change, i) - given[i]);
+          hold.react(k, reaction * inverse_dt + kick * mass[i]);
+          u = u + kick;
+        }
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u), predicted.set(i, u);
+      });
+}
+
+/// The path test has stopped vertices where they were: obstacles carry them on.
+inline void carry_held_vertices(State& state) {
+  const ClothState& c = state.cloth;
+  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view();
+  const float *mass = c.mass.data(), *inverse_mass = c.inverse_mass.data();
+  const int* held = c.held.data();
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
+        if (!held[i] || inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u);
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,45 @@
+#pragma once
+// What a frame that turns about an axis does to velocities, which are relative to it, over a step:
+//   du/dt = -dw/dt x r - w x (w x r) - 2 w x u,      r from a point of the axis,
+// the forces of Euler, of the centrifuge and of Coriolis (Landau and Lifshitz, Mechanics, section
+// 39). Coriolis' turns velocities and does no work: the trapezoidal rule, solved in closed form,
+// keeps their length to rounding. It goes before gravity, at the places that the step starts with.
+
+#include "sim/backend/parallel.h"
+#include "sim/state.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct TurningFrame {
+  Vec3<float> rate, change, centre;  // rad/s, rad/s, m
+  float dt;                          // s
+
+  DRENCH_HD Vec3<float> operator()(Vec3<float> x, Vec3<float> u) const {
+    const Vec3<float> r = x - centre, half = rate * dt,
+                      b = u - cross(change, r) - cross(half, cross(rate, r)) - cross(half, u);
+    return (b + half * dot(half, b) - cross(half, b)) * (1.f / (1.f + length2(half)));
+  }
+};
+
+inline TurningFrame turning_frame_of(const State& state) {
+  const FrameNow& now = state.frame;
+  return {{now.rate[0], now.rate[1], now.rate[2]},
+          {now.change[0], now.change[1], now.change[2]},
+          {now.centre[0], now.centre[1], now.centre[2]},
+          float(state.dt)};
+}
+
+inline void turn_frame(State& state) {
+  const TurningFrame turn = turning_frame_of(state);
+  const VecView x = state.fluid.position.view(), v = state.fluid.velocity.view(),
+                cloth = state.cloth.position.view(), speed = state.cloth.velocity.view();
+  const float* inverse_mass = state.cloth.inverse_mass.data();
+  parallel_for(
+      "turning frame", state.fluid.count, DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });
+  parallel_for(
+      "turning frame: cloth", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] > 0.f) speed.set(i, turn(cloth[i], speed[i]));
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

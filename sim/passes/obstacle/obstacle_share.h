@@ -1,0 +1,137 @@
+#pragma once
+// Obstacles in the density: mirrors, as domain walls are (image_walls.h). Beyond the surface lies
+// the fluid's image, which begins at 2 d - a/2 from a particle at distance d: inside the surface
+// moved in by d - a/2. Of a sphere that is a concentric one, whose share of the kernel is, with D
+// the image's distance and k one over the distance to the centre, both in supports,
+//   S = (1 - k D) H(D) - k N(D) / 2,    H = halfspace, N = moment,
+// from cutting shells r < 1 by the ball: a share (r - D) (2 / k - D - r) k / (4 r) of each lies in
+// it. k is half the divergence of the normal, which is how a level set has it too; a concave
+// surface has k < 0. A half-space (k = 0) overrates a sphere of 3 spacings by 29 %
+// (docs/benchmarks.md). A box takes the half-spaces of its three nearest faces, moved in alike, as
+// a product, which is exact on faces and, by symmetry, on edges and corners.
+
+#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/pressure/image_walls.h"
+#include "sim/state.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct ObstacleShare {
+  float scale, inverse_h, spacing;  // as ImageWalls
+
+  /// Farthest that a surface counts, m.
+  DRENCH_HD float reach() const { return 0.5f / inverse_h + 0.25f * spacing; }
+
+  /// @param normal  unit. @param curvature  half its divergence, 1/m.
+  DRENCH_HD WallShare curved(float distance, Vec3<float> normal, float curvature) const {
+    constexpr float sharpest = 2.f;  // edges of level sets; a sphere of half a spacing
+    const float D = (2.f * distance - 0.5f * spacing) * inverse_h;
+    if (D >= 1.f) return {0.f, {0.f, 0.f, 0.f}};
+    const float k = maximum(minimum(curvature / inverse_h, sharpest), -sharpest);
+    const float H = WendlandC2::halfspace(D), N = WendlandC2::moment(D);
+    const float value = (1.f - k * D) * H - 0.5f * k * N;
+    const float slope = k * k * (D * H + 0.5f * N) - 2.f * (1.f - k * D) * WendlandC2::plane(D);
+    if (value <= 0.f || slope >= 0.f) return {0.f, {0.f, 0.f, 0.f}};  // an edge, far off
+    return {scale * value, normal * (scale * slope * inverse_h)};
+  }
+
+  DRENCH_HD WallShare box(Vec3<float> own, const float (&half)[3]) const {
+    const BoxDistance to(own, half);
+    const float x[3] = {own.x, own.y, own.z}, n[3] = {to.normal.x, to.normal.y, to.normal.z};
+    float H[3], P[3], g[3];
+    for (int k = 0; k < 3; ++k) {
+      const float q = (to.beyond[k] + to.distance - 0.5f * spacing) * inverse_h;
+      H[k] = WendlandC2::halfspace(q);
+      P[k] = WendlandC2::plane(q);
+    }
+    const float by_face[3] = {P[0] * H[1] * H[2], H[0] * P[1] * H[2], H[0] * H[1] * P[2]};
+    const float moved = by_face[0] + by_face[1] + by_face[2];
+    for (int k = 0; k < 3; ++k)
+      g[k] = -scale * inverse_h * (sign_of(x[k]) * by_face[k] + n[k] * moved);
+    return {scale * H[0] * H[1] * H[2], {g[0], g[1], g[2]}};
+  }
+
+  /// From seven samples of the distance, one voxel apart.
+  DRENCH_HD WallShare field(const ObstacleView& o, Vec3<float> own) const {
+    const float mix = o.blend[1], d = o.distance(own, mix), e = o.field[0].voxel;
+    if (d >= reach()) return {0.f, {0.f, 0.f, 0.f}};
+    const float x0 = o.distance({own.x - e, own.y, own.z}, mix),
+                x1 = o.distance({own.x + e, own.y, own.z}, mix),
+                y0 = o.distance({own.x, own.y - e, own.z}, mix),
+                y1 = o.distance({own.x, own.y + e, own.z}, mix),
+                z0 = o.distance({own.x, own.y, own.z - e}, mix),
+                z1 = o.distance({own.x, own.y, own.z + e}, mix);
+    const Vec3<float> slope{x1 - x0, y1 - y0, z1 - z0};
+    const float size = length(slope);
+    if (size == 0.f) return {0.f, {0.f, 0.f, 0.f}};
+    const float divergence = (x0 + x1 + y0 + y1 + z0 + z1 - 6.f * d) / (e * e);
+    return curved(d, slope * (1.f / size), 0.5f * divergence);
+  }
+
+  /// Share of density that one obstacle, where it ends the step, replaces at x.
+  DRENCH_HD WallShare of(const ObstacleView& o, Vec3<float> x) const {
+    if (!o.near_path(x, x, reach())) return {0.f, {0.f, 0.f, 0.f}};
+    const Vec3<float> own = o.to_own(1, x);
+    WallShare share{};
+    if (o.shape == ObstacleShape::plane) share = curved(own.y, {0.f, 1.f, 0.f}, 0.f);
+    if (o.shape == ObstacleShape::sphere) {
+      const float r = length(own), inverse = r > 0.f ? 1.f / r : 0.f;
+      share = curved(r - o.half[0], own * inverse, inverse);
+    }
+    if (o.shape == ObstacleShape::box) share = box(own, o.half);
+    if (o.shape == ObstacleShape::field) share = field(o, own);
+    share.gradient = o.turn(1, share.gradient);
+    return share;
+  }
+
+  /// The same beside a sheet at `distance` m against its normal, as ImageWalls::share: not seen
+  /// through it.
+  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> sheet_normal,
+                           float distance, const ImageWalls& walls) const {
+    const WallShare share = of(o, x);
+    if (share.value == 0.f) return share;
+    const Vec3<float> own = o.to_own(1, x), n = o.turn(1, o.normal(own, o.blend[1]));
+    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, sheet_normal) - distance);
+    return {share.value * shown, share.gradient * shown};
+  }
+
+  /// Both replace density: 1 - (1 - S)(1 - S'), as walls among themselves.
+  static DRENCH_HD WallShare both(WallShare a, WallShare b) {
+    return {1.f - (1.f - a.value) * (1.f - b.value),
+            a.gradient * (1.f - b.value) + b.gradient * (1.f - a.value)};
+  }
+  DRENCH_HD WallShare with(WallShare walls, const ObstacleViews& obstacles, Vec3<float> x) const {
+    for (int k = 0; k < obstacles.count; ++k) {
+      const WallShare share = of(obstacles.obstacle[k], x);
+      if (share.value != 0.f) walls = both(walls, share);
+    }
+    return walls;
+  }
+};
+
+inline ObstacleShare obstacle_share_of(const Parameters& p) {
+  return {p.wall_scale, 1.f / p.support_radius, p.spacing};
+}
+
+/// Adds obstacles to what find_neighbours has of the walls.
+inline void add_obstacle_shares(State& state) {
+  const Parameters& p = state.parameters;
+  const VecView x = state.fluid.position.view();
+  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleViews obstacles = state.obstacles.views();
+  const float rest = p.rest_density;
+  Float4* wall = state.pressure.wall.data();
+  parallel_for(
+      "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
+        for (int k = 0; k < obstacles.count; ++k) {
+          const WallShare share = law.of(obstacles.obstacle[k], x[i]);
+          if (share.value == 0.f) continue;
+          const Float4 w = wall[i];
+          const WallShare all = law.both({w.w / rest, {w.x / rest, w.y / rest, w.z / rest}}, share);
+          wall[i] = {rest * all.gradient.x, rest * all.gradient.y, rest * all.gradient.z,
+                     rest * all.value};
+        }
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,58 @@
+#pragma once
+// XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
+//   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
+// antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h;
+// where it does less than a hundredth of what this does, as water's does at spacings of a
+// centimetre, it is added to c.
+
+#include "sim/passes/pressure/pressure_rows.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+struct VelocitySmoothing {
+  static constexpr int columns = 1;
+  const Float4* velocity;
+  VecView out;
+  float factor;  // of the kernel's value
+
+  DRENCH_HD bool idle() const { return false; }
+  DRENCH_HD Columns<1> inputs() const { return {{velocity}}; }
+  template <class Q>
+  struct Particle {
+    Q velocity;
+  };
+  template <class Q>
+  struct Sum {
+    Q change;
+  };
+  template <class T>
+  DRENCH_HD T weight(T u) const {
+    return T(factor) * WendlandC2::value(u);
+  }
+  template <class Q>
+  DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
+    sum.change = multiply_add(j.velocity - i.velocity, weight, sum.change);
+  }
+  DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
+    const Float4 v = velocity[i], c = sum.change;
+    out.set(i, {v.x + c.x, v.y + c.y, v.z + c.z});
+  }
+};
+
+inline void smooth_velocities(State& state) {
+  const Parameters& p = state.parameters;
+  PressureState& s = state.pressure;
+  const VecView v = state.fluid.velocity.view();
+  Float4* vector = s.vector.data();
+  parallel_for(
+      "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
+        vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
+      });
+  const float share =
+      p.xsph + (smoothing_takes_viscosity(p, state.dt) ? smoothing_of_viscosity(p, state.dt) : 0.f);
+  const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
+  for_each_neighbour("smoothing", s.lists, state.fluid.count,
+                     VelocitySmoothing{vector, v, share * volume * h * h});
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

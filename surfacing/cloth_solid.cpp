@@ -1,0 +1,64 @@
+#include "surfacing/cloth_solid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/error.h"
+#include "pipeline/contract/geometry/triangle.h"
+
+namespace drench::surfacing {
+namespace {
+
+int floor_to_int(float v) { return static_cast<int>(std::floor(v)); }
+
+constexpr const char* cure = "the frame of the cloth is damaged, simulate it again";
+
+}  // namespace
+
+Sheets::Sheets(std::span<const TriangleMesh> meshes, const BinnedParticles& particles)
+    : NearTriangles(meshes, particles, reach, "sheet", cure) {
+  for (size_t sheet = 0; sheet < meshes.size(); ++sheet) {
+    const TriangleMesh& mesh = meshes[sheet];
+    if (mesh.velocity.size() != mesh.position.size())
+      throw Error(fmt::format("surfacing: sheet {}: {} velocities for {} vertices; {}", sheet,
+                              mesh.velocity.size(), mesh.position.size(), cure));
+    for (const auto& t : mesh.triangle)
+      velocity_.push_back({mesh.velocity[t.x], mesh.velocity[t.y], mesh.velocity[t.z]});
+  }
+}
+
+void Sheets::cut(V3i block, BlockValues& value, float iso_value) const {
+  constexpr float slope = 0.25f;  // of the field in a voxel, about that at a surface
+  std::array<float, block_size> square;
+  square.fill(reach * reach);
+  const V3f origin(block * block_edge);
+  for_each_near(block, [&](uint32_t triangle) {
+    const auto& t = corners(triangle);
+    const TriangleBox box = box_of(t, reach);
+    V3i low, high;
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::max(0, floor_to_int(box.low[axis] - origin[axis]));
+      high[axis] = std::min(block_edge - 1, floor_to_int(box.high[axis] - origin[axis]));
+    }
+    for (int z = low.z; z <= high.z; ++z)
+      for (int y = low.y; y <= high.y; ++y)
+        for (int x = low.x; x <= high.x; ++x) {
+          const V3f p = origin + V3f(V3i(x, y, z));
+          float& least = square[(static_cast<size_t>(z) * block_edge + y) * block_edge + x];
+          least = std::min(least, (closest_on_triangle(p, t[0], t[1], t[2]) - p).length2());
+        }
+  });
+  for (size_t k = 0; k < block_size; ++k) {
+    if (square[k] >= reach * reach) continue;
+    value[k] = std::min(value[k], iso_value + slope * (std::sqrt(square[k]) - gap));
+  }
+}
+
+V3f Sheets::velocity(const Foot& foot) const {
+  const auto& v = velocity_[foot.triangle];
+  return v[0] * foot.weight.x + v[1] * foot.weight.y + v[2] * foot.weight.z;
+}
+
+}  // namespace drench::surfacing
