@@ -208,6 +208,7 @@ std::vector<T> PointReader::column(const char* name) const {
   std::vector<T> column;
   for (auto leaf = grid_->points->tree().cbeginLeaf(); leaf; ++leaf) {
     if (leaf->attributeSet().find(name) == points::AttributeSet::INVALID_POS) continue;
+    if (column.empty()) column.reserve(size_t(points::pointCount(grid_->points->tree())));
     const points::AttributeHandle<typename StoredAs<T>::Type> values(
         leaf->constAttributeArray(name));
     for (auto point = leaf->beginIndexOn(); point; ++point)
