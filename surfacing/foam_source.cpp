@@ -16,23 +16,16 @@ constexpr float calm = 1, wild = 10;
 constexpr float crest_low = 0.1f, crest_high = 0.4f;  // curvature of crests
 /// Weighted sums over a full neighbourhood: the integral of 1 - r / h over its ball.
 constexpr float full_weight = 3.14159265f / 3 * foam_support * foam_support * foam_support;
-/// Who has fewer neighbours than this share sees air; who has a smaller offset has no normal.
+/// Who has fewer neighbours than this fraction sees air; who has a smaller offset has no normal.
 constexpr float airy = 0.85f, least_offset = 0.2f;
 
 float ramp(float value, float low, float high) {
   return std::clamp((value - low) / (high - low), 0.f, 1.f);
 }
 
-float total(Pack sum) {
-  float lane[pack_width], all = 0;
-  store(lane, sum);
-  for (const float value : lane) all += value;
-  return all;
-}
-
 /// A particle as its block sees it: voxels from the corner, m/s from the block's base.
 struct Seen {
-  V3f place, velocity;
+  V3f position, velocity;
 };
 
 struct Sums {
@@ -41,7 +34,7 @@ struct Sums {
 
 /// The sums over all neighbours, itself among them.
 Potential sum_up(const NearFluid& fluid, const Seen& me) {
-  const Pack x = pack(me.place.x), y = pack(me.place.y), z = pack(me.place.z);
+  const Pack x = pack(me.position.x), y = pack(me.position.y), z = pack(me.position.z);
   const Pack u = pack(me.velocity.x), v = pack(me.velocity.y), w = pack(me.velocity.z);
   const Pack scale = pack(1 / foam_reach), reach2 = pack(foam_reach * foam_reach);
   Sums sum;
@@ -66,12 +59,12 @@ Potential sum_up(const NearFluid& fluid, const Seen& me) {
     sum.closing = multiply_add(weight, closing, sum.closing);
   }
   Potential p;
-  const float weight = total(sum.weight);
+  const float weight = sum_of(sum.weight);
   p.fullness = weight / full_weight;
-  p.closing = total(sum.closing) / full_weight;
+  p.closing = sum_of(sum.closing) / full_weight;
   p.offset =
-      V3f(total(sum.x), total(sum.y), total(sum.z)) * (-1 / (weight * foam_voxels_per_spacing));
-  const V3f relative = V3f(total(sum.u), total(sum.v), total(sum.w)) * (-1 / weight);
+      V3f(sum_of(sum.x), sum_of(sum.y), sum_of(sum.z)) * (-1 / (weight * foam_voxels_per_spacing));
+  const V3f relative = V3f(sum_of(sum.u), sum_of(sum.v), sum_of(sum.w)) * (-1 / weight);
   const float length = p.offset.length();
   const float ahead = length > least_offset ? relative.dot(p.offset) / length : 0;
   if (ahead > 0.6f * relative.length()) p.ahead = ahead;
@@ -84,7 +77,7 @@ float crest_curvature(const NearFluid& fluid, const FluidMoment& all, const Seen
   const V3f normal = offset.normalized();
   double sum = 0, weights = 0;
   for (size_t j = 0; j < fluid.near.size(); ++j) {
-    const V3f d = V3f(fluid.near.x[j], fluid.near.y[j], fluid.near.z[j]) - me.place;
+    const V3f d = V3f(fluid.near.x[j], fluid.near.y[j], fluid.near.z[j]) - me.position;
     const float distance = d.length();
     if (distance >= foam_reach || d.dot(normal) >= 0) continue;
     const uint32_t source = all.bins.source[fluid.near.index[j]];
