@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <regex>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/geometry/shells.h"
@@ -42,11 +42,13 @@ struct Field {
   int digits = 0;
 };
 Field frame_field(const std::string& name) {
-  static const std::regex field("%(?:0([1-9]))?d");
-  std::smatch match;
-  if (!std::regex_search(name, match, field)) return {};
-  return {size_t(match.position(0)), size_t(match.length(0)),
-          match[1].matched ? std::stoi(match[1]) : 0};
+  for (size_t at = name.find('%'); at != std::string::npos; at = name.find('%', at + 1)) {
+    const std::string_view rest = std::string_view(name).substr(at);
+    if (rest.starts_with("%d")) return {at, 2, 0};
+    if (rest.size() >= 4 && rest[1] == '0' && rest[2] >= '1' && rest[2] <= '9' && rest[3] == 'd')
+      return {at, 4, rest[2] - '0'};
+  }
+  return {};
 }
 
 /// Between two corners of open edges, of the first thousand.

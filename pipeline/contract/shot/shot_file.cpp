@@ -12,6 +12,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot/shot_check.h"
 #include "pipeline/contract/shot/shot_table.h"
+#include "pipeline/contract/shot/shot_text.h"
 #include "pipeline/contract/shot/shot_value.h"
 #include "pipeline/contract/shot/toml.h"
 #include "pipeline/contract/shot/toml_text.h"
