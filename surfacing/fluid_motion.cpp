@@ -55,10 +55,7 @@ Lattice lattice_around(const std::vector<V3f>& fluid, const std::vector<V3f>& po
         low[axis] = std::min(low[axis], p[axis]);
         high[axis] = std::max(high[axis], p[axis]);
       }
-  const double margin = block_edge * (lattice.ring() + 1);
-  for (int axis = 0; axis < 3; ++axis) {
-    lattice.origin[axis] = std::floor(low[axis] / lattice.voxel) - margin;
-    if (lattice.to_voxels(high[axis], axis) + margin < double(block_edge) * max_block) continue;
+  if (const int axis = lattice.fit(low, high); axis >= 0) {
     throw Error(fmt::format(
         "foam: fluid and foam are spread over {:.4g} m along {}, more than 2^24 voxels of {:.4g} "
         "m. Make the domain smaller, or simulate again if the fluid blew up",

@@ -109,11 +109,8 @@ Lattice lattice_of(const ParticleFrame& particles, const SurfaceSettings& settin
   lattice.voxels_per_spacing = static_cast<float>(1 / settings.voxel);
   for (lattice.bins = 8; lattice.bins > 1; lattice.bins /= 2)  // bins of at least 0.7 spacings
     if (block_edge * settings.voxel / lattice.bins > 0.7) break;
-  const double margin = block_edge * (lattice.ring() + 1);
-  for (int axis = 0; axis < 3; ++axis) {
-    lattice.origin[axis] = std::floor(bounds.low[axis] / lattice.voxel) - margin;
+  if (const int axis = lattice.fit(bounds.low, bounds.high); axis >= 0) {
     const double extent = lattice.to_voxels(bounds.high[axis], axis);
-    if (extent + margin < double(block_edge) * max_block) continue;
     throw Error(fmt::format(
         "surfacing: particles are spread over {:.4g} m along {}, {:.3g} voxels of {:.4g} m; at "
         "most "

@@ -86,7 +86,7 @@ std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& firs
       "The nearest of their corners are {:.3g} apart, in the file's unit; gaps up to {:.3g} are "
       "closed. It needs an inside: close its holes, merge its vertices by distance, and orient it "
       "in one way",
-      narrowest_gap(mesh, open), weld_share * diagonal_of(mesh));
+      narrowest_gap(mesh, open), weld_fraction * diagonal_of(mesh));
 }
 
 [[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
@@ -105,7 +105,7 @@ std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& firs
 
 /// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
 void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
-  const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
+  const Welded welded = weld(mesh, weld_fraction * diagonal_of(mesh));
   const auto open = free_edges(mesh, welded.first);
   if (!open.empty()) refuse_open(mesh, file, welded.first, open);
   size_t moved = 0;
@@ -124,7 +124,7 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
   }
 }
 
-/// Leaves out triangles of which two corners are at one place: they enclose nothing.
+/// Leaves out triangles of which two corners are at one point: they enclose nothing.
 void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
   const auto& at = mesh.position;
   const size_t dropped = std::erase_if(mesh.triangle, [&](const Triangle& t) {
@@ -138,7 +138,7 @@ void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
                                dropped));
 }
 
-/// Leaves out vertices that no triangle has: they are no places of a solid.
+/// Leaves out vertices that no triangle has: they are no points of a solid.
 void drop_unused_vertices(TriangleMesh& mesh, const std::filesystem::path& file) {
   const size_t n = mesh.position.size();
   constexpr auto unused = uint32_t(-1);

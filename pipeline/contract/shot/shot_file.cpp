@@ -49,7 +49,7 @@ class Reader {
       if (name == "quality" && mode_ == Mode::write) continue;  // read when the rest is known
       const Section* const section = shot_table::find_section(name);
       if (section == nullptr || !section->parent.empty())
-        unknown_section(name, place(key.source()));
+        unknown_section(name, location(key.source()));
       read_child(*section, &draft_.shot, name, node);
     }
   }
@@ -59,7 +59,7 @@ class Reader {
   }
 
   /// "shots/dam.toml:14"; an override is one line and named whole.
-  std::string place(const toml::source_region& source) const {
+  std::string location(const toml::source_region& source) const {
     return source.begin && !label_is_whole_ ? fmt::format("{}:{}", label_, source.begin.line)
                                             : label_;
   }
@@ -107,7 +107,7 @@ class Reader {
 
   void read_child(const Section& section, void* owner, const std::string& path,
                   const toml::node& node) {
-    const std::string where = place(node.source());
+    const std::string where = location(node.source());
     if (!section.repeated) {
       const auto* table = node.as_table();
       if (table == nullptr) {
@@ -130,19 +130,20 @@ class Reader {
                   const toml::node& node) {
     const auto* array = node.as_array();
     if (array == nullptr || (!array->empty() && !array->is_array_of_tables())) {
-      fail(place(node.source()), fmt::format("{} may stand more than once; write [[{}]] with two "
-                                             "brackets a side",
-                                             path, section.name));
+      fail(location(node.source()),
+           fmt::format("{} may stand more than once; write [[{}]] with two "
+                       "brackets a side",
+                       path, section.name));
     }
     constexpr size_t most = 4096;
     if (array->size() > most) {
-      fail(place(node.source()),
+      fail(location(node.source()),
            fmt::format("{} stands {} times; at most {} are allowed", path, array->size(), most));
     }
     for (const toml::node& item : *array) {
       const size_t index = index_for(section, owner, *item.as_table());
       const std::string own = fmt::format("{}[{}]", path, index);
-      const std::string where = place(item.source());
+      const std::string where = location(item.source());
       if (!draft_.sources.where.emplace(own, where).second) {
         fail(where,
              fmt::format("material \"{}\" is defined twice; the first time at {}. Remove one",
@@ -156,7 +157,7 @@ class Reader {
     }
   }
 
-  /// Where the next object goes: at the end, or for a material that exists already in its place.
+  /// Where the next object goes: at the end, or for a material that exists already where it is.
   size_t index_for(const Section& section, void* owner, const toml::table& table) {
     if (section.name == "material") {
       const auto* name = table.get_as<std::string>("name");
@@ -199,18 +200,18 @@ class Reader {
                      const toml::node& node) {
     const auto* table = node.as_table();
     if (table == nullptr) {
-      fail(place(node.source()),
+      fail(location(node.source()),
            fmt::format("an override of {} says which one, by name or by number from 0: {}.0.key",
                        path, path));
     }
     for (auto&& [key, item] : *table) {
       const std::string which(key.str());
-      const size_t index = find_object(section, owner, path, which, place(key.source()));
+      const size_t index = find_object(section, owner, path, which, location(key.source()));
       const auto* values = item.as_table();
       if (values == nullptr) {
-        fail(place(item.source()), fmt::format("{}.{} is not a value; override one of its keys: "
-                                               "{}.{}.key",
-                                               path, which, path, which));
+        fail(location(item.source()), fmt::format("{}.{} is not a value; override one of its keys: "
+                                                  "{}.{}.key",
+                                                  path, which, path, which));
       }
       read_table(section, section.at(owner, index), fmt::format("{}[{}]", path, index), *values);
     }
@@ -231,7 +232,7 @@ class Reader {
 
   void read_table(const Section& section, void* object, const std::string& path,
                   const toml::table& table) {
-    // The type first: it says which other keys belong to the thing.
+    // The type first: it says which other keys belong to the object.
     for (const bool types : {true, false}) {
       for (auto&& [key, node] : table) {
         const std::string name(key.str());
@@ -243,7 +244,7 @@ class Reader {
         } else if (child != nullptr) {
           read_child(*child, object, path + "." + name, node);
         } else {
-          unknown_key(section, path, name, place(key.source()));
+          unknown_key(section, path, name, location(key.source()));
         }
       }
     }
@@ -270,7 +271,8 @@ class Reader {
 
   void read_key(const Section& section, const Parameter& p, void* object, const std::string& path,
                 const toml::node& node) {
-    const shot_table::Site site{place(node.source()), fmt::format("{}.{}", path, p.key), folder_};
+    const shot_table::Site site{location(node.source()), fmt::format("{}.{}", path, p.key),
+                                folder_};
     if (mode_ == Mode::override_values && p.fixed) {
       fail(site.where,
            fmt::format("{} says which thing this is and cannot be overridden; change it "

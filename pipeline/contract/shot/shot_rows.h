@@ -90,7 +90,7 @@ struct Row : Parameter {
     row.fixed = true;
     return row;
   }
-  /// @param types  of things that have it.
+  /// @param types  of objects that have it.
   template <class... Types>
   Row only(Types... types) const {
     Row row = *this;
@@ -122,8 +122,9 @@ Row row(std::string_view section, std::string_view key, std::string_view unit, L
 }
 
 inline constexpr Limits none{};
-inline constexpr Limits share{0, 1};
-inline constexpr Limits place{-1e5, 1e5};    // m: beyond, float steps are wider than a millimetre
+inline constexpr Limits fraction{0, 1};
+inline constexpr Limits coordinate{-1e5,
+                                   1e5};     // m: beyond, float steps are wider than a millimetre
 inline constexpr Limits speed{-1000, 1000};  // m/s
 inline constexpr Limits turns{-360000, 360000};  // deg
 inline constexpr Limits seeds{0, 4294967295};    // uint32_t

@@ -7,8 +7,9 @@ namespace {
 
 std::vector<Parameter> camera_rows() {
   return {
-      row<&Camera::position>("camera", "position", "m", place, render, "may be animated"),
-      row<&Camera::target>("camera", "target", "m", place, render, "looked at; may be animated"),
+      row<&Camera::position>("camera", "position", "m", coordinate, render, "may be animated"),
+      row<&Camera::target>("camera", "target", "m", coordinate, render,
+                           "looked at; may be animated"),
       row<&Camera::fov_deg>("camera", "fov_deg", "deg", {0.1, 170}, render,
                             "horizontal field of view; may be animated"),
       row<&Camera::focus_distance>("camera", "focus_distance", "m", {0, 1e6}, render,
@@ -23,14 +24,15 @@ std::vector<Parameter> camera_rows() {
       row<&Camera::squeeze>("camera", "squeeze", "", {0.25, 4}, render,
                             "of an anamorphic lens: blur is narrower than high by this factor; "
                             "the field of view is not changed"),
-      row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
+      row<&Camera::up>("camera", "up", "", coordinate, render,
+                       "up in the picture; any length but 0"),
       row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
                                  "relative to the frame"),
       row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
                                   "relative to the frame"),
-      row<&Camera::shutter_opening>("camera", "shutter_opening", "", share, render,
+      row<&Camera::shutter_opening>("camera", "shutter_opening", "", fraction, render,
                                     "share of the shutter in which it opens evenly; 0: at once"),
-      row<&Camera::shutter_closing>("camera", "shutter_closing", "", share, render,
+      row<&Camera::shutter_closing>("camera", "shutter_closing", "", fraction, render,
                                     "share in which it closes; 0.5 and 0.5 give a triangle"),
       row<&Camera::rolling_shutter>("camera", "rolling_shutter", "", {0, 100}, render,
                                     "how much later the bottom row is exposed than the top one, "
@@ -51,14 +53,15 @@ std::vector<Parameter> light_rows() {
       row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
                             "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
                             "environment with a map, its factor"),
-      row<&Light::center>("light", "center", "m", place, render, "centre")
+      row<&Light::center>("light", "center", "m", coordinate, render, "centre")
           .only(LightType::rectangle, LightType::sphere, LightType::disk),
-      row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
+      row<&Light::u>("light", "u", "m", coordinate, render, "half edge; light leaves along u x v")
           .only(LightType::rectangle),
-      row<&Light::v>("light", "v", "m", place, render, "half edge").only(LightType::rectangle),
+      row<&Light::v>("light", "v", "m", coordinate, render, "half edge").only(LightType::rectangle),
       row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius")
           .only(LightType::sphere, LightType::disk),
-      row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
+      row<&Light::direction>("light", "direction", "", coordinate, render,
+                             "the way its light travels")
           .only(LightType::sun, LightType::disk),
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
           .only(LightType::sun),
@@ -87,31 +90,31 @@ std::vector<Parameter> material_rows() {
           .needed()
           .identity(),
       row<&Material::type>("material", "type", "", none, render, "how light meets it").identity(),
-      row<&Material::reflectance>("material", "reflectance", "", share, render,
+      row<&Material::reflectance>("material", "reflectance", "", fraction, render,
                                   "diffuse reflection, of a coated one under its coat; of metal, "
                                   "of light that faces it")
           .only(MaterialType::cloth, MaterialType::diffuse, MaterialType::metal,
                 MaterialType::coated),
-      row<&Material::edge>("material", "edge", "", share, render,
+      row<&Material::edge>("material", "edge", "", fraction, render,
                            "its colour at 82 degrees over that of Schlick's formula there")
           .only(MaterialType::metal),
-      row<&Material::roughness>("material", "roughness", "", share, render,
+      row<&Material::roughness>("material", "roughness", "", fraction, render,
                                 "its square is the alpha of GGX facets; below 0.01 smooth")
           .only(MaterialType::dielectric, MaterialType::metal, MaterialType::coated),
       row<&Material::emission>("material", "emission", "W/(sr m^2)", {0, 1e9}, render,
                                "light of its own, of obstacles only, from their outer side")
           .only(MaterialType::diffuse),
-      row<&Material::transmittance>("material", "transmittance", "", share, render,
+      row<&Material::transmittance>("material", "transmittance", "", fraction, render,
                                     "diffuse transmission; with reflectance at most 1")
           .only(MaterialType::cloth),
-      row<&Material::sheen>("material", "sheen", "", share, render,
+      row<&Material::sheen>("material", "sheen", "", fraction, render,
                             "of light that fuzz on both faces returns, most along the surface; "
                             "the rest falls on the cloth")
           .only(MaterialType::cloth),
       row<&Material::sheen_roughness>("material", "sheen_roughness", "", {0.1, 1}, render,
                                       "0.1 shines at the very rim, 1 is dusty all over")
           .only(MaterialType::cloth),
-      row<&Material::yarn_specular>("material", "yarn_specular", "", share, render,
+      row<&Material::yarn_specular>("material", "yarn_specular", "", fraction, render,
                                     "of light that yarns along u and v mirror, on meshes with "
                                     "uv and the ground; with sheen at most 1")
           .only(MaterialType::cloth),
@@ -159,9 +162,9 @@ std::vector<Parameter> film_rows() {
   return {
       row<&Ground::present>("ground", "present", "", none, mesh | render,
                             "a horizontal plane that is drawn; true when [ground] is written"),
-      row<&Ground::height>("ground", "height", "m", place, mesh | render, "its y"),
+      row<&Ground::height>("ground", "height", "m", coordinate, mesh | render, "its y"),
       row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
-      row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
+      row<&Ground::center>("ground", "center", "m", coordinate, render, "centre; y is unused"),
       row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),
       row<&Ground::matte>("ground", "matte", "", none, render, matte_text),
 

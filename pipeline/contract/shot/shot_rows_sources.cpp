@@ -9,11 +9,11 @@ std::vector<Parameter> emitter_rows() {
       row<&FluidEmitter::type>("fluid.emitter", "type", "", none, simulate,
                                "an inlet, or a closed mesh that is kept full")
           .identity(),
-      row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
+      row<&FluidEmitter::center>("fluid.emitter", "center", "m", coordinate, simulate,
                                  "centre of the inlet, or where the origin of the mesh stands; may "
                                  "be animated: the fluid takes on its velocity")
           .needed(),
-      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
+      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", coordinate, simulate,
                                     "the way the fluid leaves; any length but 0; may be animated")
           .only(EmitterType::disc),
       row<&FluidEmitter::center>("fluid.emitter", "interp", "", none, simulate,
@@ -21,10 +21,10 @@ std::vector<Parameter> emitter_rows() {
           .interpolation({Interpolation::linear, Interpolation::smooth}),
       row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
           .only(EmitterType::disc),
-      row<&FluidEmitter::u>("fluid.emitter", "u", "m", place, simulate,
+      row<&FluidEmitter::u>("fluid.emitter", "u", "m", coordinate, simulate,
                             "half of one edge; the fluid leaves along u x v")
           .only(EmitterType::rectangle),
-      row<&FluidEmitter::v>("fluid.emitter", "v", "m", place, simulate,
+      row<&FluidEmitter::v>("fluid.emitter", "v", "m", coordinate, simulate,
                             "half of the other edge, at right angles to u")
           .only(EmitterType::rectangle),
       row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
@@ -61,7 +61,7 @@ std::vector<Parameter> volume_rows() {
                                    "closed PLY or OBJ; particles stand on the lattice that begins "
                                    "at domain.min")
           .needed(),
-      row<&FluidVolume::position>("fluid.volume", "position", "m", place, simulate,
+      row<&FluidVolume::position>("fluid.volume", "position", "m", coordinate, simulate,
                                   "where the origin of the mesh stands"),
       row<&FluidVolume::rotation_deg>("fluid.volume", "rotation_deg", "deg", turns, simulate,
                                       "about x, then y, then z through position"),
@@ -83,7 +83,7 @@ std::vector<Parameter> sink_rows() {
       row<&Sink::shape, &Obstacle::name>("sink", "name", "", none, simulate,
                                          "in the log; sink, sink2, ... unless given")
           .identity(),
-      row<&Sink::shape, &Obstacle::position>("sink", "position", "m", place, simulate,
+      row<&Sink::shape, &Obstacle::position>("sink", "position", "m", coordinate, simulate,
                                              "a point of the plane, the centre of the box or "
                                              "sphere, the origin of the mesh; may be animated"),
       row<&Sink::shape, &Obstacle::rotation_deg>(
@@ -92,7 +92,7 @@ std::vector<Parameter> sink_rows() {
       row<&Sink::shape, &Obstacle::position>("sink", "interp", "", none, simulate,
                                              "between the keys of position and rotation_deg")
           .interpolation({Interpolation::linear, Interpolation::smooth}),
-      row<&Sink::shape, &Obstacle::normal>("sink", "normal", "", place, simulate,
+      row<&Sink::shape, &Obstacle::normal>("sink", "normal", "", coordinate, simulate,
                                            "points away from the side that takes fluid; any length "
                                            "but 0")
           .only(ObstacleType::plane),

@@ -68,16 +68,16 @@ std::vector<Parameter> shot_rows() {
           "turns in it. Positions, velocities and wind are relative to the domain. It turns evenly "
           "between keys, not at all before and after them; at the start all moves with it; may be "
           "animated"),
-      row<&Shot::frame_axis>("shot", "frame_axis", "", place, simulate,
+      row<&Shot::frame_axis>("shot", "frame_axis", "", coordinate, simulate,
                              "about which the domain turns, right-handed; any length but 0"),
-      row<&Shot::frame_center>("shot", "frame_center", "m", place, simulate,
+      row<&Shot::frame_center>("shot", "frame_center", "m", coordinate, simulate,
                                "a point of that axis"),
       row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
                             "fixed step; 0 chooses the largest stable one, step by step"),
 
-      row<&Domain::min>("domain", "min", "m", place, simulate,
+      row<&Domain::min>("domain", "min", "m", coordinate, simulate,
                         "lower corner; walls stand here, and periodic axes begin"),
-      row<&Domain::max>("domain", "max", "m", place, simulate,
+      row<&Domain::max>("domain", "max", "m", coordinate, simulate,
                         "upper corner; walls stand here, and periodic axes begin anew"),
       axis_row<0>("x",
                   "both ends of the x axis; periodic ones are one and the same place, "
@@ -151,20 +151,21 @@ std::vector<Parameter> fluid_rows() {
                              "particles and the mesh's vertices get their time in the shot, s"),
       row<&Fluid::material>("fluid", "material", "", none, render, "name of a [[material]]"),
 
-      row<&FluidBox::min>("fluid.box", "min", "m", place, simulate, "lower corner").needed(),
-      row<&FluidBox::max>("fluid.box", "max", "m", place, simulate, "upper corner").needed(),
+      row<&FluidBox::min>("fluid.box", "min", "m", coordinate, simulate, "lower corner").needed(),
+      row<&FluidBox::max>("fluid.box", "max", "m", coordinate, simulate, "upper corner").needed(),
       row<&FluidBox::velocity>("fluid.box", "velocity", "m/s", speed, simulate, "at the start"),
 
-      row<&FluidSphere::center>("fluid.sphere", "center", "m", place, simulate, "centre").needed(),
+      row<&FluidSphere::center>("fluid.sphere", "center", "m", coordinate, simulate, "centre")
+          .needed(),
       row<&FluidSphere::radius>("fluid.sphere", "radius", "m", {0, 1e4}, simulate, "radius")
           .needed(),
       row<&FluidSphere::velocity>("fluid.sphere", "velocity", "m/s", speed, simulate,
                                   "at the start"),
 
-      row<&FluidDrops::min>("fluid.drops", "min", "m", place, simulate,
+      row<&FluidDrops::min>("fluid.drops", "min", "m", coordinate, simulate,
                             "lower corner of the centres")
           .needed(),
-      row<&FluidDrops::max>("fluid.drops", "max", "m", place, simulate,
+      row<&FluidDrops::max>("fluid.drops", "max", "m", coordinate, simulate,
                             "upper corner of the centres")
           .needed(),
       row<&FluidDrops::velocity>("fluid.drops", "velocity", "m/s", speed, simulate, "at the start"),
@@ -184,9 +185,10 @@ std::vector<Parameter> cloth_rows() {
           "cloth", "name", "", none, simulate | render,
           "name of the sheet, part of its file names; cloth, cloth2, ... unless given")
           .identity(),
-      row<&Cloth::corner>("cloth", "corner", "m", place, simulate, "grid: where u and v start"),
-      row<&Cloth::u>("cloth", "u", "m", place, simulate, "grid: one edge"),
-      row<&Cloth::v>("cloth", "v", "m", place, simulate, "grid: the other edge"),
+      row<&Cloth::corner>("cloth", "corner", "m", coordinate, simulate,
+                          "grid: where u and v start"),
+      row<&Cloth::u>("cloth", "u", "m", coordinate, simulate, "grid: one edge"),
+      row<&Cloth::v>("cloth", "v", "m", coordinate, simulate, "grid: the other edge"),
       row<&Cloth::cells>(
           "cloth", "cells", "", {1, 4096}, simulate,
           "grid: [along u, along v]; vertex j (cells_u + 1) + i stands at i along u"),
@@ -227,7 +229,7 @@ std::vector<Parameter> cloth_rows() {
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
                                "indices of vertices held where they start"),
       row<&ClothPin::box>(
-          "cloth.pin", "box", "m", place, simulate,
+          "cloth.pin", "box", "m", coordinate, simulate,
           "{min = [x, y, z], max = [x, y, z]}: every vertex inside it at the start"),
 
       row<&Coupling::scheme>("coupling", "scheme", "", none, simulate,
@@ -242,7 +244,7 @@ std::vector<Parameter> obstacle_rows() {
       row<&Obstacle::name>("obstacle", "name", "", none, all,
                            "obstacle, obstacle2, ... unless given")
           .identity(),
-      row<&Obstacle::position>("obstacle", "position", "m", place, all,
+      row<&Obstacle::position>("obstacle", "position", "m", coordinate, all,
                                "a point of the plane, the centre of the box or sphere, the origin "
                                "of the mesh; may be animated"),
       row<&Obstacle::rotation_deg>("obstacle", "rotation_deg", "deg", {-360000, 360000}, all,
@@ -250,7 +252,7 @@ std::vector<Parameter> obstacle_rows() {
       row<&Obstacle::position>("obstacle", "interp", "", none, all,
                                "between the keys of position and rotation_deg")
           .interpolation({Interpolation::linear, Interpolation::smooth}),
-      row<&Obstacle::normal>("obstacle", "normal", "", place, all,
+      row<&Obstacle::normal>("obstacle", "normal", "", coordinate, all,
                              "points from the solid to the fluid; any length but 0")
           .only(ObstacleType::plane),
       row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, all, "edges").only(ObstacleType::box),
@@ -287,11 +289,11 @@ std::vector<Parameter> probe_rows() {
                         "part of its file's name, sim/probe.NAME.csv; probe, probe2, ... unless "
                         "given")
           .identity(),
-      row<&Probe::position>("probe", "position", "m", place, simulate,
+      row<&Probe::position>("probe", "position", "m", coordinate, simulate,
                             "height: the vertical line through it; pressure: centre of the disc; "
                             "velocity: centre of the ball; tip: the vertex nearest to it at rest")
           .only(ProbeType::height, ProbeType::pressure, ProbeType::tip, ProbeType::velocity),
-      row<&Probe::normal>("probe", "normal", "", place, simulate,
+      row<&Probe::normal>("probe", "normal", "", coordinate, simulate,
                           "of the disc; any length but 0. A disc within half a spacing of a wall "
                           "of the domain, an obstacle or a sheet, and along it, measures what is "
                           "pushed there; of a sheet the side that it points to")
@@ -299,7 +301,7 @@ std::vector<Parameter> probe_rows() {
       row<&Probe::radius>("probe", "radius", "m", {1e-6, 1e4}, simulate,
                           "of the disc or ball; below a spacing it counts as one")
           .only(ProbeType::pressure, ProbeType::velocity),
-      row<&Probe::direction>("probe", "direction", "", place, simulate,
+      row<&Probe::direction>("probe", "direction", "", coordinate, simulate,
                              "along which the farthest fluid is looked for; any length but 0")
           .only(ProbeType::front),
       row<&Probe::on>("probe", "on", "", none, simulate,

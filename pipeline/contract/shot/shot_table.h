@@ -1,6 +1,6 @@
 #pragma once
 // The one list of sections and keys of a shot file. Reading, checking, the lock file, the digests
-// and the reference all walk it.
+// and the reference are made of it.
 
 #include <string>
 #include <string_view>
@@ -57,8 +57,8 @@ struct Parameter {
   void (*choose)(void* field, std::string_view name) = nullptr;  // choices of an enum
   std::string_view (*chosen)(const void* field) = nullptr;
   bool required = false;  // when the section stands in the file
-  bool fixed = false;     // cannot be overridden: it says which thing this is
-  unsigned types = ~0u;   // bit i: the key belongs to things whose type is choice i
+  bool fixed = false;     // cannot be overridden: it says which object this is
+  unsigned types = ~0u;   // bit i: the key belongs to objects whose type is choice i
 };
 
 /// A table or an array of tables. `owner` is the parent section's object, the Shot at the top.
@@ -70,8 +70,8 @@ struct Section {
   size_t (*count)(void* owner) = nullptr;
   void* (*at)(void* owner, size_t index) = nullptr;
   void (*append)(void* owner) = nullptr;                  // repeated only
-  const std::string* (*name_of)(void* object) = nullptr;  // things with names
-  int (*type_of)(void* object) = nullptr;                 // things with a type
+  const std::string* (*name_of)(void* object) = nullptr;  // objects with names
+  int (*type_of)(void* object) = nullptr;                 // objects with a type
 };
 
 const std::vector<Section>& sections();  // a parent stands before its children
@@ -105,9 +105,10 @@ void visit_children(std::string_view parent, void* owner, const std::string& pat
     const size_t n = section.repeated ? section.count(owner) : 1;
     for (size_t i = 0; i < n; ++i) {
       void* const object = section.at(owner, i);
-      const std::string place = section.repeated ? prefix + "[" + std::to_string(i) + "]" : prefix;
-      f(section, object, place);
-      visit_children(section.name, object, place, f);
+      const std::string own_path =
+          section.repeated ? prefix + "[" + std::to_string(i) + "]" : prefix;
+      f(section, object, own_path);
+      visit_children(section.name, object, own_path, f);
     }
   }
 }

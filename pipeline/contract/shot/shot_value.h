@@ -16,7 +16,7 @@ struct Site {
   std::filesystem::path folder;  // paths in the value are relative to it
 };
 
-/// @throws Error naming place, key, value and limits when the value does not fit the row.
+/// @throws Error naming location, key, value and limits when the value does not fit the row.
 void read_value(const Parameter& parameter, void* field, const toml::node& value, const Site& site);
 /// What grid_pins says. @throws Error as above.
 std::vector<GridPins> read_grid_pins(const Parameter& parameter, const toml::node& value,
