@@ -218,7 +218,12 @@ void Planner::plan_mesh() {
     }
     const Action input = wanted_.may(Step::simulate) ? simulated_[frame] : Action::skip;
     const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
-    if (!decision && input == Action::skip) missing.push_back(layout::particles(frame));
+    if (!decision && input == Action::skip) {
+      for (const std::string& file : simulated_files(wanted_, frame)) {
+        const auto known = lookup_(file);
+        if (!known || known->state != FileState::intact) missing.push_back(file);
+      }
+    }
     add_made_from(Step::mesh, frame, decision, input, mesh_files(wanted_, frame), wanted_.mesh);
     meshed_[frame] = plan_.tasks.back().action;
   }

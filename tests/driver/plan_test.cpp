@@ -199,6 +199,18 @@ TEST(Plan, SaysWhatALaterStageAloneIsMissing) {
   EXPECT_NE(plan.problems[0].find("drench simulate"), std::string::npos) << plan.problems[0];
 }
 
+TEST(Plan, NamesTheSheetThatMeshingIsMissing) {
+  ToySettings settings;
+  settings.steps = {Step::mesh};
+  Wanted wanted = toy_wanted(settings);
+  const Snapshot snapshot = complete(settings);  // particles of every frame, and no sheet
+  wanted.cloth = {"flag"};
+  const Plan plan = make_plan(wanted, snapshot, settings.last);
+  ASSERT_EQ(plan.problems.size(), 1u);
+  EXPECT_NE(plan.problems[0].find("25 of the files"), std::string::npos) << plan.problems[0];
+  EXPECT_NE(plan.problems[0].find(layout::cloth("flag", 1)), std::string::npos);
+}
+
 TEST(Plan, ReportsFramesBeyondAShortenedRange) {
   ToySettings settings;
   const Snapshot snapshot = complete(settings);
