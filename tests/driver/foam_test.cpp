@@ -9,6 +9,7 @@
 #include "pipeline/contract/files/mesh_file.h"
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/shot/shot_file.h"
+#include "pipeline/driver/plan_text.h"
 #include "surfacing/foam.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/driver/folder.h"
@@ -195,25 +196,27 @@ TEST(FoamOfAShot, StopsAtMeshes) {
   }
 }
 
-Wanted wanted_of(const TinyShot& shot, const std::vector<std::string>& set) {
-  return want(read_shot(shot.file(), {.set = set}), {1001, 1002},
-              {Step::simulate, Step::mesh, Step::foam, Step::render}, "cpu");
+Targets targets_of_shot(const TinyShot& shot, const std::vector<std::string>& set) {
+  return targets_of(read_shot(shot.file(), {.set = set}), {1001, 1002},
+                    {Step::simulate, Step::mesh, Step::foam, Step::render}, "cpu");
 }
 
 TEST(FoamOfAShot, ChangesNoKeyWhileItIsOff) {
   const TinyShot shot;
-  const Wanted plain = wanted_of(shot, {});
-  const Wanted off = wanted_of(shot, {"foam.lifetime=7", "foam.radius=0.5"});
-  const Wanted on = wanted_of(shot, {"foam.present=true"});
+  const Targets plain = targets_of_shot(shot, {});
+  const Targets off = targets_of_shot(shot, {"foam.lifetime=7", "foam.radius=0.5"});
+  const Targets on = targets_of_shot(shot, {"foam.present=true"});
   EXPECT_FALSE(off.has_foam);
   EXPECT_TRUE(on.has_foam);
-  for (const Wanted& other : {off, on}) {
+  for (const Targets& other : {off, on}) {
     EXPECT_EQ(plain.simulate.digest, other.simulate.digest);
     EXPECT_EQ(plain.mesh.digest, other.mesh.digest);
     EXPECT_EQ(plain.render.digest, other.render.digest);
   }
-  EXPECT_EQ(render_inputs(plain, 1001), render_inputs(off, 1001));
-  EXPECT_NE(render_inputs(plain, 1001), render_inputs(on, 1001));
+  EXPECT_EQ(possible_inputs(rule_of(Step::render), plain, 1001),
+            possible_inputs(rule_of(Step::render), off, 1001));
+  EXPECT_NE(possible_inputs(rule_of(Step::render), plain, 1001),
+            possible_inputs(rule_of(Step::render), on, 1001));
   EXPECT_EQ(plan_text(make_plan(plain, {}, 1012)), plan_text(make_plan(off, {}, 1012)));
   EXPECT_EQ(plan_text(make_plan(plain, {}, 1012)).find("foam"), std::string::npos);
 }
@@ -221,7 +224,7 @@ TEST(FoamOfAShot, ChangesNoKeyWhileItIsOff) {
 TEST(FoamOfAShot, HasAKeyThatFollowsWallsAndGravityButNoProbe) {
   const TinyShot shot;
   const auto key = [&](const std::string& change) {
-    return wanted_of(shot, {"foam.present=true", change}).foam.digest;
+    return targets_of_shot(shot, {"foam.present=true", change}).foam.digest;
   };
   const Digest plain = key("foam.present=true");
   EXPECT_NE(key("shot.gravity=[0,-5,0]"), plain);

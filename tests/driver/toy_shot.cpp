@@ -65,30 +65,31 @@ class ToySimulation : public Simulation {
 
 }  // namespace
 
-Wanted toy_wanted(const ToySettings& settings) {
-  Wanted wanted;
-  wanted.shot = "toy";
-  wanted.first = settings.first;
-  wanted.frames =
+Targets toy_targets(const ToySettings& settings) {
+  Targets targets;
+  targets.shot = "toy";
+  targets.first = settings.first;
+  targets.frames =
       settings.frames.empty() ? all_frames({settings.first, settings.last, 24}) : settings.frames;
-  wanted.steps = settings.steps;
-  wanted.fluid = settings.fluid;
-  if (!settings.fluid) wanted.cloth = {"flag"};
-  wanted.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
-  wanted.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
-  wanted.obstacles_move = settings.obstacles_move;
-  wanted.has_foam = settings.foam;
-  if (settings.foam) wanted.steps.push_back(Step::foam);
-  if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
-  wanted.render = toy_key("camera", settings.camera, "1");
-  wanted.denoise_frames = settings.denoise_frames;
-  wanted.denoised_later = settings.denoise_frames > 0;
-  if (wanted.denoised_later) {
-    wanted.steps.push_back(Step::denoise);
-    wanted.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
+  targets.steps = settings.steps;
+  targets.fluid = settings.fluid;
+  if (!settings.fluid) targets.cloth = {"flag"};
+  targets.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
+  targets.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
+  targets.obstacles_move = settings.obstacles_move;
+  targets.has_foam = settings.foam;
+  if (settings.foam) targets.steps.push_back(Step::foam);
+  if (settings.foam) targets.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
+  targets.render = toy_key("camera", settings.camera, "1");
+  targets.denoise_frames = settings.denoise_frames;
+  targets.denoised_later = settings.denoise_frames > 0;
+  if (targets.denoised_later) {
+    // As the commands have it: what renders denoises.
+    if (targets.includes(Step::render)) targets.steps.push_back(Step::denoise);
+    targets.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
   }
-  wanted.dailies = toy_key("dailies", "", "1");
-  return wanted;
+  targets.dailies = toy_key("dailies", "", "1");
+  return targets;
 }
 
 std::unique_ptr<Simulation> ToyStages::start_simulation() {
@@ -138,7 +139,7 @@ StageReport ToyStages::render(const fs::path& folder, int frame, const Attribute
       settings_.fluid ? layout::fluid_mesh(frame) : layout::cloth("flag", frame);
   StageReport report;
   const std::string foam = settings_.foam ? text_of(folder / layout::foam(frame)) : "";
-  report.files.push_back(write_file_whole(folder / render_file(toy_wanted(settings_), frame),
+  report.files.push_back(write_file_whole(folder / render_file(toy_targets(settings_), frame),
                                           settings_.camera + " " + text_of(folder / input) + foam));
   log(Step::render, frame, false);
   return report;
@@ -194,24 +195,24 @@ std::vector<int> ToyStages::frames(Step step) const {
 
 Plan make_toy(const ToySettings& settings, ToyStages& stages, const fs::path& folder,
               ExecuteOptions options) {
-  const Wanted wanted = toy_wanted(settings);
+  const Targets targets = toy_targets(settings);
   const FolderLock lock(folder);
   Manifest manifest(folder / layout::manifest);
   manifest.open_for_append();
   Progress progress(ProgressStyle::quiet);
   std::optional<Plan> first;
-  Again again(folder, manifest);
+  Retries retries(folder, manifest);
   for (;;) {
-    const Plan plan = make_plan(wanted, take_snapshot(folder, manifest), settings.last);
-    if (again.drops_inputs_of(wanted, plan)) continue;
+    const Plan plan = make_plan(targets, take_snapshot(folder, manifest), settings.last);
+    if (retries.drop_damaged_inputs(targets, plan)) continue;
     if (!first) first = plan;
     if (!plan.problems.empty()) throw Error(plan.problems.front());
     if (plan.nothing_to_do()) return *first;
     try {
-      execute(wanted, plan, folder, manifest, stages, progress, options);
+      execute(targets, plan, folder, manifest, stages, progress, options);
       return *first;
-    } catch (const PlanAgain& found) {
-      again.found(found);
+    } catch (const DamagedInput& found) {
+      retries.count(found);
     }
   }
 }

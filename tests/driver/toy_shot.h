@@ -30,7 +30,7 @@ struct ToySettings {
   std::vector<Step> steps{Step::simulate, Step::mesh, Step::render, Step::contact_sheet};
 };
 
-Wanted toy_wanted(const ToySettings& settings);
+Targets toy_targets(const ToySettings& settings);
 
 /// What happened, in order: ("simulate", 3, "begin").
 struct Event {
