@@ -75,7 +75,7 @@ class Executor {
 
   /// How far a rule has come.
   struct Reached {
-    int next = 0;           // Frames::from_first: frame that was not looked at yet
+    int next = 0;           // Frames::from_first, of one thread: frame that was not looked at yet
     std::set<int> ready;    // Frames::with_neighbours: frames delivered whose own inputs are made
     std::set<int> started;  // frames that a thread has taken on
   };

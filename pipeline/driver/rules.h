@@ -1,7 +1,7 @@
 #pragma once
-// The dependency graph as data: a rule for each step, as a makefile has them. What makes a rule's
-// files stands in execute.cpp. The simulation has no rule: its frames are a chain that starts at a
-// checkpoint.
+// The dependency graph as data: a rule for each step, as a makefile has them. The function that
+// makes a rule's files stands in make.cpp. The simulation has no rule: its frames are a chain that
+// starts at a checkpoint.
 
 #include <optional>
 #include <string>

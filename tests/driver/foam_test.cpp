@@ -23,6 +23,7 @@ using test::digests_in;
 using test::Event;
 using test::flip_bit_quietly;
 using test::make_toy;
+using test::Mark;
 using test::TemporaryFolder;
 using test::TinyShot;
 using test::ToySettings;
@@ -57,15 +58,15 @@ TEST(FoamSteps, ComeInOrderAfterTheirFluidAndBeforeTheirPictures) {
   const Made stages(foamy(), folder);
   EXPECT_EQ(stages.frames(Step::foam), range(1, 25));
   const std::vector<Event> events = stages.events();
-  const auto at = [&](Step step, int frame, bool begin) {
+  const auto at = [&](Step step, int frame, Mark mark) {
     return std::find_if(events.begin(), events.end(), [&](const Event& e) {
-      return e.step == step && e.frame == frame && e.begin == begin;
+      return e.step == step && e.frame == frame && e.mark == mark;
     });
   };
   for (int frame = 2; frame <= 25; ++frame) {
-    EXPECT_LT(at(Step::simulate, frame, false), at(Step::foam, frame, true));
-    EXPECT_LT(at(Step::foam, frame - 1, false), at(Step::foam, frame, true));
-    EXPECT_LT(at(Step::foam, frame, false), at(Step::render, frame, true));
+    EXPECT_LT(at(Step::simulate, frame, Mark::end), at(Step::foam, frame, Mark::begin));
+    EXPECT_LT(at(Step::foam, frame - 1, Mark::end), at(Step::foam, frame, Mark::begin));
+    EXPECT_LT(at(Step::foam, frame, Mark::end), at(Step::render, frame, Mark::begin));
   }
   const Made again(foamy(), folder);
   EXPECT_TRUE(again.events().empty());

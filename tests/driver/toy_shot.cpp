@@ -29,7 +29,7 @@ class ToySimulation : public Simulation {
   int frame() const override { return frame_; }
   void preroll(const std::function<bool()>&) override {}
   StageReport advance(const std::function<bool()>& keep_going) override {
-    stages_.log(Step::simulate, frame_ + 1, true);
+    stages_.log(Step::simulate, frame_ + 1, Mark::begin);
     if (stages_.hook) stages_.hook(Step::simulate, frame_ + 1);
     constexpr int steps = 100;
     for (; step_ < steps; ++step_) {
@@ -38,7 +38,7 @@ class ToySimulation : public Simulation {
     }
     step_ = 0;
     ++frame_;
-    stages_.log(Step::simulate, frame_, false);
+    stages_.log(Step::simulate, frame_, Mark::end);
     return {};
   }
   std::vector<WrittenFile> write_frame(const fs::path& folder) const override {
@@ -97,7 +97,7 @@ std::unique_ptr<Simulation> ToyStages::start_simulation() {
 }
 
 StageReport ToyStages::mesh(const fs::path& folder, int frame) {
-  log(Step::mesh, frame, true);
+  log(Step::mesh, frame, Mark::begin);
   if (hook) hook(Step::mesh, frame);
   const double state = std::strtod(text_of(folder / layout::particles(frame)).c_str(), nullptr);
   const double unit = std::pow(10.0, -settings_.mesh_digits);
@@ -105,13 +105,13 @@ StageReport ToyStages::mesh(const fs::path& folder, int frame) {
   report.files.push_back(
       write_file_whole(folder / layout::fluid_mesh(frame),
                        fmt::format("{:.9f}\n", std::round(state / unit) * unit)));
-  log(Step::mesh, frame, false);
+  log(Step::mesh, frame, Mark::end);
   return report;
 }
 
 /// A mean over frames: one wrong frame before shows in all that follow.
 StageReport ToyStages::foam(const fs::path& folder, int frame) {
-  log(Step::foam, frame, true);
+  log(Step::foam, frame, Mark::begin);
   if (hook) hook(Step::foam, frame);
   const auto number = [&](const std::string& file) {
     return std::strtod(text_of(folder / file).c_str(), nullptr);
@@ -126,13 +126,13 @@ StageReport ToyStages::foam(const fs::path& folder, int frame) {
   StageReport report;
   report.files.push_back(
       write_file_whole(folder / layout::foam(frame), fmt::format("{:a}\n", foam)));
-  log(Step::foam, frame, false);
+  log(Step::foam, frame, Mark::end);
   return report;
 }
 
 StageReport ToyStages::render(const fs::path& folder, int frame, const Attributes&,
                               const std::function<void(double)>& progress) {
-  log(Step::render, frame, true);
+  log(Step::render, frame, Mark::begin);
   if (hook) hook(Step::render, frame);
   progress(0.5);
   const std::string input =
@@ -141,30 +141,30 @@ StageReport ToyStages::render(const fs::path& folder, int frame, const Attribute
   const std::string foam = settings_.foam ? text_of(folder / layout::foam(frame)) : "";
   report.files.push_back(write_file_whole(folder / render_file(toy_targets(settings_), frame),
                                           settings_.camera + " " + text_of(folder / input) + foam));
-  log(Step::render, frame, false);
+  log(Step::render, frame, Mark::end);
   return report;
 }
 
 /// All of what it is given, in order.
 StageReport ToyStages::denoise(const fs::path& folder, int frame, const NoisyFiles& noisy,
                                const Attributes&) {
-  log(Step::denoise, frame, true);
+  log(Step::denoise, frame, Mark::begin);
   if (hook) hook(Step::denoise, frame);
   std::string all;
   for (const std::string& file : noisy.all()) all += file + " " + text_of(folder / file);
   StageReport report;
   report.files.push_back(write_file_whole(folder / layout::image("toy", frame), all));
-  log(Step::denoise, frame, false);
+  log(Step::denoise, frame, Mark::end);
   return report;
 }
 
 StageReport ToyStages::contact_sheet(const fs::path& folder, const std::vector<int>& frames) {
-  log(Step::contact_sheet, 0, true);
+  log(Step::contact_sheet, 0, Mark::begin);
   std::string all;
   for (const int frame : frames) all += text_of(folder / layout::image("toy", frame));
   StageReport report;
   report.files.push_back(write_file_whole(folder / layout::contact_sheet, all));
-  log(Step::contact_sheet, 0, false);
+  log(Step::contact_sheet, 0, Mark::end);
   return report;
 }
 
@@ -173,9 +173,9 @@ StageReport ToyStages::movie(const fs::path&, const std::vector<int>&,
   throw std::logic_error("toys make no movie");
 }
 
-void ToyStages::log(Step step, int frame, bool begin) {
+void ToyStages::log(Step step, int frame, Mark mark) {
   const std::scoped_lock lock(mutex_);
-  events_.push_back({step, frame, begin});
+  events_.push_back({step, frame, mark});
 }
 
 std::vector<Event> ToyStages::events() const {
@@ -188,7 +188,7 @@ int ToyStages::count(Step step) const { return int(frames(step).size()); }
 std::vector<int> ToyStages::frames(Step step) const {
   std::vector<int> result;
   for (const Event& event : events()) {
-    if (event.step == step && event.begin) result.push_back(event.frame);
+    if (event.step == step && event.mark == Mark::begin) result.push_back(event.frame);
   }
   return result;
 }
