@@ -258,14 +258,6 @@ struct PressureState {
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
   Hierarchy hierarchy;
-
-  void resize(size_t n) {
-    for (Column<Float4>* c :
-         {&place, &scratch_a, &wall, &correction, &correction_cross, &scratch_b})
-      c->resize(n);
-    for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
-    control.resize(1);
-  }
 };
 
 /// Columns of surface tension (passes/tension/surface_tension.h), rebuilt every step.

@@ -1,29 +1,29 @@
 #include "sim/neighbours/sort_particles.h"
 
+#include "sim/columns.h"
 #include "sim/passes/obstacle/drain.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-void permute(Column<float>& column, Column<float>& spare, const int* order, int n) {
-  const float* from = column.data();
-  float* to = spare.data();
+template <class T>
+void permute(Column<T>& column, Column<T>& spare, const int* order, int n) {
+  const T* from = column.data();
+  T* to = spare.data();
   parallel_for(
       "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
-
-void permute(Column<int>& column, Column<int>& spare, const int* order, int n) {
-  const int* from = column.data();
-  int* to = spare.data();
-  parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
-  column.swap(spare);
+void permute(Column<float>& column, State& state, const int* order, int n) {
+  permute(column, state.swap_float, order, n);
 }
-
-void permute(VecColumn& column, Column<float>& spare, const int* order, int n) {
-  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, spare, order, n);
+/// The cells of particles are of no use any more.
+void permute(Column<int>& column, State& state, const int* order, int n) {
+  permute(column, state.fluid.cell, order, n);
+}
+void permute(VecColumn& column, State& state, const int* order, int n) {
+  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, state, order, n);
 }
 
 }  // namespace
@@ -71,18 +71,10 @@ void sort_particles(State& state) {
   const int n = f.count;
   sort_by_cell(state);
   const int* order = f.order.data();
-  // Their cells are of no use any more: the columns of integers are permuted into that.
-  permute(f.position, state.swap_float, order, n);
-  permute(f.velocity, state.swap_float, order, n);
-  permute(f.id, f.cell, order, n);
-  if (p.incompressible) permute(f.pressure_term, state.swap_float, order, n);
-  if (f.memory_triangle.size()) {
-    if (p.incompressible) permute(f.start, state.swap_float, order, n);
-    permute(f.memory_triangle, f.cell, order, n);
-    permute(f.memory_side, f.cell, order, n);
-    permute(f.owed, state.swap_float, order, n);
-    permute(f.far_by, state.swap_float, order, n);
-  }
+  for_each_fluid_column(state, [&](const ColumnInfo& info, auto& column, auto) {
+    const bool lasts = info.extent == Extent::particles && info.use != Use::rebuilt;
+    if (lasts && size_of(column) > 0) permute(column, state, order, n);
+  });
   bool open = false;
   for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];
   if (open || state.sinks.count > 0) drop_removed(state);
