@@ -5,7 +5,7 @@
 #include "render/integrator/sampler.h"
 #include "render/renderer.h"
 
-namespace drench {
+namespace drench::render {
 
 enum class Estimator {
   mis,         // light and surface sampling, power heuristic
@@ -68,4 +68,4 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                   const RenderOptions& options, RenderStats* stats = nullptr,
                   const std::function<void(double)>& progress = {});
 
-}  // namespace drench
+}  // namespace drench::render

@@ -19,7 +19,7 @@
 #include "render/integrator/sampler.h"
 #include "render/options.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -348,4 +348,4 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, Re
   return render_frame(shot, frame, geometry, RenderOptions{}, stats, progress);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot/shot.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The moving geometry of one frame. Blurred from stored velocity: x + t v / fps over the shutter.
 struct FrameGeometry {
@@ -79,4 +79,4 @@ Film read_exr(const std::filesystem::path& path);
 WrittenFile write_png(const std::filesystem::path& path, int width, int height,
                       const std::vector<uint8_t>& rgb);
 
-}  // namespace drench
+}  // namespace drench::render

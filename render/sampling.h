@@ -4,7 +4,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Sine and cosine of an eighth of a turn at most, to 1e-7: Taylor's sums, without the cases of the
 /// general functions.
@@ -55,4 +55,4 @@ inline float power_heuristic(float a, float b) {
   return 1 / (1 + ratio * ratio);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace drench {
+namespace drench::render {
 
 using Imath::V2f;
 using Imath::V3f;
@@ -50,4 +50,4 @@ struct Basis {
   }
 };
 
-}  // namespace drench
+}  // namespace drench::render

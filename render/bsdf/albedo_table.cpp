@@ -5,7 +5,7 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -72,4 +72,4 @@ AlbedoTable AlbedoTable::mirrors(float alpha) {
   return integrate(alpha, 1, [](float) { return 1.f; });
 }
 
-}  // namespace drench
+}  // namespace drench::render

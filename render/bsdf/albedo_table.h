@@ -7,7 +7,7 @@
 
 #include <array>
 
-namespace drench {
+namespace drench::render {
 
 class AlbedoTable {
  public:
@@ -36,4 +36,4 @@ class AlbedoTable {
   float mean_reflected_ = 0, mean_total_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

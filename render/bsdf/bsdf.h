@@ -8,7 +8,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Scatter {
   V3f direction;  // unit
@@ -53,4 +53,4 @@ struct FacingFrame {
         basis(mirroring_normal(outgoing, geometric_normal * side, shading * side)) {}
 };
 
-}  // namespace drench
+}  // namespace drench::render

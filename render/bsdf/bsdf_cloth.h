@@ -6,7 +6,7 @@
 #include "render/packed.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Of photons, on the side that is looked at and on the other, W/m^2.
 struct Irradiance {
@@ -87,4 +87,4 @@ class ClothBsdf {
   float reflect_probability_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

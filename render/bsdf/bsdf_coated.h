@@ -16,7 +16,7 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 /// A lobe's `share` is the chance that the loop samples it, which density and weight hold.
 class CoatLobe {
@@ -131,4 +131,4 @@ class CoatedBsdf {
   const AlbedoTable& coat_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

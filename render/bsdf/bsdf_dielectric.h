@@ -3,7 +3,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Where light goes at an interface, for radiance divided by the squared index ("basic radiance"),
 /// which refraction leaves unchanged: so no factor for the change of solid angle appears here.
@@ -59,4 +59,4 @@ Vector interface_normal(const Vector& direction, const Vector& geometric, const 
   return dot(reflected, g) > 0 ? n : g;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -18,7 +18,7 @@
 #include "render/bsdf/wet_cloth.h"
 #include "render/bsdf/yarn.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What fabric is at a point. What is absent (black, dry) needs no table.
 struct FabricPoint {
@@ -316,4 +316,4 @@ class FabricBsdf {
   V3f albedo_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 #include "render/bsdf/albedo_table.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 /// F82-tint: Schlick's reflectance less a bump whose peak, at a cosine of 1/7 (82 degrees), takes
 /// it to `edge` of Schlick's there. Kutz, Hasan, Edmondson 2021, "Novel Aspects of the Adobe
@@ -70,4 +70,4 @@ class MetalBsdf {
   V3f gain_, albedo_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

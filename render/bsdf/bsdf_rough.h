@@ -11,7 +11,7 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 class RoughBsdf {
  public:
@@ -81,4 +81,4 @@ class RoughBsdf {
   float gain_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -10,7 +10,7 @@
 
 #include "pipeline/contract/error.h"
 
-namespace drench {
+namespace drench::render {
 
 FabricPoint fabric_at(const Scene& scene, const Surface& surface, const Hit& hit, float time,
                       float wetness, Bodies in) {
@@ -132,4 +132,4 @@ float Scene::wetness(const Hit& hit) const {
   return std::clamp(w, 0.f, 1.f);  // rounding
 }
 
-}  // namespace drench
+}  // namespace drench::render

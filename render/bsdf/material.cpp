@@ -7,7 +7,7 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot/shot_table.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -147,4 +147,4 @@ void check_pictures(const Shot& shot, PictureMemory memory) {
     if (!light.map.empty()) read_sky(light.map, memory);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include "render/bsdf/yarn.h"
 #include "render/texture/texture.h"
 
-namespace drench {
+namespace drench::render {
 
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
@@ -76,4 +76,4 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name,
 /// @throws Error as find_material and read_sky.
 void check_pictures(const Shot& shot, PictureMemory memory);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -9,7 +9,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Ggx {
   float alpha = 0;  // root mean square slope, roughly; 0: a plane, with one normal
@@ -109,4 +109,4 @@ class GgxReflection {
   float bound_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -42,4 +42,4 @@ float SheenTable::at(float cos) const {
   return share_[size_t(k)] + (share_[size_t(k) + 1] - share_[size_t(k)]) * t;
 }
 
-}  // namespace drench
+}  // namespace drench::render

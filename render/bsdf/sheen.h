@@ -10,7 +10,7 @@
 
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Directions are local, z the normal, both in the upper hemisphere.
 struct SheenLobe {
@@ -51,4 +51,4 @@ class SheenTable {
   float mean_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -2,7 +2,7 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -64,4 +64,4 @@ SheetColours wet_colours(const SheetColours& dry, const WetFibres& fibres) {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

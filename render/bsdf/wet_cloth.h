@@ -13,7 +13,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Wet over dry.
 struct WetFibres {
@@ -32,4 +32,4 @@ struct SheetColours {
 /// @return what they are when water fills the sheet, before its surface reflects any of it back
 SheetColours wet_colours(const SheetColours& dry, const WetFibres& fibres);
 
-}  // namespace drench
+}  // namespace drench::render

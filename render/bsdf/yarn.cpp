@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -59,4 +59,4 @@ float YarnTable::at(float cos, float turn) const {
   return low + (high - low) * s;
 }
 
-}  // namespace drench
+}  // namespace drench::render

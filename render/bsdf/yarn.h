@@ -12,7 +12,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// One family. Directions are local, z the normal, x along the yarn, o above the horizon.
 struct YarnFacets {
@@ -79,4 +79,4 @@ class YarnTable {
   float mean_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include "render/color/color.h"
 #include "render/color/ocio_view.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -64,4 +64,4 @@ std::vector<uint8_t> ViewTransform::operator()(const Film& film) const {
 
 std::string ViewTransform::key() const { return ocio_ ? ocio_->key() : std::string(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 
 #include "render/renderer.h"
 
-namespace drench {
+namespace drench::render {
 
 /// OpenColorIO's way from linear ACEScg to a display.
 class OcioView;
@@ -29,4 +29,4 @@ class ViewTransform {
   std::shared_ptr<const OcioView> ocio_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

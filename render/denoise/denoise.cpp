@@ -14,7 +14,7 @@
 #include "render/denoise/fireflies.h"
 #include "render/scene/motion_match.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -471,4 +471,4 @@ std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

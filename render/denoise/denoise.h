@@ -6,7 +6,7 @@
 
 #include "render/film/pixel_sum.h"
 
-namespace drench {
+namespace drench::render {
 
 /// A picture as two independent halves of its samples. Planes are row-major from the top left,
 /// width x height each.
@@ -50,4 +50,4 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 /// @return the three colours
 std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture, Neighbours neighbours = {});
 
-}  // namespace drench
+}  // namespace drench::render

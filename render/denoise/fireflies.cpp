@@ -3,7 +3,7 @@
 #include <cmath>
 #include <functional>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -186,4 +186,4 @@ std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   return glints;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,7 +7,7 @@
 
 #include "render/denoise/denoise.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Calls with the pixels within `reach` of one.
 template <class Visit>
@@ -36,4 +36,4 @@ void for_each_window(int width, int height, int reach, const Visit& visit) {
 ///         samples of a pixel found it to tell its shape
 std::vector<NoisyPicture::Plane> tame_outliers(NoisyPicture& picture);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -10,7 +10,7 @@
 #include "pipeline/contract/error.h"
 #include "render/denoise/oidn.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -168,4 +168,4 @@ Film denoised_film(const std::filesystem::path& frame,
   return film;
 }
 
-}  // namespace drench
+}  // namespace drench::render

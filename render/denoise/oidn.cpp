@@ -5,7 +5,7 @@
 
 #include "pipeline/contract/error.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -154,4 +154,4 @@ std::vector<Plane> OpenImageDenoise::denoise(const NoisyPicture& picture) const 
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/hash.h"
 
-namespace drench {
+namespace drench::render {
 
 class CheckpointArchive {
  public:
@@ -38,4 +38,4 @@ class CheckpointArchive {
   Hasher hasher_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

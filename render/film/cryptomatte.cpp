@@ -6,7 +6,7 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
-namespace drench {
+namespace drench::render {
 
 uint32_t murmur3(std::string_view name) {
   constexpr uint32_t c1 = 0xcc9e2d51u, c2 = 0x1b873593u;
@@ -79,4 +79,4 @@ std::array<float, 2 * CryptomattePixel::kRanks> CryptomattePixel::ranked(
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

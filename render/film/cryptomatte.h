@@ -12,7 +12,7 @@
 
 #include "render/film/checkpoint_archive.h"
 
-namespace drench {
+namespace drench::render {
 
 /// MurmurHash3, 32 bits, x86 variant, seed 0, of a name's UTF-8 bytes.
 uint32_t murmur3(std::string_view name);
@@ -40,4 +40,4 @@ class CryptomattePixel {
   std::vector<std::pair<int, int>> counts_;  // of a thing, in the order they were met
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <new>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -50,4 +50,4 @@ std::string exr_bytes(const Imf::Header& header, const Imf::FrameBuffer& pixels)
   return stream.take();
 }
 
-}  // namespace drench
+}  // namespace drench::render

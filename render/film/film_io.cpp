@@ -21,7 +21,7 @@
 #include "render/film/exr_memory.h"
 #include "render/renderer.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -278,4 +278,4 @@ WrittenFile write_png(const std::filesystem::path& path, int width, int height,
   return write_file_whole(path, bytes);
 }
 
-}  // namespace drench
+}  // namespace drench::render

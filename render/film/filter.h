@@ -6,7 +6,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Blackman-Harris window of 3 pixels.
 class PixelFilter {
@@ -28,4 +28,4 @@ class PixelFilter {
   std::array<float, kSize + 1> inverse_;  // quantiles of the window
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 #include "pipeline/contract/files/files.h"
 #include "render/film/checkpoint_archive.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -84,4 +84,4 @@ bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   return true;
 }
 
-}  // namespace drench
+}  // namespace drench::render

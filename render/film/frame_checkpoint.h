@@ -9,7 +9,7 @@
 #include "render/integrator/sample_plan.h"
 #include "render/options.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What the samples of a picture have added up to.
 struct Sums {
@@ -50,4 +50,4 @@ void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums);
 /// these inputs, and they are as they were.
 bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums);
 
-}  // namespace drench
+}  // namespace drench::render

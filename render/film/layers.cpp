@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -272,4 +272,4 @@ std::vector<std::pair<std::string, std::string>> LayerFilm::header() const {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

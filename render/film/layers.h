@@ -12,7 +12,7 @@
 #include "render/renderer.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Names without repetition, with a number for each of a list that may repeat them.
 struct NameIndex {
@@ -101,4 +101,4 @@ class LayerFilm {
   bool catchers_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -114,4 +114,4 @@ void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> smooth,
   smooth_plate_ = std::move(smooth);
 }
 
-}  // namespace drench
+}  // namespace drench::render

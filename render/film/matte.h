@@ -29,7 +29,7 @@
 #include "render/film/checkpoint_archive.h"
 #include "render/film/pixel_sum.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What one camera sample met of the plate, shares of light by colour.
 struct MatteRecord {
@@ -102,4 +102,4 @@ class PlateFilm {
   std::vector<NoisyPicture::Plane> smooth_shadows_, smooth_plate_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

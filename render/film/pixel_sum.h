@@ -3,7 +3,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Sums of a pixel in the order of its samples. They are kept in 4 to 7 whole batches too, of 8
 /// samples at first; two become one when there are 8. A batch is a net of the Sobol sequence,
@@ -72,4 +72,4 @@ class PixelSum {
   int samples_ = 0, size_ = kBatch, whole_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

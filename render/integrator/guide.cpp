@@ -1,6 +1,6 @@
 #include "render/integrator/guide.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -115,4 +115,4 @@ float RefractedLightGuide::pdf(const V3f& point, const V3f& direction) const {
   return density > 0 ? density / total * ior_ * ior_ * direction.y / air.y : 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,7 +7,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/light/lights.h"
 
-namespace drench {
+namespace drench::render {
 
 class RefractedLightGuide {
  public:
@@ -63,4 +63,4 @@ Scatter sample_mixed(const Bsdf& bsdf, const RefractedLightGuide& guide, float s
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

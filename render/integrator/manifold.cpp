@@ -4,7 +4,7 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -230,4 +230,4 @@ bool walk_finds(const Scene& scene, const Surface& surface, float time, Bodies i
   return apart.length() < kSameWay * lamp.extent && along > 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 /// A way from a surface through an interface to a point of a lamp.
 struct BentWay {
@@ -49,4 +49,4 @@ std::optional<WalkedLight> walk_to_lamps(const Scene& scene, const Surface& surf
 bool walk_finds(const Scene& scene, const Surface& surface, float time, Bodies in,
                 const LampPoint& lamp, const V3f& flight, uint64_t& rays);
 
-}  // namespace drench
+}  // namespace drench::render

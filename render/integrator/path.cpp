@@ -9,7 +9,7 @@
 
 #include "render/integrator/path_tracer.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -69,4 +69,4 @@ PathFunction path_function(unsigned features) {
   return functions[features % kFeatureCount];
 }
 
-}  // namespace drench
+}  // namespace drench::render

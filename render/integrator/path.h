@@ -9,7 +9,7 @@
 #include "render/integrator/photons.h"
 #include "render/integrator/sampler.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What the loop must be able to do for a frame. What is absent costs no branch.
 enum Feature : unsigned {
@@ -72,4 +72,4 @@ using PathFunction = void (*)(const Scene&, const PathSettings&, std::span<Camer
 /// @param features  any of Feature, combined
 PathFunction path_function(unsigned features);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -8,7 +8,7 @@
 #include "render/integrator/path.h"
 #include "render/integrator/path_state.h"
 
-namespace drench {
+namespace drench::render {
 
 template <bool has_plate>
 class PathFilm {
@@ -106,4 +106,4 @@ class PathFilm {
   float alpha_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

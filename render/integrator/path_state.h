@@ -5,7 +5,7 @@
 
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Vertices before roulette may end a path: few are worth ending that may still leave the water for
 /// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
@@ -79,4 +79,4 @@ struct PlateWalk {
   World world = World::whole;  // now
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -19,7 +19,7 @@
 #include "render/integrator/manifold.h"
 #include "render/integrator/path_film.h"
 
-namespace drench {
+namespace drench::render {
 
 template <unsigned features>
 class PathTracer {
@@ -597,4 +597,4 @@ class PathTracer {
   bool going_ = false;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 
 #include "render/film/pixel_sum.h"
 
-namespace drench {
+namespace drench::render {
 
 PhotonRounds::PhotonRounds(double photons, double most_photons, int samples)
     : most_(int(std::clamp(std::ceil(photons / most_photons), 1.,
@@ -63,4 +63,4 @@ void FramePhotons::turn_to(int round, const PhotonRounds& rounds, uint64_t& rays
   round_ = round;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -11,7 +11,7 @@
 #include "render/integrator/photons.h"
 #include "render/options.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The rounds of a pass over the picture (SamplePlan).
 class PhotonRounds {
@@ -63,4 +63,4 @@ class FramePhotons {
   Caustics caustics_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -11,7 +11,7 @@
 #include "render/integrator/sampler.h"
 #include "render/scene/embree.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -444,4 +444,4 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -32,7 +32,7 @@
 #include "render/bsdf/bsdf_cloth.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Photon {
   V3f position;    // m
@@ -213,4 +213,4 @@ struct Caustics {
 Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
                        uint64_t& rays, const PhotonRound& round = {});
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace drench {
+namespace drench::render {
 
 float relative_error(const PixelSum& pixel) {
   float sum = 0;
@@ -106,4 +106,4 @@ bool SamplePlan::next(const std::vector<PixelSum>& pixels, double photon_error) 
   return more;
 }
 
-}  // namespace drench
+}  // namespace drench::render

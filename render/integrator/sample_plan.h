@@ -6,7 +6,7 @@
 #include "render/film/checkpoint_archive.h"
 #include "render/film/pixel_sum.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The relative error of a pixel as its samples tell: mean over the colours of variance of the mean
 /// / (mean^2 + 0.01). Its mean over a picture is the picture's relative MSE.
@@ -52,4 +52,4 @@ class SamplePlan {
   std::vector<int> wanted_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

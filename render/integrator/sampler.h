@@ -7,7 +7,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 inline uint32_t reverse_bits(uint32_t x) {
   x = __builtin_bswap32(x);
@@ -149,4 +149,4 @@ class Sampler {
   uint32_t reversed_index_ = 0, seed_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

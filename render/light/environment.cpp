@@ -5,7 +5,7 @@
 #include "render/color/color.h"
 #include "render/texture/texture.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -179,4 +179,4 @@ float Environment::pdf(const V3f& direction) const {
   return row_table_.probability(row) * column_tables_[row].probability(column) / solid_angle;
 }
 
-}  // namespace drench
+}  // namespace drench::render

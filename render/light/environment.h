@@ -10,7 +10,7 @@
 #include "render/light/sky_map.h"
 #include "render/texture/picture.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Draws from a discrete distribution in constant time. Walker's alias method in Vose's form.
 class AliasTable {
@@ -75,4 +75,4 @@ class Environment {
   std::vector<AliasTable> column_tables_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

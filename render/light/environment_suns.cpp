@@ -6,7 +6,7 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -202,4 +202,4 @@ std::vector<MapSun> split_suns(SkyMap& map, float rotation) {
   return SunFinder(map, rotation).split();
 }
 
-}  // namespace drench
+}  // namespace drench::render

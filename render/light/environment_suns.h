@@ -7,7 +7,7 @@
 
 #include "render/light/sky_map.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What a region sends beyond its surroundings, as a disc far away.
 struct MapSun {
@@ -23,4 +23,4 @@ struct MapSun {
 /// @param rotation  of the map, turns
 std::vector<MapSun> split_suns(SkyMap& map, float rotation);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 #include <limits>
 #include <numeric>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -125,4 +125,4 @@ float LightTree::cluster_importance(const Node& node, const V3f& from) const {
   return (node.round + node.flat * cosine) / std::max(distance2, kInside * node.spread);
 }
 
-}  // namespace drench
+}  // namespace drench::render

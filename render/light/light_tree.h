@@ -15,7 +15,7 @@
 #include "render/scene/box_test.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 class LightTree {
  public:
@@ -186,4 +186,4 @@ void LightTree::along(const V3f& origin, const V3f& direction, float reach,
   }
 }
 
-}  // namespace drench
+}  // namespace drench::render

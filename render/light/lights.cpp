@@ -10,7 +10,7 @@
 #include "render/sampling.h"
 #include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -425,4 +425,4 @@ LightSample Lights::sample_chosen(const Choice& choice, const V3f& from, float t
           environment_group_};
 }
 
-}  // namespace drench
+}  // namespace drench::render

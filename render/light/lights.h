@@ -12,7 +12,7 @@
 #include "render/light/light_tree.h"
 #include "render/light/mesh_light.h"
 
-namespace drench {
+namespace drench::render {
 
 /// A rectangle, disk or sphere, ready to be hit and sampled.
 struct ShapeLight {
@@ -182,4 +182,4 @@ class Lights {
   float environment_importance_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -75,4 +75,4 @@ LightTree::Light MeshLight::extent() const {
   return {{center_ - V3f(radius_), center_ + V3f(radius_)}, {0, 0, 0}, power_};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,7 +5,7 @@
 #include "pipeline/contract/error.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -115,4 +115,4 @@ V2f ShutterCamera::project(const CameraPose& pose, const V3f& point) const {
   return {0.5f * width_ + dot(to, pose.right) * scale, 0.5f * height_ - dot(to, pose.up) * scale};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,7 +5,7 @@
 #include "pipeline/contract/shot/shot.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Ray {
   V3f origin, direction;  // m; direction is unit
@@ -110,4 +110,4 @@ Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f&
   return {pose.position + shift, normalized(through - shift * (1 / pose.focus_distance)), time};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -87,4 +87,4 @@ PixelMatch chained(const PixelMatch& first, const PixelMatch& next) {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

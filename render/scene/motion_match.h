@@ -6,7 +6,7 @@
 
 #include "render/denoise/denoise.h"
 
-namespace drench {
+namespace drench::render {
 
 /// By pixel of one frame.
 struct PixelMatch {
@@ -23,4 +23,4 @@ PixelMatch match_pixels(const NoisyPicture& from, const NoisyPicture& to, Side s
 /// To a frame farther away, by one in between. @param first  to that one, @param next  from it
 PixelMatch chained(const PixelMatch& first, const PixelMatch& next);
 
-}  // namespace drench
+}  // namespace drench::render

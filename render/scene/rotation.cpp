@@ -5,7 +5,7 @@
 
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -73,4 +73,4 @@ void Scene::turn_object(SceneObject& object, const TriangleMesh& mesh, const Tur
   object.position_close = object.key.back().position;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,7 +5,7 @@
 #include "pipeline/contract/geometry/obstacle.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// How an obstacle's keys move it about a frame.
 class Turn {
@@ -33,4 +33,4 @@ class Turn {
   Pose pose_, before_, after_;  // at the frame, and kStep about it
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -13,7 +13,7 @@
 #include "render/scene/rotation.h"
 #include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -446,4 +446,4 @@ bool Scene::is_inside(uint32_t object, const V3f& point, float time) const {
   return hit.kind != Hit::Kind::nothing && surface(up, hit).geometric_normal.y > 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -17,7 +17,7 @@
 #include "render/scene/camera.h"
 #include "render/scene/embree.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The dielectric bodies that a point is in, one bit each; of several the highest fills the place.
 using Bodies = uint32_t;
@@ -298,4 +298,4 @@ class Scene {
   unsigned features_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -61,4 +61,4 @@ void KeptParts::give_back(SceneObject object) {
   objects_.push_back(std::move(object));
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -13,7 +13,7 @@
 #include "pipeline/contract/hash.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 class KeptParts {
  public:
@@ -47,4 +47,4 @@ class KeptParts {
   std::vector<SceneObject> objects_;  // oldest first
 };
 
-}  // namespace drench
+}  // namespace drench::render

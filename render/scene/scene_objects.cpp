@@ -10,7 +10,7 @@
 #include "render/scene/scene.h"
 #include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -249,4 +249,4 @@ void Scene::build(SceneObject& object) {
   check_embree(parts_->device().get());
 }
 
-}  // namespace drench
+}  // namespace drench::render

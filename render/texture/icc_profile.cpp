@@ -6,7 +6,7 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -186,4 +186,4 @@ IccProfile::IccProfile(Bytes bytes) : code_(code_of(bytes, why_not_)) {
   if (const std::string text = description(bytes); !text.empty()) name_ = text;
 }
 
-}  // namespace drench
+}  // namespace drench::render

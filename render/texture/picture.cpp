@@ -16,7 +16,7 @@
 #include "render/texture/icc_profile.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -264,4 +264,4 @@ Raster read_picture(const fs::path& path, PictureUse use, PictureMemory& memory)
   fail_unread(path, bytes);
 }
 
-}  // namespace drench
+}  // namespace drench::render

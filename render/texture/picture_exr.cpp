@@ -23,7 +23,7 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -371,4 +371,4 @@ Raster read_exr_picture(const PictureFile& file) {
   }
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -13,7 +13,7 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -222,4 +222,4 @@ class HdrReader {
 
 Raster read_hdr(const PictureFile& file) { return HdrReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -16,7 +16,7 @@
 
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -257,4 +257,4 @@ class JpegReader {
 
 Raster read_jpeg(const PictureFile& file) { return JpegReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

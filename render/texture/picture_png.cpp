@@ -12,7 +12,7 @@
 
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -284,4 +284,4 @@ class PngReader {
 
 Raster read_png(const PictureFile& file) { return PngReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -14,7 +14,7 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -420,4 +420,4 @@ class TiffReader {
 
 Raster read_tiff(const PictureFile& file) { return TiffReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -38,7 +38,7 @@ double log_slope(const std::vector<double>& x, const std::vector<double>& y) {
 }
 
 /// Sum of the colours over the film.
-double light_of(const Film& film) {
+double light_of(const render::Film& film) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); ++k)
     if (k % 4 != 3) sum += film.rgba[k];
@@ -52,8 +52,8 @@ struct Sampled {
   double light = 0;  // over that of the reference
 };
 
-Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples, const Film& reference,
-               const RenderOptions& options = {}) {
+Sampled sample(const Shot& shot, const render::FrameGeometry& geometry, int samples,
+               const render::Film& reference, const render::RenderOptions& options = {}) {
   constexpr int kSeeds = 5;
   Sampled out;
   std::vector<Render> renders;
@@ -96,7 +96,7 @@ std::optional<double> time_to(double error, const std::vector<Sampled>& curve) {
 }
 
 void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
-                const FrameGeometry& geometry, const Film& reference) {
+                const render::FrameGeometry& geometry, const render::Film& reference) {
   std::vector<double> counts, errors;
   std::vector<Sampled> curve;
   for (const int samples : {1, 4, 16, 64, 256}) {
@@ -122,7 +122,7 @@ void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
 }
 
 void render_convergence(const Emit& emit) {
-  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
+  const render::FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
   emit_curve(emit, "cloth", cloth_shot(), cloth,
              render(cloth_shot(), cloth, kReferenceSamples, 1000).film);
   Shot paths = pool_shot();
@@ -136,7 +136,7 @@ const Registration render_convergence_case{
     render_convergence};
 
 void render_cloth(const Emit& emit) {
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   // So many samples that building the scene no longer counts.
   Line line = line_of({0, render(cloth_shot(), geometry, 256, 1)});
   line.method += ", rate";
@@ -154,15 +154,15 @@ const Registration render_cloth_case{
 void render_caustics(const Emit& emit) {
   Shot photons = pool_shot(), paths = photons;
   paths.render.photons = 0;
-  const FrameGeometry geometry{wavy_pool(), {}};
-  Film reference = render(paths, geometry, kReferenceSamples / 2, 1000).film;
-  const Film half = render(paths, geometry, kReferenceSamples / 2, 1001).film;
+  const render::FrameGeometry geometry{wavy_pool(), {}};
+  render::Film reference = render(paths, geometry, kReferenceSamples / 2, 1000).film;
+  const render::Film half = render(paths, geometry, kReferenceSamples / 2, 1001).film;
   const double own = relative_mse(reference, half) / 4;
   for (size_t k = 0; k < half.rgba.size(); ++k)
     reference.rgba[k] = 0.5f * (reference.rgba[k] + half.rgba[k]);
-  RenderOptions none;
-  none.walks = Walks::none;
-  const std::tuple<const char*, const Shot*, RenderOptions> ways[] = {
+  render::RenderOptions none;
+  none.walks = render::Walks::none;
+  const std::tuple<const char*, const Shot*, render::RenderOptions> ways[] = {
       {"paths", &paths, {}}, {"photons", &photons, none}, {"photons and walks", &photons, {}}};
   for (const int samples : {4, 16, 64, 256}) {
     double efficiency = 0;
@@ -191,7 +191,7 @@ const Registration render_caustics_case{
     render_caustics};
 
 /// Relative MSE by two references of paths alone, so that their noise adds nothing.
-double error_beside(const Film& film, const Film& a, const Film& b) {
+double error_beside(const render::Film& film, const render::Film& a, const render::Film& b) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); ++k) {
     if (k % 4 == 3) continue;
@@ -209,14 +209,14 @@ void render_walks(const Emit& emit) {
   Shot paths = shot;
   paths.render.photons = 0;
   for (const float waves : {0.f, 1.f, 2.f, 4.f}) {
-    const FrameGeometry geometry{wavy_pool(128, waves), {}};
-    const Film a = render(paths, geometry, kReference, 1000).film,
-               b = render(paths, geometry, kReference, 1001).film;
+    const render::FrameGeometry geometry{wavy_pool(128, waves), {}};
+    const render::Film a = render(paths, geometry, kReference, 1000).film,
+                       b = render(paths, geometry, kReference, 1001).film;
     double least = 1e30;  // relative MSE x CPU s
-    for (const auto& [name, walks] : {std::pair{"photons", Walks::none},
-                                      {"photons and walks", Walks::some},
-                                      {"what is chosen", Walks::if_calm}}) {
-      RenderOptions options;
+    for (const auto& [name, walks] : {std::pair{"photons", render::Walks::none},
+                                      {"photons and walks", render::Walks::some},
+                                      {"what is chosen", render::Walks::if_calm}}) {
+      render::RenderOptions options;
       options.walks = walks;
       double error = 0, cpu_s = 0;
       Render last;
@@ -228,7 +228,7 @@ void render_walks(const Emit& emit) {
       line.method = fmt::format("pool, waves of {:.2f} m, {}", 0.03 * double(waves), name);
       line.more["rel_mse"] = error, line.more["cpu_s"] = cpu_s;
       line.more["walked"] = last.stats.walked;
-      if (walks == Walks::if_calm) {
+      if (walks == render::Walks::if_calm) {
         line.error = error * cpu_s / least, line.gate = 1.15;
         line.error_of = "error x time over that of the better";
       }
@@ -273,13 +273,13 @@ Shot lamps_shot(int count, Lamps where) {
 /// Error and time by the number of lamps.
 void render_lamps(const Emit& emit) {
   constexpr int kReference = 1600, kSamples = 64, kSeeds = 4;
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   for (const Lamps where : {Lamps::above, Lamps::low}) {
     double of_one = 0;
     for (const int count : {1, 4, 16, 64, 256}) {
       const Shot shot = lamps_shot(count, where);
-      const Film a = render(shot, geometry, kReference, 1000).film,
-                 b = render(shot, geometry, kReference, 1001).film;
+      const render::Film a = render(shot, geometry, kReference, 1000).film,
+                         b = render(shot, geometry, kReference, 1001).film;
       double error = 0, cpu_s = 0;
       Render last;
       for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
@@ -312,14 +312,14 @@ void render_denoise(const Emit& emit) {
   constexpr int kReference = 6400;
   Shot sky = larger(pool_shot());
   sky.light.erase(sky.light.begin());
-  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}},
+  const render::FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}},
       drops{spray(), {}};
-  const std::tuple<std::string, Shot, const FrameGeometry*> pictures[] = {
+  const std::tuple<std::string, Shot, const render::FrameGeometry*> pictures[] = {
       {"cloth", larger(cloth_shot()), &cloth},
       {"pool under the sky", sky, &pool},
       {"spray against the sun", larger(spray_shot()), &drops}};
   for (const auto& [name, shot, geometry] : pictures) {
-    const Film reference = render(shot, *geometry, kReference, 1000).film;
+    const render::Film reference = render(shot, *geometry, kReference, 1000).film;
     for (const int samples : {16, 64, 256}) {
       Shot clean = shot;
       clean.render.denoise = true;
@@ -351,8 +351,8 @@ void render_adaptive(const Emit& emit) {
   constexpr int kReference = 25600;
   Shot shot = pool_shot();
   shot.light.erase(shot.light.begin());
-  const FrameGeometry geometry{wavy_pool(), {}};
-  const Film reference = render(shot, geometry, kReference, 1000).film;
+  const render::FrameGeometry geometry{wavy_pool(), {}};
+  const render::Film reference = render(shot, geometry, kReference, 1000).film;
   std::vector<double> counts, errors;
   for (const int samples : {32, 64, 128, 256, 512}) {
     counts.push_back(std::log(double(samples)));
@@ -385,7 +385,7 @@ void render_scaling(const Emit& emit) {
   constexpr double kLeastEfficiency = 0.85;
   Shot shot = cloth_shot();
   shot.render.width = 640, shot.render.height = 360;  // 920 tiles
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   double alone_s = 0;
   std::vector<int> counts;
   for (int n = 1; n < hardware_threads(); n *= 2) counts.push_back(n);

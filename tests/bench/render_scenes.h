@@ -25,14 +25,14 @@ TriangleMesh spray();
 Shot spray_shot();
 
 struct Render {
-  Film film;
-  RenderStats stats;
+  render::Film film;
+  render::RenderStats stats;
   Measured cost;
 };
-Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed,
-              const RenderOptions& options = {});
+Render render(Shot shot, const render::FrameGeometry& geometry, int samples, uint32_t seed,
+              const render::RenderOptions& options = {});
 
 /// mean((x - r)^2 / (r^2 + 0.01)) over pixels and channels.
-double relative_mse(const Film& film, const Film& reference);
+double relative_mse(const render::Film& film, const render::Film& reference);
 
 }  // namespace drench::bench

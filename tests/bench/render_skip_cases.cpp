@@ -14,7 +14,7 @@ namespace {
 
 struct Frame {
   Shot shot;
-  FrameGeometry geometry;
+  render::FrameGeometry geometry;
 };
 
 struct Variant {

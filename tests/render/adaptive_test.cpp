@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 /// Left a sky that has no noise; right a floor under a lamp that most paths miss.
@@ -168,4 +170,4 @@ TEST(Crop, BeyondTheFrameIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,7 +8,7 @@
 #include "render/scene/camera.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// Points of the lens that rays leave from, in its radii, right and up.
@@ -185,4 +185,4 @@ TEST(Aperture, RefusesTwoBladesAndNoWidth) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -12,7 +12,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 V3f at_angle(double angle) {  // towards a surface with normal +y
@@ -299,4 +301,4 @@ TEST(Checker, AlternatesInSquaresOfItsSize) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,7 +8,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/strip.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 TEST(Camera, SpansItsHorizontalFieldOfView) {
@@ -116,4 +116,4 @@ TEST(ThinLens, SpreadsAPointOverItsCircleOfConfusion) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -9,7 +9,7 @@
 
 #include "render/bsdf/bsdf.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 struct ChiSquare {
   double p_value = 0;   // chance of a fit as bad as this for a true density
@@ -68,4 +68,4 @@ ChiSquare chi_square(uint32_t seed, const Draw& draw, const Density& density) {
   return out;
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

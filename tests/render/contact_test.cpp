@@ -7,7 +7,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr double kIndex = 1.333;
@@ -94,4 +94,4 @@ TEST(WaterOnCloth, TurnedInsideOutHasNoDepth) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -13,7 +13,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 constexpr int kSize = 64;
@@ -350,4 +352,4 @@ TEST(NoisyFrame, WithNeighboursErrsLess) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

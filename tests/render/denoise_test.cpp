@@ -8,7 +8,7 @@
 #include "render/denoise/denoise.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr int kSize = 64;
@@ -325,4 +325,4 @@ TEST(DenoisedFrame, OfTooFewSamplesIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 struct Everything {
@@ -164,4 +166,4 @@ TEST(RenderStats, CountWhatWasTraced) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -12,7 +12,7 @@
 #include "tests/render/closed_body.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr double kIndex = 1.333;
@@ -433,4 +433,4 @@ TEST(WaterMesh, KnowsWhatLiesInside) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

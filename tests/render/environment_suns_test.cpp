@@ -10,7 +10,9 @@
 #include "tests/render/puddle.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 struct Disc {
@@ -250,4 +252,4 @@ TEST(MapSuns, GiveTheCausticThatPathsFindInTheMap) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

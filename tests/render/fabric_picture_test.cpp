@@ -11,7 +11,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 Material fabric(float reflectance, float transmittance) {
@@ -220,4 +222,4 @@ TEST(FabricBits, AreTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -7,7 +7,7 @@
 
 #include "tests/render/lobes.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr float kWater = 1.333f;
@@ -407,4 +407,4 @@ TEST(Fabric, HasItsYarnsOnBothFaces) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -6,7 +6,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 FoamFrame spheres(const std::vector<V3f>& centers, float radius) {
@@ -158,4 +158,4 @@ TEST(FoamPicture, RefusesWhatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

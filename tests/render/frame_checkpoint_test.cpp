@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 struct Stopped {};
@@ -124,4 +126,4 @@ TEST(FrameCheckpoint, OfOtherInputsOrDamagedCountsForNothing) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -10,7 +10,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 Material gauze(float reflectance, float transmittance, double gap) {
@@ -301,4 +301,4 @@ TEST(GapBits, AreOthersOnlyWhereSomethingHasGaps) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

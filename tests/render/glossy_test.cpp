@@ -10,7 +10,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 Material rough_glass(const std::string& name, double roughness, double ior = 1.5) {
@@ -413,4 +415,4 @@ TEST(NormalMap, SendsNothingThroughTheSurface) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -18,7 +18,7 @@
 #include "pipeline/contract/error.h"
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 using Imath::V3d;
@@ -340,4 +340,4 @@ TEST_F(JpegTexture, TurnedPicturesOfCamerasAreNamed) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

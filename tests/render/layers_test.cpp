@@ -19,7 +19,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 const FilmLayer& layer_of(const Film& film, const std::string& name) {
@@ -384,4 +386,4 @@ TEST(LayerFile, RefusesChannelsOfOneName) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -11,7 +11,7 @@
 #include "tests/render/chi_square.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr int kMany = 60;
@@ -233,4 +233,4 @@ TEST(LightTree, GivesPhotonsAndWalksThePictureOfPaths) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -5,7 +5,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 constexpr float kReflectance = 0.5f;
@@ -187,4 +189,4 @@ TEST(EnvironmentMap, ShowsRotatedColumnsAndUpwardRows) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

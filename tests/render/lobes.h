@@ -9,7 +9,7 @@
 #include "tests/render/chi_square.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 inline const V3f kUp(0, 0, 1);
 
@@ -81,4 +81,4 @@ int disagreements(const Lobe& lobe, const Scatter& s) {
   return differ(s.pdf, pdf) || differ(s.weight.x * s.pdf, value.x);
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

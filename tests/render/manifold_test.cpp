@@ -11,7 +11,7 @@
 #include "render/integrator/photons.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr double kIndex = 1.333;
@@ -251,4 +251,4 @@ TEST(Walks, AreLeftOutWhereWaterIsNotCalm) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -10,7 +10,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 const FilmLayer& layer_of(const Film& film, const std::string& name) {
@@ -498,4 +498,4 @@ TEST(ShadowCatcher, IsSeenThroughClearWater) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

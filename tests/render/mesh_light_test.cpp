@@ -9,7 +9,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// A square in y = 0 around the origin that faces down, of two triangles.
@@ -213,4 +213,4 @@ TEST(MeshLight, AboveWaterIsAimedAt) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

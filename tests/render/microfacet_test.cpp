@@ -7,7 +7,7 @@
 #include "render/bsdf/bsdf_rough.h"
 #include "tests/render/lobes.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 RoughBsdf rough(float cos, float alpha, float eta, const AlbedoTable& albedo) {
@@ -338,4 +338,4 @@ TEST(RoughDielectric, BecomesTheSmoothOne) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

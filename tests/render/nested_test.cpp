@@ -4,7 +4,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr double kWater = 1.333, kGlass = 1.5;
@@ -122,4 +122,4 @@ TEST(NestedBodies, AreRefusedBeyondTheirNumber) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,7 +8,9 @@
 #include "tests/render/puddle.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 /// A wavy puddle under a lamp and a sky, 32 x 32 pixels, without walks.
@@ -245,4 +247,4 @@ TEST(PhotonError, IsNoneWithoutPhotons) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

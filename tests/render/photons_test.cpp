@@ -10,7 +10,7 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr double kIndex = 1.333;
@@ -403,4 +403,4 @@ TEST(Photons, AreNotTracedWithoutLampsOrFluid) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -19,7 +19,11 @@
 #include "render/texture/texture.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
+using drench::test::TemporaryFolder;
+using drench::test::write_quickly;
 
 /// What `f` writes to stderr, which is free again even where it throws.
 inline std::string said_by(const std::function<void()>& f) {
@@ -222,4 +226,4 @@ class PictureTest : public testing::Test {
   int count_ = 0;
 };
 
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -4,7 +4,7 @@
 
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 class Png : public PictureTest {};
@@ -342,4 +342,4 @@ TEST_F(Png, TakesNoMoreMemoryThanItsPixelsAndHeedsTheLimit) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

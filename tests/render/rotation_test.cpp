@@ -7,7 +7,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 constexpr int kSize = 64;
@@ -157,4 +157,4 @@ TEST(Turn, TakesKeysOnlyWhereItsBendShows) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

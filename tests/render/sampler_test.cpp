@@ -16,7 +16,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 TEST(Sampler, FillsEveryElementaryIntervalOnce) {
@@ -266,4 +268,4 @@ TEST(AliasTable, DrawsInProportion) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -6,7 +6,7 @@
 #include "render/scene/scene_cache.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 struct Still {
@@ -80,4 +80,4 @@ TEST(KeptParts, LetGoOfWhatCreeps) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

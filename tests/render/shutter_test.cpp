@@ -8,7 +8,7 @@
 #include "render/scene/camera.h"
 #include "tests/render/strip.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// Share of the light that has come by a time, for shares of opening and closing.
@@ -235,4 +235,4 @@ TEST(RollingShutter, KeepsTheFirstRowOnTimeForAMovingCameraToo) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -5,7 +5,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 /// Mean darkness of every column of a film of a black thing before a sky of radiance 1.
 inline std::vector<double> darkness_of_columns(const Film& film) {
@@ -41,4 +41,4 @@ struct Strip {
   }
 };
 
-}  // namespace drench::test
+}  // namespace drench::render::test

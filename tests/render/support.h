@@ -12,7 +12,7 @@
 #include "pipeline/contract/error.h"
 #include "render/options.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 inline constexpr double kPi64 = std::numbers::pi;
 
@@ -258,4 +258,4 @@ inline void expect_estimators_agree(const Shot& shot, const FrameGeometry& geome
   EXPECT_NEAR(bsdf.value, mis.value, 4 * std::hypot(bsdf.error, mis.error));
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

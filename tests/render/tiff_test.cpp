@@ -6,7 +6,7 @@
 
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// One picture of a file, samples as numbers by pixel and channel.
@@ -447,4 +447,4 @@ TEST_F(Tiff, WhatIsCutOffIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test
