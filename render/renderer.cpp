@@ -23,7 +23,7 @@ namespace drench::render {
 
 namespace {
 
-constexpr int kTile = 16;  // pixels a side
+constexpr int tile_size = 16;  // pixels a side
 
 double process_cpu_seconds() {
   timespec t{};
@@ -32,19 +32,19 @@ double process_cpu_seconds() {
 }
 
 void check_settings(const RenderSettings& r) {
-  constexpr int kLargest = 32768, kMostSamples = 1 << 20;
-  if (r.width < 1 || r.height < 1 || r.width > kLargest || r.height > kLargest)
+  constexpr int max_size = 32768, max_samples = 1 << 20;
+  if (r.width < 1 || r.height < 1 || r.width > max_size || r.height > max_size)
     throw Error(fmt::format("render: a picture of {} x {} pixels; each must lie in 1..{}", r.width,
-                            r.height, kLargest));
-  if (r.samples < 1 || r.samples > kMostSamples)
-    throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, kMostSamples));
+                            r.height, max_size));
+  if (r.samples < 1 || r.samples > max_samples)
+    throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, max_samples));
   if (r.crop_max != V2i(0, 0) &&
       !(r.crop_min.x >= 0 && r.crop_min.y >= 0 && r.crop_min.x < r.crop_max.x &&
         r.crop_min.y < r.crop_max.y && r.crop_max.x <= r.width && r.crop_max.y <= r.height))
     throw Error("render: crop_min and crop_max give no part of the picture; mend them");
-  if (r.denoise && r.samples < 2 * PixelSum::kBatch)
+  if (r.denoise && r.samples < 2 * PixelSum::smallest_batch)
     throw Error(fmt::format("render.denoise needs at least {} samples, render.samples is {}",
-                            2 * PixelSum::kBatch, r.samples));
+                            2 * PixelSum::smallest_batch, r.samples));
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
 }
 
@@ -59,8 +59,8 @@ struct Job {
   FilmWindow window;
   int width, height;  // pixels, of the window
 
-  int columns() const { return (width + kTile - 1) / kTile; }  // of tiles
-  int rows() const { return (height + kTile - 1) / kTile; }
+  int columns() const { return (width + tile_size - 1) / tile_size; }  // of tiles
+  int rows() const { return (height + tile_size - 1) / tile_size; }
 };
 
 /// Where on the film the samples of a pixel lie: known for eight at a time, long before each is
@@ -74,17 +74,17 @@ class FilmPoints {
 
   Sampler sampler(int sample) const { return first_.at(uint32_t(sample)); }
   V2f operator[](int sample) {
-    const int k = sample % kAtOnce;
+    const int k = sample % samples_at_once;
     if (sample - k != from_) fill(sample - k);
     return point_[size_t(k)];
   }
 
  private:
-  static constexpr int kAtOnce = 8;
+  static constexpr int samples_at_once = 8;
 
   void fill(int from) {
     from_ = from;
-    point_ = first_.two_of_eight(uint32_t(from), kFilterDimension);
+    point_ = first_.two_of_eight(uint32_t(from), filter_dimension);
     for (V2f& p : point_) p = center_ + job_.filter.offset(p);
   }
 
@@ -92,7 +92,7 @@ class FilmPoints {
   V2f center_;
   Sampler first_;
   int from_ = -1;
-  std::array<V2f, kAtOnce> point_;
+  std::array<V2f, samples_at_once> point_;
 };
 
 /// Calls back with the finished share of the samples that are expected, one tile at a time.
@@ -133,19 +133,19 @@ void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
 /// @return those added
 uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
-  std::vector<PathRecord> record(kPathsAtOnce, sums.layers.blank());
+  std::vector<PathRecord> record(paths_in_flight, sums.layers.blank());
   const bool records = sums.layers.records();
   std::vector<CameraSample> samples;
   uint64_t added = 0;
-  const int x0 = tile % job.columns() * kTile, y0 = tile / job.columns() * kTile;
-  for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
-    for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
+  const int x0 = tile % job.columns() * tile_size, y0 = tile / job.columns() * tile_size;
+  for (int y = y0; y < std::min(y0 + tile_size, job.height); ++y)
+    for (int x = x0; x < std::min(x0 + tile_size, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
       FilmPoints film(job, x + job.window.x, y + job.window.y);
       const int wanted = sums.wanted(pixel, round);
       for (int s = sums.pixel[pixel].samples(); s < wanted; s = sums.pixel[pixel].samples()) {
         samples.clear();
-        for (size_t k = 0; k < kPathsAtOnce && s + int(k) < wanted; ++k)
+        for (size_t k = 0; k < paths_in_flight && s + int(k) < wanted; ++k)
           samples.push_back(
               {film.sampler(s + int(k)), film[s + int(k)], records ? &record[k] : nullptr, {}});
         job.trace(job.scene, job.path, samples, rays);
@@ -265,26 +265,26 @@ Film developed(const Job& job, const Sums& sums) {
 
 PlateFilm plate_film(const Shot& shot, const Scene& scene, size_t pixels) {
   const bool see_through = shot.render.refraction_alpha == RefractionAlpha::transparent &&
-                           (scene.features() & kMattes) && !scene.bodies().empty();
+                           (scene.features() & Feature::mattes) && !scene.bodies().empty();
   return {scene.has_catchers() ? pixels : 0, shot.render.denoise && see_through ? pixels : 0};
 }
 
 }  // namespace
 
 PixelFilter::PixelFilter() {
-  constexpr int kSteps = 4096;
-  std::array<double, kSteps + 1> cdf{};
-  for (int k = 0; k < kSteps; ++k) {
-    const double t = 2 * std::numbers::pi * (k + 0.5) / kSteps;
+  constexpr int steps = 4096;
+  std::array<double, steps + 1> cdf{};
+  for (int k = 0; k < steps; ++k) {
+    const double t = 2 * std::numbers::pi * (k + 0.5) / steps;
     cdf[k + 1] = cdf[k] + 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) -
                  0.01168 * std::cos(3 * t);
   }
   int k = 0;
-  for (int q = 0; q <= kSize; ++q) {
-    const double target = cdf[kSteps] * q / kSize;
-    while (k + 1 < kSteps && cdf[k + 1] < target) ++k;
+  for (int q = 0; q <= table_size; ++q) {
+    const double target = cdf[steps] * q / table_size;
+    while (k + 1 < steps && cdf[k + 1] < target) ++k;
     const double within = (target - cdf[k]) / (cdf[k + 1] - cdf[k]);
-    inverse_[q] = float(((k + std::clamp(within, 0., 1.)) / kSteps - 0.5) * kWidth);
+    inverse_[q] = float(((k + std::clamp(within, 0., 1.)) / steps - 0.5) * width);
   }
 }
 

@@ -27,12 +27,12 @@ class AlbedoTable {
   static AlbedoTable mirrors(float alpha);
 
  private:
-  static constexpr int kNodes = 128;  // over the root of the cosine, finer where facets are grazed
+  static constexpr int nodes = 128;  // over the root of the cosine, finer where facets are grazed
 
   template <class Fresnel>
   static AlbedoTable integrate(float alpha, float eta, const Fresnel& fresnel);
 
-  std::array<Share, kNodes + 1> share_;
+  std::array<Share, nodes + 1> share_;
   float mean_reflected_ = 0, mean_total_ = 1;
 };
 

@@ -20,9 +20,9 @@ struct Scatter {
 /// surface, so that a smooth or mapped normal shows no reflections from behind it.
 /// All unit; `outgoing` and `shading` in the hemisphere of `geometric`.
 inline V3f mirroring_normal(const V3f& outgoing, const V3f& geometric, const V3f& shading) {
-  constexpr float kLeast = 0.01f;  // cosine of a mirrored direction
+  constexpr float min_cosine = 0.01f;  // cosine of a mirrored direction
   const V3f mirrored = shading * (2 * dot(shading, outgoing)) - outgoing;
-  const float least = std::min(0.9f * dot(outgoing, geometric), kLeast);
+  const float least = std::min(0.9f * dot(outgoing, geometric), min_cosine);
   const float height = dot(mirrored, geometric);
   if (height >= least) return shading;
   const V3f half = outgoing + normalized(mirrored + geometric * (least - height));

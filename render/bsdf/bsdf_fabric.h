@@ -53,7 +53,7 @@ size_t choose(const std::array<float, n>& share, float& u) {
     if (u < share[k]) break;
     if (k + 1 < n) u -= share[k];
   }
-  u = std::clamp(u / share[last], 0.f, kOneMinusEpsilon);
+  u = std::clamp(u / share[last], 0.f, one_minus_epsilon);
   return last;
 }
 
@@ -133,20 +133,20 @@ class FabricBsdf {
    public:
     V3f value(const V3f& incoming, float& pdf) const {
       V3f sum = dry_.value(incoming, pdf);
-      pdf *= share_[kDry];
+      pdf *= share_[dry_lobe];
       if (top_) {
         const V3f i = top_->local(incoming);
         sum *= top_->through(i);
-        if (share_[kFuzz] > 0 && top_->meets(incoming, i)) {
+        if (share_[fuzz_lobe] > 0 && top_->meets(incoming, i)) {
           sum += top_->sheen_over_cos(i) * i.z;
-          pdf += share_[kFuzz] * SheenLobe::pdf();
+          pdf += share_[fuzz_lobe] * SheenLobe::pdf();
         }
       }
       sum *= 1 - wetness_;
       if (wet_) {
         float wet_pdf = 0;
         sum += wet_->value(incoming, wet_pdf) * wetness_;
-        pdf += wet_pdf * share_[kWet];
+        pdf += wet_pdf * share_[wet_lobe];
       }
       pdf *= of_all_;
       return sum;
@@ -155,10 +155,10 @@ class FabricBsdf {
     Scatter sample(V2f u) const {
       const size_t lobe = choose(share_, u.x);
       V3f direction;
-      if (lobe == kFuzz) {
+      if (lobe == fuzz_lobe) {
         direction = top_->sheen_direction(u);
       } else {
-        const Scatter drawn = lobe == kDry ? dry_.sample(u) : wet_->sample(u);
+        const Scatter drawn = lobe == dry_lobe ? dry_.sample(u) : wet_->sample(u);
         if (!(drawn.pdf > 0)) return {};
         direction = drawn.direction;
       }
@@ -173,7 +173,7 @@ class FabricBsdf {
       if (top_) {
         const V3f i = top_->local(incoming);
         radiance *= top_->through(i);
-        if (share_[kFuzz] > 0 && top_->meets(incoming, i))
+        if (share_[fuzz_lobe] > 0 && top_->meets(incoming, i))
           radiance += top_->sheen_over_cos(i) * power;
       }
       radiance *= 1 - wetness_;
@@ -181,13 +181,13 @@ class FabricBsdf {
         wet_->receive(wet, incoming, power);
         radiance += wet_->radiance(wet) * wetness_;
       }
-      light.front += radiance * kPi;
+      light.front += radiance * pi;
     }
-    V3f radiance(const Irradiance& light) const { return light.front * (1 / kPi); }
+    V3f radiance(const Irradiance& light) const { return light.front * (1 / pi); }
 
    private:
     friend class FabricBsdf;
-    enum Lobe : size_t { kDry, kFuzz, kWet };
+    enum Lobe : size_t { dry_lobe, fuzz_lobe, wet_lobe };
     explicit Soft(const ClothBsdf& dry) : dry_(dry) {}
 
     ClothBsdf dry_;
@@ -203,20 +203,20 @@ class FabricBsdf {
     V3f value(const V3f& incoming, float& pdf) const {
       V3f sum(0);
       pdf = 0;
-      if (share_[kWarp] > 0) {
+      if (share_[warp_lobe] > 0) {
         const V3f i = top_->local(incoming);
         if (top_->meets(incoming, i)) {
           float warp = 0, weft = 0;
           sum = top_->yarn(FabricTop::Family::warp, i, warp) +
                 top_->yarn(FabricTop::Family::weft, i, weft);
           sum *= 1 - wetness_;
-          pdf = share_[kWarp] * warp + share_[kWeft] * weft;
+          pdf = share_[warp_lobe] * warp + share_[weft_lobe] * weft;
         }
       }
       if (film_) {
         float film = 0;
         sum += film_->value(incoming, film) * wetness_;
-        pdf += share_[kFilm] * film;
+        pdf += share_[film_lobe] * film;
       }
       pdf *= of_all_;
       return sum;
@@ -226,20 +226,20 @@ class FabricBsdf {
       if (of_all_ == 0) return {};
       const size_t lobe = choose(share_, u.x);
       V3f direction;
-      if (lobe == kFilm) {
+      if (lobe == film_lobe) {
         const Scatter drawn = film_->sample(u);
         if (!(drawn.pdf > 0)) return {};
         direction = drawn.direction;
       } else {
         direction = top_->yarn_direction(
-            lobe == kWarp ? FabricTop::Family::warp : FabricTop::Family::weft, u);
+            lobe == warp_lobe ? FabricTop::Family::warp : FabricTop::Family::weft, u);
       }
       return weigh(direction, [&](const V3f& d, float& pdf) { return value(d, pdf); });
     }
 
    private:
     friend class FabricBsdf;
-    enum Lobe : size_t { kWarp, kWeft, kFilm };
+    enum Lobe : size_t { warp_lobe, weft_lobe, film_lobe };
 
     std::optional<FabricTop> top_;
     std::optional<CoatLobe> film_;
@@ -259,7 +259,7 @@ class FabricBsdf {
   const Glints& glints() const { return glints_; }
 
  private:
-  static constexpr float kFilmLooks = 1.f / 3;  // of what is soft, where all is wet
+  static constexpr float film_sampling = 1.f / 3;  // of what is soft, where all is wet
 
   FabricBsdf(const V3f& outgoing, const FacingFrame& frame, const FabricPoint& point)
       : soft_(ClothBsdf(outgoing, frame.geometric, frame.basis.normal, point.dry.reflectance,
@@ -295,7 +295,7 @@ class FabricBsdf {
     if (!(wet.reflected() > 0)) return;  // within the very liquid
     glints_.film_.emplace(wet.coat(1));
     // A film reflects little, but what it shows are lamps.
-    const float looks = (soft[0] + soft[1] + soft[2]) * kFilmLooks;
+    const float looks = (soft[0] + soft[1] + soft[2]) * film_sampling;
     glints[2] = std::max(wet.reflected(), looks) * point.wetness;
   }
 

@@ -16,13 +16,14 @@ namespace drench::render {
 
 namespace {
 
-constexpr float kGrey = 0.18f, kRange = 1 - kGrey, kPower = 1.5f;
+constexpr float middle_grey = 0.18f, shoulder_range = 1 - middle_grey, shoulder_power = 1.5f;
 
 float shoulder(float x) {
-  if (!(x > kGrey)) return std::max(x, 0.f);  // also catches NaN
+  if (!(x > middle_grey)) return std::max(x, 0.f);  // also catches NaN
   if (x > 1e6f) return 1;
-  const float u = (x - kGrey) / kRange;
-  return kGrey + kRange * u / std::pow(1 + std::pow(u, kPower), 1 / kPower);
+  const float u = (x - middle_grey) / shoulder_range;
+  return middle_grey +
+         shoulder_range * u / std::pow(1 + std::pow(u, shoulder_power), 1 / shoulder_power);
 }
 
 /// NaN is black.

@@ -65,14 +65,14 @@ void CryptomattePixel::archive(CheckpointArchive& file) {
   for (auto& [thing, count] : counts_) file.value(thing), file.value(count);
 }
 
-std::array<float, 2 * CryptomattePixel::kRanks> CryptomattePixel::ranked(
+std::array<float, 2 * CryptomattePixel::ranks> CryptomattePixel::ranked(
     const std::vector<float>& ids, int samples) const {
   std::vector<std::pair<int, int>> sorted = counts_;
   std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
     return a.second != b.second ? a.second > b.second : a.first < b.first;
   });
-  std::array<float, 2 * kRanks> out{};
-  for (size_t k = 0; k < std::min(sorted.size(), size_t(kRanks)); ++k) {
+  std::array<float, 2 * ranks> out{};
+  for (size_t k = 0; k < std::min(sorted.size(), size_t(ranks)); ++k) {
     out[2 * k] = ids[size_t(sorted[k].first)];
     out[2 * k + 1] = float(sorted[k].second) / float(samples);
   }

@@ -11,10 +11,10 @@ namespace drench::render {
 namespace {
 
 /// Changes with the layout of what is archived.
-constexpr uint64_t kFormat = 0x6472656e63680004;  // "drench", 4
+constexpr uint64_t format_version = 0x6472656e63680004;  // "drench", 4
 
 struct Head {
-  uint64_t format = kFormat;
+  uint64_t format = format_version;
   Digest inputs;
   uint64_t pixels = 0;
 };
@@ -60,7 +60,7 @@ bool CheckpointArchive::finish() {
 void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   write_file_whole(checkpoint.file, [&](const std::filesystem::path& temporary) {
     CheckpointArchive file(temporary, CheckpointArchive::Way::write);
-    Head head{kFormat, checkpoint.inputs, sums.pixel.size()};
+    Head head{format_version, checkpoint.inputs, sums.pixel.size()};
     file.value(head);
     archive(file, sums);
     if (!file.finish())
@@ -74,7 +74,7 @@ bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   CheckpointArchive file(checkpoint.file, CheckpointArchive::Way::read);
   Head head;
   file.value(head);
-  if (head.format != kFormat || head.inputs != checkpoint.inputs ||
+  if (head.format != format_version || head.inputs != checkpoint.inputs ||
       head.pixels != sums.pixel.size())
     return false;
   Sums read = sums;

@@ -135,9 +135,9 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   p.albedo2 += record.albedo * record.albedo;
   const int object = record.first.kind == Hit::Kind::ground   ? int(scene_->object_count())
                      : record.first.kind == Hit::Kind::object ? int(record.first.index)
-                                                              : kSky;
+                                                              : no_object;
   if (features_) vote(p.usual, object, record);
-  if (object == kSky) return;
+  if (object == no_object) return;
   p.normal += record.normal;
   p.normal2 += record.normal * record.normal;
   const CameraPose& eye = frame_camera_.open();
@@ -159,7 +159,7 @@ void LayerFilm::vote(Usual& usual, int object, const PathRecord& record) const {
     return;
   }
   usual = {object, 1};
-  if (object == kSky) return;
+  if (object == no_object) return;
   usual.after = motion_of(record, frame_camera_.close(), 1);
   usual.before = motion_of(record, before_camera_.open(), -1);
 }
@@ -215,7 +215,7 @@ void LayerFilm::add_matte(std::vector<FilmLayer>& out, const std::string& name,
                           const std::vector<PixelSum>& pixels) const {
   const std::vector<float> ids = ids_of(things);
   const size_t first = out.size();
-  for (int part = 0; part < CryptomattePixel::kRanks / 2; ++part)
+  for (int part = 0; part < CryptomattePixel::ranks / 2; ++part)
     out.push_back(
         layer(name + "0" + std::to_string(part), {"R", "G", "B", "A"}, FilmLayer::Precision::full));
   for (size_t p = 0; p < pixels.size(); ++p) {
@@ -256,7 +256,7 @@ void LayerFilm::add_motion(NoisyPicture& picture) const {
   for (auto& side : picture.motion)
     for (NoisyPicture::Plane& plane : side) plane.resize(pixel_.size());
   for (size_t p = 0; p < pixel_.size(); ++p) {
-    const bool sky = pixel_[p].usual.object == kSky;
+    const bool sky = pixel_[p].usual.object == no_object;
     const V3f before = sky ? motion_of_sky(p, before_camera_.open()) : pixel_[p].usual.before;
     const V3f after = sky ? motion_of_sky(p, frame_camera_.close()) : pixel_[p].usual.after;
     picture.motion[0][0][p] = before.x, picture.motion[0][1][p] = -before.y;

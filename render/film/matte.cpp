@@ -8,7 +8,7 @@ namespace drench::render {
 
 namespace {
 
-constexpr float kWhole = 1 - 1e-3f;  // this and more is what smoothing leaves of 1
+constexpr float almost_one = 1 - 1e-3f;  // this and more is what smoothing leaves of 1
 
 }  // namespace
 
@@ -99,7 +99,7 @@ void PlateFilm::smooth_shadows(std::vector<NoisyPicture::Plane> smooth) {
   for (size_t p = 0; p < with_.size(); ++p) {
     const V3f noisy = noisy_light_left(p);
     for (size_t c = 0; c < 3; ++c)
-      if (smooth[c][p] > kWhole && noisy[int(c)] == 1) smooth[c][p] = 1;
+      if (smooth[c][p] > almost_one && noisy[int(c)] == 1) smooth[c][p] = 1;
   }
   smooth_shadows_ = std::move(smooth);
 }

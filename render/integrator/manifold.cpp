@@ -8,13 +8,13 @@ namespace drench::render {
 
 namespace {
 
-constexpr int kMostSteps = 5;
-constexpr int kMostMet = 16;           // contact faces that a ray passes one after the other
-constexpr float kArrived = 0.03f;      // of the lamp's extent: so near its point a walk ends
-constexpr float kSameWay = 0.15f;      // of it: so near each other two ways arrive that are one
-constexpr float kLongStep = 0.3f;      // rad
-constexpr float kMostFocus = 2;        // times the light that would come straight: more is photons'
-constexpr float kIsSmooth = 0.99995f;  // cosine between two unit normals that are one
+constexpr int max_steps = 5;
+constexpr int max_contacts = 16;            // contact faces that a ray passes one after the other
+constexpr float arrival_tolerance = 0.03f;  // of the lamp's extent: so near its point a walk ends
+constexpr float same_path = 0.15f;  // of it: so near each other two ways arrive that are one
+constexpr float max_step = 0.3f;    // rad
+constexpr float max_focus = 2;      // times the light that would come straight: more is photons'
+constexpr float smooth_cosine = 0.99995f;  // cosine between two unit normals that are one
 
 /// Where a ray meets the interface and, bent there, the lamp's plane.
 struct Arrival {
@@ -93,7 +93,7 @@ class Walk {
     Ray ray{surface_.leave(direction), direction, time_};
     Bodies in = in_;
     out.way = 0;
-    for (int met = 0; met < kMostMet; ++met) {
+    for (int met = 0; met < max_contacts; ++met) {
       out.hit = scene_.intersect(ray, Coherence::incoherent);
       ++rays_;
       if (out.hit.kind != Hit::Kind::object) return false;
@@ -115,7 +115,7 @@ class Walk {
     const SceneObject& object = scene_.object(out.hit.index);
     if (!object.sphere.empty()) return false;
     const SmoothNormal smooth(object.corners(out.hit.triangle, time_), out.hit);
-    if (!(dot(smooth.unit(), out.normal) < -kIsSmooth)) return false;
+    if (!(dot(smooth.unit(), out.normal) < -smooth_cosine)) return false;
     for (int k = 0; k < 2; ++k) {
       const Packed to_plane = axis_[k] - normal_ * (dot(axis_[k], out.bent) * inverse);
       out.slope[k] = slope_before(direction, flat, to_plane, smooth, out);
@@ -167,11 +167,11 @@ std::optional<BentWay> walk_to_lamp(const Scene& scene, const Surface& surface, 
                                     Bodies in, const LampPoint& lamp, uint64_t& rays) {
   const Walk walk(scene, surface, time, in, lamp, rays);
   const V3f way = lamp.sun ? lamp.at : lamp.at - surface.position;
-  const float distance2 = dot(way, way), arrived = kArrived * lamp.extent;
+  const float distance2 = dot(way, way), arrived = arrival_tolerance * lamp.extent;
   const V3f to = way * (1 / std::sqrt(distance2));
   Packed direction(level_direction(to, scene.medium(in ? in : scene.fluid()).ior));
   Arrival at;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < max_steps; ++step) {
     if (!walk.shoot(direction, at)) return {};
     const Packed &a = at.slope[0], &b = at.slope[1];
     const float area = dot(direction, cross(a, b));
@@ -179,7 +179,7 @@ std::optional<BentWay> walk_to_lamp(const Scene& scene, const Surface& surface, 
       const float density = 1 / std::abs(area);
       const float straight = lamp.sun ? 1 : -dot(to, lamp.normal) / distance2;
       const V3f &n = surface.geometric_normal, along = direction.unpacked();
-      if (!(density < kMostFocus * straight && dot(along, n) * dot(to, n) > 0)) return {};
+      if (!(density < max_focus * straight && dot(along, n) * dot(to, n) > 0)) return {};
       const V3f absorbed = scene.medium(at.face.body).absorption * at.way,
                 bent = at.bent.unpacked();
       return BentWay{along,
@@ -193,7 +193,7 @@ std::optional<BentWay> walk_to_lamp(const Scene& scene, const Surface& surface, 
     Packed turn = (cross(b, direction) * at.miss.x + cross(direction, a) * at.miss.y) * (1 / area);
     const float angle2 = dot(turn, turn);
     if (!std::isfinite(angle2)) return {};
-    if (angle2 > kLongStep * kLongStep) turn = turn * (kLongStep / std::sqrt(angle2));
+    if (angle2 > max_step * max_step) turn = turn * (max_step / std::sqrt(angle2));
     direction = normalized(direction + turn);
   }
   return {};
@@ -227,7 +227,7 @@ bool walk_finds(const Scene& scene, const Surface& surface, float time, Bodies i
   const float along = -dot(flight, to);
   const V3f off = -flight - to * along;
   const V2f apart(dot(off, way->slope[0]), dot(off, way->slope[1]));
-  return apart.length() < kSameWay * lamp.extent && along > 0;
+  return apart.length() < same_path * lamp.extent && along > 0;
 }
 
 }  // namespace drench::render

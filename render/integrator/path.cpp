@@ -35,8 +35,8 @@ void trace(const Scene& scene, const PathSettings& settings, std::span<CameraSam
            uint64_t& rays) {
   using Path = PathTracer<features>;
   static_assert(std::is_trivially_destructible_v<Path>);
-  alignas(Path) std::byte place[kPathsAtOnce][sizeof(Path)];
-  std::array<Path*, kPathsAtOnce> paths, going;
+  alignas(Path) std::byte place[paths_in_flight][sizeof(Path)];
+  std::array<Path*, paths_in_flight> paths, going;
   size_t left = 0;
   const auto keep = [&](Path* path) {  // without a branch, which nothing foretells
     going[left] = path;
@@ -64,9 +64,9 @@ constexpr std::array<PathFunction, sizeof...(features)> table(std::index_sequenc
 }  // namespace
 
 PathFunction path_function(unsigned features) {
-  static constexpr auto functions = table(std::make_index_sequence<kFeatureCount>{});
-  if (features & kMattes) return &trace<kMattes | (kFeatureCount - 1)>;
-  return functions[features % kFeatureCount];
+  static constexpr auto functions = table(std::make_index_sequence<Feature::combinations>{});
+  if (features & Feature::mattes) return &trace<Feature::mattes | (Feature::combinations - 1)>;
+  return functions[features % Feature::combinations];
 }
 
 }  // namespace drench::render

@@ -12,18 +12,20 @@
 namespace drench::render {
 
 /// What the loop must be able to do for a frame. What is absent costs no branch.
-enum Feature : unsigned {
-  kMotionBlur = 1,     // something, or the camera, moves in the shutter
-  kDielectric = 2,     // water: refraction, absorption, medium on the path
-  kSampledLights = 4,  // lights are sampled, with multiple importance sampling
-  kThinLens = 8,
-  kGlossy = 16,        // metal, coats, rough dielectrics, fabric
-  kFeatureCount = 32,  // combinations of these
-  kMattes = 32,        // a plate goes behind; such frames have all the others switched on
+struct Feature {
+  enum : unsigned {
+    motion_blur = 1,     // something, or the camera, moves in the shutter
+    dielectric = 2,      // water: refraction, absorption, medium on the path
+    sampled_lights = 4,  // lights are sampled, with multiple importance sampling
+    thin_lens = 8,
+    glossy = 16,        // metal, coats, rough dielectrics, fabric
+    combinations = 32,  // of these
+    mattes = 32,        // a plate goes behind; such frames have all the others switched on
+  };
 };
 
 /// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.
-enum CameraDimension : uint32_t { kFilterDimension, kLensDimension, kTimeDimension };
+enum CameraDimension : uint32_t { filter_dimension, lens_dimension, time_dimension };
 
 struct PathSample {
   V3f radiance;     // W/(sr m^2)
@@ -63,7 +65,7 @@ struct CameraSample {
 };
 
 /// Camera samples that are on their way at once.
-inline constexpr size_t kPathsAtOnce = 4;
+inline constexpr size_t paths_in_flight = 4;
 
 /// Traces that many samples or fewer; `rays` counts rays traced.
 using PathFunction = void (*)(const Scene&, const PathSettings&, std::span<CameraSample>,

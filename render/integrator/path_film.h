@@ -25,7 +25,7 @@ class PathFilm {
 
   /// Whether a plate stands for what this path meets.
   bool sees_plate(const PathState& state) const {
-    return state.clear && dot(state.ray.direction, plate.view) > kMostBend;
+    return state.clear && dot(state.ray.direction, plate.view) > max_bend_cosine;
   }
 
   /// Ends the path on the plate.

@@ -10,7 +10,7 @@ namespace drench::render {
 
 PhotonRounds::PhotonRounds(double photons, double most_photons, int samples)
     : most_(int(std::clamp(std::ceil(photons / most_photons), 1.,
-                           std::max(1., double(samples / PixelSum::kBatch))))) {
+                           std::max(1., double(samples / PixelSum::smallest_batch))))) {
   photons_ = uint32_t(std::clamp(photons / most_, 1., most_photons));
 }
 
@@ -31,12 +31,13 @@ int PhotonRounds::upto(int round, int wanted) const {
   if (round + 1 == end_) return wanted;
   const int before = first_ == 0 ? 0 : wanted / 2;
   const double part = double(round + 1 - first_) / (end_ - first_);
-  return int((before + part * (wanted - before)) / PixelSum::kBatch) * PixelSum::kBatch;
+  return int((before + part * (wanted - before)) / PixelSum::smallest_batch) *
+         PixelSum::smallest_batch;
 }
 
 PhotonRound PhotonRounds::at(int round) const {
-  constexpr unsigned kMostSlots = 8;  // log2: with 24 bits for the photons of a round
-  return {round, end_, std::min(unsigned(std::bit_width(unsigned(most_ - 1))), kMostSlots)};
+  constexpr unsigned max_slots_log2 = 8;  // log2: with 24 bits for the photons of a round
+  return {round, end_, std::min(unsigned(std::bit_width(unsigned(most_ - 1))), max_slots_log2)};
 }
 
 double PhotonRounds::radius(double last) const {

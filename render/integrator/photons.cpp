@@ -16,32 +16,35 @@ namespace drench::render {
 namespace {
 
 /// Sampling dimensions of a photon; each interface takes two.
-enum PhotonDimension : uint32_t {
-  kStart,  // within its stretch of the area
-  kStartPoint,
-  kLamp,
-  kLampPoint,
-  kTime,
-  kInterfaces,
-  kRow = kInterfaces,  // free: interfaces count from 1
-  kFirstGap = 1u << 16
+struct PhotonDimension {
+  enum : uint32_t {
+    start,  // within its stretch of the area
+    start_point,
+    lamp,
+    lamp_point,
+    time,
+    interfaces,
+    row = interfaces,  // free: interfaces count from 1
+    first_gap = 1u << 16
+  };
 };
-constexpr int kMostInterfaces = 64, kLongFlight = 8;
-constexpr float kLongSurvival = 0.8f;
-constexpr int kMostMet = 1 << 12;   // contact faces and gaps that it passes one after the other
-constexpr float kMostPower = 2;     // of one that falls straight on a body, where discs hold few
-constexpr double kDotShare = 0.1;   // of a disc's light that one may bring where they hold many
-constexpr float kCrowd = 4;         // times the photons of the median one's disc
-constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
-constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
+constexpr int max_interfaces = 64, long_flight = 8;
+constexpr float long_flight_survival = 0.8f;
+constexpr int max_crossings = 1 << 12;  // contact faces and gaps that it passes one after the other
+constexpr float max_power = 2;  // of one that falls straight on a body, where discs hold few
+/// Of a disc's light that one may bring where they hold many.
+constexpr double max_disc_fraction = 0.1;
+constexpr float crowd_factor = 4;         // times the photons of the median one's disc
+constexpr uint32_t min_crowd = 400;       // photons of a crowded cell: noise above blur
+constexpr unsigned max_subsets_log2 = 3;  // log2: any eight samples in a row see all photons
 // Rounds after which hands are twice as many, log2: time is divided ever finer, and noise still
 // falls where eight samples in a row then miss photons of a round.
-constexpr unsigned kMoreHands = 4;
-constexpr double kHand = 4;  // photons of the median one's disc in a hand, at least
+constexpr unsigned rounds_per_doubling_log2 = 4;
+constexpr double min_subset_photons = 4;  // photons of the median one's disc in a hand, at least
 // Share of the light that walks must find to be taken: each costs a path four rays, and where much
 // is left to photons the error is theirs (render_walks).
-constexpr double kCalm = 0.8;
-constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
+constexpr double calm_fraction = 0.8;
+constexpr uint32_t photon_seed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
 double wanted_count(double photons) { return 20 * std::sqrt(photons / 1e5); }
@@ -119,8 +122,8 @@ class PhotonTracer {
         starts_(starts),
         count_(count),
         walks_(walks),
-        most_power_(std::max(kMostPower, float(kDotShare * wanted_count(double(count) * rounds)))) {
-  }
+        most_power_(
+            std::max(max_power, float(max_disc_fraction * wanted_count(double(count) * rounds)))) {}
 
   enum class Fate { lost, lies, walked };
 
@@ -143,7 +146,7 @@ class PhotonTracer {
       // Those that fell through gaps are missing on the yarns, which get what others do.
       const float yarns = 1 - surface.material->gap;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
-                flight.power * (1 / (n * n * yarns)), sampler.one(kTime)};
+                flight.power * (1 / (n * n * yarns)), sampler.one(PhotonDimension::time)};
       if (!finite(photon.power)) return Fate::lost;
       return is_walked(flight, surface, rays) ? Fate::walked : Fate::lies;
     }
@@ -155,12 +158,15 @@ class PhotonTracer {
   bool start(uint32_t number, const Sampler& sampler, size_t& from, Flight& flight,
              Surface& surface, uint64_t& rays) const {
     const ShutterCurve& curve = scene_.camera().curve();
-    flight.ray.time = curve.time(sampler.one(kTime), curve.rolls() ? sampler.one(kRow) : 0.f);
-    const auto [hit, area_ratio] = starts_.sample((number + double(sampler.one(kStart))) / count_,
-                                                  sampler.two(kStartPoint), flight.ray.time, from);
+    flight.ray.time = curve.time(sampler.one(PhotonDimension::time),
+                                 curve.rolls() ? sampler.one(PhotonDimension::row) : 0.f);
+    const auto [hit, area_ratio] =
+        starts_.sample((number + double(sampler.one(PhotonDimension::start))) / count_,
+                       sampler.two(PhotonDimension::start_point), flight.ray.time, from);
     surface = scene_.surface(flight.ray, hit);
     const LightSample light =
-        scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
+        scene_.lights().sample_lamps(surface.position, sampler.one(PhotonDimension::lamp),
+                                     sampler.two(PhotonDimension::lamp_point));
     const float facing = dot(light.direction, surface.geometric_normal);
     if (!(light.pdf > 0) || !(facing > 0)) return false;
     ++rays;
@@ -189,8 +195,8 @@ class PhotonTracer {
   /// that bends the light; flux through the real surface has the cosine with that one's, so where
   /// the two differ it takes the ratio, and photons carry what paths find the other way.
   bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
-    if (++flight.interfaces > kMostInterfaces) return false;
-    const uint32_t dimension = kInterfaces + 2 * uint32_t(flight.interfaces);
+    if (++flight.interfaces > max_interfaces) return false;
+    const uint32_t dimension = PhotonDimension::interfaces + 2 * uint32_t(flight.interfaces);
     const V3f d = flight.ray.direction;
     const Medium &before = scene_.medium(flight.in),
                  &after = scene_.medium(flight.in ^ surface.body);
@@ -223,9 +229,9 @@ class PhotonTracer {
     }
     flight.power *= gain;
     flight.most_gain /= gain;
-    if (flight.interfaces > kLongFlight) {
-      if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
-      flight.power *= 1 / kLongSurvival;
+    if (flight.interfaces > long_flight) {
+      if (!(sampler.one(dimension + 1) < long_flight_survival)) return false;
+      flight.power *= 1 / long_flight_survival;
     }
     if (!reflect) flight.in ^= surface.body;
     flight.ray.origin = surface.leave(out);
@@ -237,7 +243,7 @@ class PhotonTracer {
   /// it falls through. Where water has a surface in their gaps paths keep what comes through.
   Hit next(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
     bool dry_gap = false;
-    for (int met = 0; met < kMostMet; ++met) {
+    for (int met = 0; met < max_crossings; ++met) {
       const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
       ++rays;
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
@@ -247,7 +253,7 @@ class PhotonTracer {
       absorb(flight, hit.distance);  // as paths do
       if (outwards) flight.in |= surface.body;
       const float gap = surface.material->gap;
-      if (gap > 0 && sampler.one(kFirstGap + flight.sheets++) < gap) {
+      if (gap > 0 && sampler.one(PhotonDimension::first_gap + flight.sheets++) < gap) {
         ++flight.gaps;
         flight.ray.origin = surface.leave(flight.ray.direction);
         dry_gap = !scene_.in_fluid(flight.in);
@@ -311,7 +317,7 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
   for (int round = 0; round < 4; ++round) {
     const float edge = 2 * radius;
     const double density = typical_count(photons, edge) / (double(edge) * edge);
-    radius = float(std::sqrt(wanted / (double(kPi) * density)));
+    radius = float(std::sqrt(wanted / (double(pi) * density)));
     radius = std::clamp(radius, least, std::max(least, diagonal / 10));
   }
   return radius;
@@ -327,9 +333,10 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, int rounds) {
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
   const unsigned most_hands =
-      kMostHands + unsigned(std::bit_width(unsigned(rounds)) - 1) / kMoreHands;
+      max_subsets_log2 + unsigned(std::bit_width(unsigned(rounds)) - 1) / rounds_per_doubling_log2;
   const double wanted = wanted_count(double(size_) * rounds);
-  while (hands_log2_ < most_hands && int(2 * hands()) <= samples && wanted >= kHand * 2 * hands())
+  while (hands_log2_ < most_hands && int(2 * hands()) <= samples &&
+         wanted >= min_subset_photons * 2 * hands())
     ++hands_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
   while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
@@ -342,7 +349,7 @@ void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
   for (const Photon& p : photons) ++count[bucket_of(cell_of(p.position))];
   const double wanted = wanted_count(double(size_) * rounds) / rounds;
   const uint32_t crowd =
-      std::max({1u, kFewest / uint32_t(rounds), uint32_t(kCrowd * 4 / kPi * wanted)});
+      std::max({1u, min_crowd / uint32_t(rounds), uint32_t(crowd_factor * 4 / pi * wanted)});
   for (const uint32_t c : count)
     radius2_.push_back(radius_ * radius_ * (c > crowd ? float(crowd) / float(c) : 1.f));
 }
@@ -387,7 +394,7 @@ GatheredLight PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& 
     return out;
   };
   const auto all = [](int) { return 1.f; };
-  const auto half = [](int k) { return kHalf[k]; };
+  const auto half = [](int k) { return half_sign[k]; };
   return {{total(0, all), total(1, all)}, {total(0, half), total(1, half)}};
 }
 
@@ -401,7 +408,7 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
   const uint32_t index = uint32_t(round.index), slot = index & ((1u << round.slots_log2) - 1);
-  const uint32_t round_seed = seed ^ kSeed ^ hash_bits(index >> round.slots_log2);
+  const uint32_t round_seed = seed ^ photon_seed ^ hash_bits(index >> round.slots_log2);
   const PhotonTracer tracer(scene, starts, count, round.rounds, walks);
   struct Found {
     Photon photon;
@@ -434,7 +441,7 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
     }
   Caustics out;
   if (light > 0) out.walked = float(walked / light);
-  if (walks == Walks::if_calm) walks = out.walked > kCalm ? Walks::some : Walks::none;
+  if (walks == Walks::if_calm) walks = out.walked > calm_fraction ? Walks::some : Walks::none;
   out.walks = walks;
   std::vector<Photon> left;
   for (const std::vector<Found>& part : found)

@@ -95,7 +95,7 @@ class PhotonMap {
       for (unsigned k = 0; k < 8; ++k)
         if (shares[k] > 0)
           f(V3f(flight[0][k], flight[1][k], flight[2][k]), V3f(p.red[k], p.green[k], p.blue[k]),
-            shares[k], kHalf[k]);
+            shares[k], half_sign[k]);
     });
   }
 
@@ -104,9 +104,9 @@ class PhotonMap {
                            const V3f& front) const;
 
  private:
-  static constexpr float kSameSurface = 0.7f;  // cosine between normals
-  static constexpr float kThickness = 0.5f;    // of the disc, radii: curved surfaces count whole
-  static constexpr float kHalf[8] = {1, -1, 1, -1, 1, -1, 1, -1};  // by place in a pack
+  static constexpr float same_surface = 0.7f;    // cosine between normals
+  static constexpr float disc_thickness = 0.5f;  // of the disc, radii: curved surfaces count whole
+  static constexpr float half_sign[8] = {1, -1, 1, -1, 1, -1, 1, -1};  // by place in a pack
 
   /// Also false for a point that is not finite.
   bool reaches(const V3f& p) const {
@@ -148,9 +148,9 @@ class PhotonMap {
   void for_each_pack_of(uint32_t first, uint32_t last, const V3f& point, const V3f& normal,
                         float radius2, const F& f) const {
     const __m256 one = _mm256_set1_ps(1), inverse_r2 = one / radius2;
-    const __m256 scale = _mm256_set1_ps(2 / (kPi * radius2));
-    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius2);
-    const __m256 same = _mm256_set1_ps(511 * kSameSurface * 511 * kSameSurface);
+    const __m256 scale = _mm256_set1_ps(2 / (pi * radius2));
+    const __m256 thick = _mm256_set1_ps(disc_thickness * disc_thickness * radius2);
+    const __m256 same = _mm256_set1_ps(511 * same_surface * 511 * same_surface);
     for (uint32_t at = first & ~7u; at < last; at += 8) {
       const PhotonPack& p = pack_[at / 8];
       const __m256 x = _mm256_load_ps(p.x.data()) - point.x;

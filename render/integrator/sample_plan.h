@@ -41,8 +41,8 @@ class SamplePlan {
   double expected() const { return expected_; }
 
  private:
-  static constexpr int kFirst = 32;  // samples before the scatter is trusted
-  static constexpr int kReach = 3;   // pixels around one that tell its scatter with it
+  static constexpr int first_samples = 32;  // samples before the scatter is trusted
+  static constexpr int radius = 3;          // pixels around one that tell its scatter with it
 
   std::vector<float> deviations(const std::vector<PixelSum>& pixels) const;
 

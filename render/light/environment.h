@@ -29,7 +29,7 @@ class AliasTable {
   };
 
  public:
-  static constexpr size_t kBytesAnEntry = sizeof(Bin) + sizeof(float);
+  static constexpr size_t bytes_per_entry = sizeof(Bin) + sizeof(float);
 
  private:
   std::vector<Bin> bins_;

@@ -12,11 +12,11 @@ namespace {
 
 /// Radiance, in means of what is no brighter, from which light may be a sun's: one path of 64 that
 /// meets less by chance adds at most half to its pixel.
-constexpr double kBright = 32;
+constexpr double min_contrast = 32;
 /// sr, a disc of 6.5 degrees: of directions that leave a surface one in 600 meets what is larger.
-constexpr double kLargest = 0.01;
+constexpr double max_solid_angle = 0.01;
 /// Of all light of the map. There are so at most a hundred suns, which every light sample weighs.
-constexpr double kLeastShare = 0.01;
+constexpr double min_fraction = 0.01;
 
 /// Integrals of a row's tent, which a bilinear lookup weighs its texels with, over the polar angle.
 struct RowMoments {
@@ -52,7 +52,7 @@ class SunFinder {
   }
 
   std::vector<MapSun> split() {
-    const double threshold = kBright * background();
+    const double threshold = min_contrast * background();
     Region bright;
     for (uint32_t t = 0; t < map_.texel.size(); ++t)
       if (luminance(map_.texel[t]) > threshold) bright.push_back(t);
@@ -91,11 +91,11 @@ class SunFinder {
     return sum;
   }
 
-  /// Mean of all that is at most kBright times as bright as it.
+  /// Mean of all that is at most min_contrast times as bright as it.
   double background() const {
     double mean = total_ / (4 * std::numbers::pi);
     for (int round = 0; round < 64; ++round) {
-      const Sum sum = sum_below(kBright * mean);
+      const Sum sum = sum_below(min_contrast * mean);
       const double next = sum.solid_angle > 0 ? sum.light / sum.solid_angle : 0;
       if (!(next < mean)) break;
       mean = next;
@@ -134,8 +134,8 @@ class SunFinder {
         size += solid_angle(t);
         light += solid_angle(t) * luminance(map_.texel[t]);
       }
-      if (light < kLeastShare * total_) continue;
-      (size <= kLargest ? suns : too_large).push_back(std::move(region));
+      if (light < min_fraction * total_) continue;
+      (size <= max_solid_angle ? suns : too_large).push_back(std::move(region));
     }
     for (const Region& region : too_large) find_regions(region, 2 * threshold, suns);
   }

@@ -34,9 +34,9 @@ class LightTree {
 
   /// Clusters that are weighed for a point, each light in one of them.
   struct Cut {
-    static constexpr uint32_t kMost = 8;
-    std::array<uint32_t, kMost> node;
-    std::array<float, kMost> weight;
+    static constexpr uint32_t max_nodes = 8;
+    std::array<uint32_t, max_nodes> node;
+    std::array<float, max_nodes> weight;
     uint32_t size = 0;
     float total = 0;
   };
@@ -60,7 +60,7 @@ class LightTree {
   void along(const V3f& origin, const V3f& direction, float reach, const Meet& meet) const;
 
  private:
-  static constexpr int kDeepest = 64;
+  static constexpr int max_depth = 64;
 
   struct Node {
     Imath::Box3f bounds;
@@ -106,7 +106,7 @@ LightTree::Cut LightTree::cut(int kinds, const V3f& from, const Importance& impo
   for (uint32_t k = 0; k < cut.size;) {
     const Node& node = nodes_[cut.node[k]];
     const V3f away = from - node.center;
-    if (!node.is_leaf() && cut.size < Cut::kMost && dot(away, away) < node.spread) {
+    if (!node.is_leaf() && cut.size < Cut::max_nodes && dot(away, away) < node.spread) {
       cut.node[cut.size++] = node.second;
       ++cut.node[k];
       continue;
@@ -170,7 +170,7 @@ void LightTree::along(const V3f& origin, const V3f& direction, float reach,
                       const Meet& meet) const {
   if (!has_[0]) return;
   const BoxTest box(origin, direction);
-  std::array<uint32_t, kDeepest + 1> waiting;
+  std::array<uint32_t, max_depth + 1> waiting;
   int left = 0;
   waiting[left++] = root_[0];
   while (left > 0) {

@@ -111,9 +111,9 @@ class Lights {
     }
     for (size_t s = 0; s < suns_.size() && suns == Suns::seen; ++s) {
       if (!suns_[s].covers(direction)) continue;
-      const float pdf = weighed ? choice_probability(shapes_.size() + s, from) /
-                                      (2 * kPi * suns_[s].one_minus_cos)
-                                : 0.f;
+      const float pdf =
+          weighed ? choice_probability(shapes_.size() + s, from) / (2 * pi * suns_[s].one_minus_cos)
+                  : 0.f;
       found(suns_[s].radiance, pdf, suns_[s].group);
     }
   }

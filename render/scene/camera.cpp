@@ -89,7 +89,7 @@ V2f ShutterCamera::aperture(const V2f& lens) const {
   } else {
     const float along = lens.x * float(blades_), first = std::floor(along), part = along - first;
     const auto corner = [&](float k) {
-      const float angle = 2 * kPi * k / float(blades_) + blade_rotation_;
+      const float angle = 2 * pi * k / float(blades_) + blade_rotation_;
       return V2f(std::sin(angle), std::cos(angle));
     };
     p = (corner(first) * (1 - part) + corner(first + 1) * part) * std::sqrt(lens.y);

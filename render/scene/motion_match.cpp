@@ -11,10 +11,10 @@ namespace {
 
 /// Pixels by which the way there and back may miss: half of one is lost to rounding each way, and
 /// what speeds up, or turns, comes back elsewhere by a part of its motion.
-constexpr float kMostMissed = 1.5f, kMissedShare = 0.25f;
+constexpr float max_missed = 1.5f, missed_fraction = 0.25f;
 /// Squared difference of guides, about 1 in size, that one surface may have between frames, and
 /// beyond it in units of their variance.
-constexpr float kMostUnlike = 0.25f, kNoiseUnlike = 9;
+constexpr float max_difference = 0.25f, noise_factor = 9;
 
 struct Place {
   int x = 0, y = 0;
@@ -44,7 +44,7 @@ bool leads_back(const NoisyPicture& from, const NoisyPicture& to, size_t p, size
     missed += m * m;
     length += from.motion[there][c][p] * from.motion[there][c][p];
   }
-  return std::sqrt(missed) <= kMostMissed + kMissedShare * std::sqrt(length);
+  return std::sqrt(missed) <= max_missed + missed_fraction * std::sqrt(length);
 }
 
 bool looks_alike(const NoisyPicture& from, const NoisyPicture& to, size_t p, size_t q) {
@@ -55,7 +55,7 @@ bool looks_alike(const NoisyPicture& from, const NoisyPicture& to, size_t p, siz
     unlike += d * d;
     noise += from.feature_variance[f][p] + scale * scale * to.feature_variance[f][q];
   }
-  return unlike <= kMostUnlike + kNoiseUnlike * noise;
+  return unlike <= max_difference + noise_factor * noise;
 }
 
 }  // namespace

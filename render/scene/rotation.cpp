@@ -9,8 +9,8 @@ namespace drench::render {
 
 namespace {
 
-constexpr double kStep = 1e-3;  // frames; a velocity is that of obstacle_surface
-constexpr int kMostSegments = 16;
+constexpr double time_step = 1e-3;  // frames; a velocity is that of obstacle_surface
+constexpr int max_segments = 16;
 
 V3d turned(const Pose& from, const Pose& to, const V3d& v) {
   return to.to_world(from.to_own(v + from.position)) - to.position;
@@ -22,15 +22,15 @@ Turn::Turn(const Obstacle& obstacle, int frame)
     : obstacle_(obstacle),
       frame_(frame),
       pose_(obstacle_pose(obstacle, frame)),
-      before_(obstacle_pose(obstacle, frame - kStep)),
-      after_(obstacle_pose(obstacle, frame + kStep)) {}
+      before_(obstacle_pose(obstacle, frame - time_step)),
+      after_(obstacle_pose(obstacle, frame + time_step)) {}
 
 Turn::At::At(const Turn& turn, double frames)
     : turn_(turn), frames_(frames), pose_(obstacle_pose(turn.obstacle_, turn.frame_ + frames)) {}
 
 V3f Turn::At::position(const V3f& p, const V3f& v) const {
   const V3d own = turn_.pose_.to_own(V3d(p));
-  const V3d posed = (turn_.after_.to_world(own) - turn_.before_.to_world(own)) / (2 * kStep);
+  const V3d posed = (turn_.after_.to_world(own) - turn_.before_.to_world(own)) / (2 * time_step);
   return V3f(pose_.to_world(own) + turned(turn_.pose_, pose_, V3d(v) - posed) * frames_);
 }
 
@@ -53,8 +53,8 @@ int Scene::segments_of(const TriangleMesh& mesh, const Turn& turn) const {
     }
   }
   bend *= camera_.pixels_per_radian();
-  if (bend < kVisibleMotion) return 0;
-  return std::min(kMostSegments, int(std::ceil(std::sqrt(bend / kVisibleMotion))));
+  if (bend < visible_motion) return 0;
+  return std::min(max_segments, int(std::ceil(std::sqrt(bend / visible_motion))));
 }
 
 void Scene::turn_object(SceneObject& object, const TriangleMesh& mesh, const Turn& turn,

@@ -30,7 +30,7 @@ class Turn {
  private:
   const Obstacle& obstacle_;
   int frame_;
-  Pose pose_, before_, after_;  // at the frame, and kStep about it
+  Pose pose_, before_, after_;  // at the frame, and time_step about it
 };
 
 }  // namespace drench::render

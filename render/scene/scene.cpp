@@ -17,13 +17,13 @@ namespace drench::render {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float infinity = std::numeric_limits<float>::infinity();
 /// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
-constexpr float kRelativeError = 16 * 0x1p-24f;
-constexpr float kSharedError = 2 * 0x1p-24f;
-constexpr float kNearEdge = 0.01f;  // of a barycentric coordinate
+constexpr float relative_position_error = 16 * 0x1p-24f;
+constexpr float shared_position_error = 2 * 0x1p-24f;
+constexpr float near_edge = 0.01f;  // of a barycentric coordinate
 /// Indices whose ratio is so near 1 have no facets that bend light.
-constexpr float kSameIndex = 1e-3f;
+constexpr float same_index = 1e-3f;
 
 /// Written by fours, as Embree reads it at once: a read of what narrower writes left waits for
 /// them.
@@ -209,7 +209,7 @@ void Scene::find_albedos() {
       const float eta = m.ior / medium_[k].ior;
       const bool coat = m.type == MaterialType::coated || m.type == MaterialType::cloth;
       if (coat) m.albedo_outside[k] = table(m.alpha, eta);
-      if (coat || std::abs(eta - 1) < kSameIndex) continue;
+      if (coat || std::abs(eta - 1) < same_index) continue;
       m.albedo_outside[k] = table(m.alpha, eta);
       m.albedo_inside[k] = table(m.alpha, 1 / eta);
     }
@@ -230,17 +230,18 @@ void Scene::find_features(Background background) {
                   [](const ShadingMaterial& m) { return m.has_facets() || m.is_fabric(); });
   has_gaps_ = std::any_of(materials_.begin(), materials_.end(),
                           [](const ShadingMaterial& m) { return m.gap > 0; });
-  features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
-              (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
-              (facets || has_gaps_ ? kGlossy : 0u) |
-              (background == Background::clear || has_mattes() ? kMattes : 0u);
+  features_ = (moving ? Feature::motion_blur : 0u) | (bodies_.empty() ? 0u : Feature::dielectric) |
+              (lights_.can_sample() ? Feature::sampled_lights : 0u) |
+              (camera_.has_lens() ? Feature::thin_lens : 0u) |
+              (facets || has_gaps_ ? Feature::glossy : 0u) |
+              (background == Background::clear || has_mattes() ? Feature::mattes : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   const float t = (ground_center_.y - origin.y) / direction.y;
-  if (!(t > 0)) return kInfinity;  // also the ray that starts on it, at 0, and the parallel one
+  if (!(t > 0)) return infinity;  // also the ray that starts on it, at 0, and the parallel one
   const V3f p = origin + direction * t - ground_center_;
-  return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
+  return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : infinity;
 }
 
 void Scene::meet(uint32_t object, const Ray& ray, Coherence coherence, Hit& nearest) const {
@@ -266,10 +267,10 @@ Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
 
 Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   Hit hit;
-  hit.distance = kInfinity;
+  hit.distance = infinity;
   if (has_ground_ && (world == World::whole || ground_matte_ != Matte::none)) {
     hit.distance = ground_distance(ray.origin, ray.direction);
-    if (hit.distance < kInfinity) hit.kind = Hit::Kind::ground;
+    if (hit.distance < infinity) hit.kind = Hit::Kind::ground;
   }
   const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
   if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
@@ -318,7 +319,7 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.uv = V2f(0);
   s.small = true;
   const V3f size = absolute(center) + absolute(V3f(way.x, way.y, way.z)) + V3f(sphere.w);
-  const V3f error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  const V3f error = size * relative_position_error + V3f(largest(size) * shared_position_error);
   s.reach = dot(absolute(s.geometric_normal), error);
 }
 
@@ -396,9 +397,10 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   const Packed position = a * w + b * hit.u + c * hit.v;
   Packed size = absolute(a) * w + absolute(b) * hit.u + absolute(c) * hit.v;
   if (object.moves()) size = size + Packed(object.way(hit, ray.time));
-  const Packed error = size * kRelativeError + Packed(_mm_set1_ps(largest(size) * kSharedError));
+  const Packed error =
+      size * relative_position_error + Packed(_mm_set1_ps(largest(size) * shared_position_error));
   position.store(s.position);
-  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(corner, hit, error, s);
+  if (s.body && std::min({w, hit.u, hit.v}) < near_edge) keep_off_edges(corner, hit, error, s);
   const Packed flat = normalized(corner.across());
   s.reach = dot(absolute(flat), error);
   const Packed smooth =
@@ -442,7 +444,7 @@ Bodies Scene::bodies_at(const V3f& point, float time) const {
 bool Scene::is_inside(uint32_t object, const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};
   // The mesh is closed and outward: a point is inside if the first side met is an inner one.
-  const Hit hit = meet(object, up, kInfinity);
+  const Hit hit = meet(object, up, infinity);
   return hit.kind != Hit::Kind::nothing && surface(up, hit).geometric_normal.y > 0;
 }
 

@@ -236,7 +236,7 @@ class Scene {
   unsigned features() const { return features_; }
 
  private:
-  static constexpr float kVisibleMotion = 0.1f;  // pixels over the shutter
+  static constexpr float visible_motion = 0.1f;  // pixels over the shutter
 
   void add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);

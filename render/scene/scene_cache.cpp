@@ -56,7 +56,7 @@ std::optional<SceneObject> KeptParts::take(const Digest& contents) {
 void KeptParts::give_back(SceneObject object) {
   const std::lock_guard lock(mutex_);
   const auto same_name = [&](const SceneObject& o) { return o.name == object.name; };
-  if (size_t(std::count_if(objects_.begin(), objects_.end(), same_name)) == kOfOneName)
+  if (size_t(std::count_if(objects_.begin(), objects_.end(), same_name)) == max_objects_per_name)
     objects_.erase(std::find_if(objects_.begin(), objects_.end(), same_name));
   objects_.push_back(std::move(object));
 }

@@ -35,7 +35,7 @@ class KeptParts {
  private:
   /// Of objects of one name: one for every frame that may be at work. More would only pile up
   /// where a sheet creeps too slowly to be blurred.
-  static constexpr size_t kOfOneName = 4;
+  static constexpr size_t max_objects_per_name = 4;
 
   EmbreeDevice device_;
   std::mutex mutex_;

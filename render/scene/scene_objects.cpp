@@ -14,9 +14,9 @@ namespace drench::render {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float infinity = std::numeric_limits<float>::infinity();
 /// Of foam: froth scatters light many times and absorbs next to none.
-constexpr float kFoamReflectance = 0.9f;
+constexpr float foam_reflectance = 0.9f;
 
 void check_embree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
@@ -58,7 +58,7 @@ void check_foam(const FoamFrame& foam) {
                             foam.velocity.size(), foam.radius.size()));
   for (size_t k = 0; k < n; ++k)
     if (!finite(foam.position[k]) || !finite(foam.velocity[k]) || !(foam.radius[k] > 0) ||
-        !(foam.radius[k] < kInfinity))
+        !(foam.radius[k] < infinity))
       throw Error(
           fmt::format("foam: particle {} is not finite or has no radius; make the foam anew", k));
 }
@@ -95,7 +95,7 @@ Imath::Box3f bounds_of(const SceneObject& object) {
 bool Scene::moves_visibly(const TriangleMesh& mesh) const {
   if (mesh.velocity.empty() || close_ == open_) return false;
   const float shutter = float((close_ - open_) / fps_);  // s
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  const float limit = visible_motion / (shutter * camera_.pixels_per_radian());
   for (const auto& t : mesh.triangle) {
     const V3f &a = mesh.position[t.x], &b = mesh.position[t.y], &c = mesh.position[t.z];
     const V3f middle = (a + b + c) / 3;
@@ -171,7 +171,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
 bool Scene::moves_visibly(const FoamFrame& foam) const {
   const float shutter = float((close_ - open_) / fps_);  // s
   if (shutter == 0) return false;
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  const float limit = visible_motion / (shutter * camera_.pixels_per_radian());
   for (size_t k = 0; k < foam.position.size(); ++k) {
     const float distance = (foam.position[k] - camera_.open().position).length();
     if (foam.velocity[k].length() > limit * std::max(0.f, distance - foam.radius[k])) return true;
@@ -182,7 +182,7 @@ bool Scene::moves_visibly(const FoamFrame& foam) const {
 void Scene::add_foam(const FoamFrame& foam) {
   check_foam(foam);
   ShadingMaterial white;
-  white.reflectance = V3f(kFoamReflectance);
+  white.reflectance = V3f(foam_reflectance);
   white.transmittance = white.absorption = V3f(0);
   materials_.push_back(white);
   material_names_.push_back("foam");

@@ -52,8 +52,8 @@ class HdrReader {
   /// Up to the end of the line, which must be there.
   std::string text_line() {
     std::string out;
-    constexpr size_t kLongest = 1 << 16;
-    while (at_ < file_.bytes().size() && out.size() < kLongest) {
+    constexpr size_t max_length = 1 << 16;
+    while (at_ < file_.bytes().size() && out.size() < max_length) {
       const char c = char(file_.bytes()[at_++]);
       if (c == '\n') {
         if (!out.empty() && out.back() == '\r') out.pop_back();
@@ -64,7 +64,7 @@ class HdrReader {
     file_.fail(
         fmt::format("its header has no end or a line of more than {} bytes; write it again or "
                     "give another",
-                    kLongest));
+                    max_length));
   }
 
   /// Numbers after the '='. Fewer than `count`, or such that are not finite, or not above 0 where
@@ -157,9 +157,9 @@ class HdrReader {
   }
 
   void read_line(std::vector<Rgbe>& line, int row) {
-    constexpr size_t kShortest = 8, kLongest = 0x7fff;  // that the new kind of runs is for
+    constexpr size_t min_length = 8, max_length = 0x7fff;  // that the new kind of runs is for
     Rgbe first = pixel(row);
-    if (line.size() >= kShortest && line.size() <= kLongest && first.r == 2 && first.g == 2 &&
+    if (line.size() >= min_length && line.size() <= max_length && first.r == 2 && first.g == 2 &&
         first.b < 128) {
       if (size_t(first.b) << 8 != (line.size() & ~size_t(255)) || first.e != (line.size() & 255))
         damaged(row);

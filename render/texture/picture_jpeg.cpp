@@ -21,7 +21,7 @@ namespace drench::render {
 namespace {
 
 /// A file of more scans only takes time: a picture that is refined bit by bit has a dozen or two.
-constexpr int kMostScans = 200;
+constexpr int max_scans = 200;
 
 /// What libjpeg is given and says. It reports errors by a jump, so nothing with a destructor may
 /// live here.
@@ -72,9 +72,9 @@ void on_message(j_common_ptr info, int level) {
 }
 
 void on_progress(j_common_ptr info) {
-  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= kMostScans) return;
+  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= max_scans) return;
   Jpeg& state = state_of(info);
-  std::snprintf(state.error, sizeof state.error, "it has more than %d scans", kMostScans);
+  std::snprintf(state.error, sizeof state.error, "it has more than %d scans", max_scans);
   std::longjmp(state.jump, 1);
 }
 

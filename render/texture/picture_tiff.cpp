@@ -19,7 +19,7 @@ namespace drench::render {
 namespace {
 
 /// Of one strip or tile, and of what libtiff takes for itself at once.
-constexpr uint64_t kLargestBlock = uint64_t(1) << 30;
+constexpr uint64_t max_block_size = uint64_t(1) << 30;
 /// The most bytes that one of a codec's stands for; none where only decoding tells.
 std::optional<double> largest_packing(int compression, uint32_t width) {
   switch (compression) {
@@ -95,7 +95,7 @@ struct Close {
 
 std::unique_ptr<TIFF, Close> open(Source& source) {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options, tmsize_t(kLargestBlock));
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options, tmsize_t(max_block_size));
   TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, &source);
   TIFFOpenOptionsSetWarningHandlerExtR(options, on_warning, &source);
   std::unique_ptr<TIFF, Close> tiff(TIFFClientOpenExt(
@@ -120,7 +120,7 @@ class TiffReader {
     Raster picture = kind();
     const Orientation place(orientation_, int(width_), int(height_));
     const uint64_t block = tiled_ ? uint64_t(TIFFTileSize64(tiff())) : strip_size();
-    if (block == 0 || block > kLargestBlock)
+    if (block == 0 || block > max_block_size)
       file_.fail(
           fmt::format("its strips or tiles have {} bytes each; write it again with smaller "
                       "ones",

@@ -56,7 +56,7 @@ TEST(Interface, ReflectsTotallyBeyondTheCriticalAngle) {
 
 struct RandomCloth {
   std::mt19937 random{9};
-  float uniform() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
+  float uniform() { return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random); }
   V3f direction() { return Basis({0, 0, 1}).world(sample_cone({uniform(), uniform()}, 2)); }
   ClothBsdf bsdf(float bend) {
     const V3f geometric = direction();

@@ -64,8 +64,8 @@ TEST(MotionBlur, IsLeftOutBelowATenthOfAPixel) {
     const Strip strip(4, travel);
     return Scene(strip.shot, 1001, strip.geometry, {}).features();
   };
-  EXPECT_EQ(features(0.05) & kMotionBlur, 0u);
-  EXPECT_NE(features(0.2) & kMotionBlur, 0u);
+  EXPECT_EQ(features(0.05) & Feature::motion_blur, 0u);
+  EXPECT_NE(features(0.2) & Feature::motion_blur, 0u);
 }
 
 TEST(MotionBlur, OfTheCameraEqualsThatOfTheScene) {

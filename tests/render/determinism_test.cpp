@@ -112,7 +112,7 @@ TEST(RenderedBits, OfEveryLightAndLensAreTheSameForAnyNumberOfThreads) {
 
 TEST(RenderedBits, DoNotChangeWhenUnusedFeaturesAreSwitchedOn) {
   RenderOptions forced;
-  forced.force_features = kFeatureCount - 1;
+  forced.force_features = Feature::combinations - 1;
   Everything scene;
   const Film with_water = render_frame(scene.shot, 1001, scene.geometry);
   EXPECT_EQ(render_frame(scene.shot, 1001, scene.geometry, forced).rgba, with_water.rgba);
@@ -131,7 +131,7 @@ TEST(RenderedBits, DoNotChangeWithAnIdleFeature) {
   scene.shot.camera.lens_radius = 0.0;
   scene.geometry.cloth.push_back({"empty", {}});
   EXPECT_EQ(Scene(scene.shot, 1001, scene.geometry, {}).features(),
-            unsigned(kDielectric | kSampledLights));
+            unsigned(Feature::dielectric | Feature::sampled_lights));
   EXPECT_EQ(render_frame(scene.shot, 1001, scene.geometry).rgba, plain.rgba);
 }
 

@@ -318,7 +318,7 @@ TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
   ASSERT_GT(share, 0.2);
   ASSERT_LT(share, 0.9);
   const auto number = [](std::mt19937& random) {
-    return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random);
+    return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random);
   };
   const ChiSquare fit = chi_square(
       7,

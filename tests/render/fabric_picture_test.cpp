@@ -83,12 +83,12 @@ TEST(WetSheet, HasTheBitsOfADryOneWhereItIsDry) {
   const auto features = [](const Draped& d) {
     return Scene(d.shot, 1001, d.geometry, {}).features();
   };
-  EXPECT_FALSE(features(without) & kGlossy);
-  EXPECT_FALSE(features(with) & kGlossy);
+  EXPECT_FALSE(features(without) & Feature::glossy);
+  EXPECT_FALSE(features(with) & Feature::glossy);
   const Film dry = render_frame(without.shot, 1001, without.geometry);
   EXPECT_EQ(render_frame(with.shot, 1001, with.geometry).rgba, dry.rgba);
   soak_along_x(sheet);
-  EXPECT_TRUE(features(with) & kGlossy);
+  EXPECT_TRUE(features(with) & Feature::glossy);
   EXPECT_NE(render_frame(with.shot, 1001, with.geometry).rgba, dry.rgba);
 }
 

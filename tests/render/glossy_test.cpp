@@ -297,17 +297,17 @@ TEST(GlossyBits, AreOthersOnlyWhereSomethingIsGlossy) {
   Stage stage;
   stage.stand(dielectric("thing", 1.5), ball({0, 0.4f, 0}, 0.4f));
   const auto features = [&] { return Scene(stage.shot, 1001, stage.geometry, {}).features(); };
-  EXPECT_FALSE(features() & kGlossy);
+  EXPECT_FALSE(features() & Feature::glossy);
   const Film smooth = render_frame(stage.shot, 1001, stage.geometry);
   stage.shot.material.back().roughness = 0.009;
-  EXPECT_FALSE(features() & kGlossy);
+  EXPECT_FALSE(features() & Feature::glossy);
   EXPECT_EQ(render_frame(stage.shot, 1001, stage.geometry).rgba, smooth.rgba);
   stage.shot.material.back().roughness = 0.1;
-  EXPECT_TRUE(features() & kGlossy);
+  EXPECT_TRUE(features() & Feature::glossy);
   EXPECT_NE(render_frame(stage.shot, 1001, stage.geometry).rgba, smooth.rgba);
   for (const MaterialType type : {MaterialType::metal, MaterialType::coated}) {
     stage.shot.material.back().type = type;
-    EXPECT_TRUE(features() & kGlossy);
+    EXPECT_TRUE(features() & Feature::glossy);
   }
 }
 

@@ -15,7 +15,7 @@ inline const V3f kUp(0, 0, 1);
 
 struct Uniform {
   std::mt19937& random;
-  float one() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
+  float one() { return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random); }
   V2f two() {
     const float x = one();
     return {x, one()};
@@ -43,7 +43,7 @@ template <class Sample>
 double furnace_of(const Sample& sample) {
   constexpr int kPoints = 1 << 18;
   constexpr double root = 1.2207440846057596;
-  const auto part = [](double x) { return std::min(float(x - std::floor(x)), kOneMinusEpsilon); };
+  const auto part = [](double x) { return std::min(float(x - std::floor(x)), one_minus_epsilon); };
   double sum = 0;
   for (int k = 0; k < kPoints; ++k) {
     const double x = k + 0.5;

@@ -235,7 +235,7 @@ TriangleMesh roof_tiles() {
   constexpr float kHalf = 5, kWidth = 2 * kHalf / kTiles, kBelow = -0.1f;
   for (int k = 0; k < kTiles; ++k) {
     const float x = -kHalf + kWidth * float(k), next = -kHalf + kWidth * float(k + 1);
-    const float rise = kWidth * std::tan(15 * kPi / 180), odd = k % 2 == 0 ? 0.f : rise;
+    const float rise = kWidth * std::tan(15 * pi / 180), odd = k % 2 == 0 ? 0.f : rise;
     const float y = 0.4f + odd, there = 0.4f + rise - odd;
     quad({V3f(x, y, kHalf), {next, there, kHalf}, {next, there, -kHalf}, {x, y, -kHalf}},
          V3f(0, 1, 0));
@@ -262,7 +262,7 @@ TriangleMesh roof_tiles() {
 // what the smooth normals say. Of 70 degrees half the faces see 85.
 TEST(Photons, PassAsManyAsSmoothNormalsSay) {
   Shot shot = pool_shot(kIndex, 0);
-  const double a = 70 * double(kPi) / 180;
+  const double a = 70 * double(pi) / 180;
   shot.light = {sun({std::sin(a), -std::cos(a), 0}, 0.5)};
   const double passes = 1 - double(fresnel_reflectance(float(std::cos(a)), float(kIndex)));
   const double expected = 2 * std::cos(a) * passes / (kIndex * kIndex);

@@ -95,7 +95,7 @@ TEST(PixelFilter, HasTheWindowsVariance) {
   constexpr int kSteps = 200000;
   for (int k = 0; k < kSteps; ++k)
     square += std::pow(filter.offset({float((k + 0.5) / kSteps), 0.5f}).x, 2);
-  const double w = PixelFilter::kWidth, a0 = 0.35875;
+  const double w = PixelFilter::width, a0 = 0.35875;
   const double expected =
       w * w / 12 + w * w / (2 * kPi64 * kPi64) * (-0.48829 + 0.14128 / 4 - 0.01168 / 9) / a0;
   EXPECT_NEAR(square / kSteps, expected, 0.005 * expected);  // 1024 straight pieces
@@ -146,7 +146,7 @@ double chi_square_deviate(const std::function<V3f(std::mt19937&)>& draw,
 }
 
 V2f uniform2(std::mt19937& random) {
-  std::uniform_real_distribution<float> u(0, kOneMinusEpsilon);
+  std::uniform_real_distribution<float> u(0, one_minus_epsilon);
   const float x = u(random);
   return {x, u(random)};
 }

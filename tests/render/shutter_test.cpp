@@ -33,7 +33,7 @@ TEST(ShutterCurve, DrawsTimesAsItIsOpen) {
     camera.shutter_opening = opening;
     camera.shutter_closing = closing;
     const ShutterCurve curve(camera);
-    for (const float u : {0.f, 0.01f, 0.2f, 0.37f, 0.5f, 0.81f, 0.99f, kOneMinusEpsilon}) {
+    for (const float u : {0.f, 0.01f, 0.2f, 0.37f, 0.5f, 0.81f, 0.99f, one_minus_epsilon}) {
       const float t = curve.time(u, 0.3f);
       EXPECT_GE(t, 0);
       EXPECT_LE(t, 1);
