@@ -29,9 +29,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kSamples = 64, kReferenceSamples = 100 * kSamples;
-constexpr int kFew = 16, kMany = 256;  // between them a sample's cost is measured
-constexpr uint32_t kSeeds = 3;
+constexpr int picture_samples = 64, reference_samples = 100 * picture_samples;
+constexpr int few_samples = 16, many_samples = 256;  // between them a sample's cost is measured
+constexpr uint32_t seeds = 3;
 
 struct Picture {
   std::string name;
@@ -152,8 +152,8 @@ json description_of(const Picture& picture, const fs::path& folder) {
                        {"v", vector_of(light.v)},
                        {"radiance", light.radiance.x}});
   }
-  return {{"width", kSmallWidth},
-          {"height", kSmallHeight},
+  return {{"width", small_width},
+          {"height", small_height},
           {"fps", shot.timeline.fps},
           {"shutter", shot.camera.shutter_close - shot.camera.shutter_open},
           {"threads", hardware_threads()},
@@ -237,15 +237,15 @@ struct Reference {
 
 Reference reference_of(Picture picture) {
   picture.shot.render.photons = 0;
-  const std::vector<render::Film> halves{ours(picture, kReferenceSamples, 1001).film,
-                                         ours(picture, kReferenceSamples, 1002).film};
+  const std::vector<render::Film> halves{ours(picture, reference_samples, 1001).film,
+                                         ours(picture, reference_samples, 1002).film};
   Reference reference{mean_of(halves), 0, variance_of_mean(halves)};
   reference.rel_mse = relative_mse(halves[0], reference.film);  // half of their mean is each
   return reference;
 }
 
 struct Contender {
-  double rel_mse = 0, cpu_s = 0, whole_cpu_s = 0;  // at kSamples; without and with set-up
+  double rel_mse = 0, cpu_s = 0, whole_cpu_s = 0;  // at picture_samples; without and with set-up
   double mean = 0, variance = 0;                   // of the picture; of this mean
   double off = 0, sigmas = 0;                      // from the reference's
 };
@@ -255,14 +255,15 @@ Contender contend(const Reference& reference, F rendered) {
   Contender out;
   std::vector<render::Film> many;
   double few_s = 1e30, many_s = 1e30, usual_s = 1e30;
-  for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
-    const Rendered usual = rendered(kSamples, seed), lots = rendered(kMany, 100 + seed);
-    out.rel_mse += (relative_mse(usual.film, reference.film) - reference.rel_mse) / kSeeds;
+  for (uint32_t seed = 1; seed <= seeds; ++seed) {
+    const Rendered usual = rendered(picture_samples, seed),
+                   lots = rendered(many_samples, 100 + seed);
+    out.rel_mse += (relative_mse(usual.film, reference.film) - reference.rel_mse) / seeds;
     usual_s = std::min(usual_s, usual.cpu_s), many_s = std::min(many_s, lots.cpu_s);
-    few_s = std::min(few_s, rendered(kFew, 200 + seed).cpu_s);
+    few_s = std::min(few_s, rendered(few_samples, 200 + seed).cpu_s);
     many.push_back(lots.film);
   }
-  out.cpu_s = (many_s - few_s) * kSamples / (kMany - kFew);
+  out.cpu_s = (many_s - few_s) * picture_samples / (many_samples - few_samples);
   out.whole_cpu_s = usual_s;
   const double right = mean_of(reference.film);
   out.mean = mean_of(mean_of(many)), out.variance = variance_of_mean(many);
@@ -273,7 +274,8 @@ Contender contend(const Reference& reference, F rendered) {
 
 Line line_of(const Contender& contender) {
   Line line;
-  line.resolution = fmt::format("{} x {} pixels, {} samples", kSmallWidth, kSmallHeight, kSamples);
+  line.resolution =
+      fmt::format("{} x {} pixels, {} samples", small_width, small_height, picture_samples);
   line.threads = hardware_threads();
   line.more["rel_mse"] = contender.rel_mse;
   line.more["cpu_s_of_samples"] = contender.cpu_s;

@@ -16,16 +16,16 @@ namespace drench::bench {
 
 namespace {
 
-constexpr int kReference = 800;              // samples
-constexpr int kFirst = 1001, kMeasured = 3;  // frames that are compared
-constexpr int kRadius = 2;                   // frames beside them
-constexpr float kFps = 24;
+constexpr int reference = 800;             // samples
+constexpr int first = 1001, measured = 3;  // frames that are compared
+constexpr int frame_radius = 2;            // frames beside them
+constexpr float fps = 24;
 
 /// Pleats that wander by their length in a second.
 render::FrameGeometry cloth_at(int frame) {
   TriangleMesh mesh = pleated_sheet();
   const float rate = 2 * float(std::numbers::pi);  // 1/s
-  const float phase = rate * float(frame - kFirst) / kFps;
+  const float phase = rate * float(frame - first) / fps;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     V3f& p = mesh.position[v];
     const float angle = 30 * p.x + 3 * p.y - phase, deep = 0.05f * (1.2f - p.y);
@@ -39,7 +39,7 @@ render::FrameGeometry cloth_at(int frame) {
 render::FrameGeometry pool_at(int frame) {
   TriangleMesh mesh = wavy_pool();
   const float rate = 8;  // 1/s
-  const float phase = rate * float(frame - kFirst) / kFps;
+  const float phase = rate * float(frame - first) / fps;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     V3f& p = mesh.position[v];
     if (p.y < 0.2f) continue;
@@ -61,8 +61,9 @@ Shot moving(Shot shot) {
   shot.material.back().checker = true;
   shot.material.back().checker_size = 0.5;
   const V3d from = shot.camera.position.keys.front().second, by(0.03, 0, 0);
-  shot.camera.position.keys = {{kFirst - kRadius, from - by * kRadius},
-                               {kFirst + kMeasured + kRadius, from + by * (kMeasured + kRadius)}};
+  shot.camera.position.keys = {
+      {first - frame_radius, from - by * frame_radius},
+      {first + measured + frame_radius, from + by * (measured + frame_radius)}};
   return shot;
 }
 
@@ -84,10 +85,10 @@ render::Film noisy_frame(const Sequence& sequence, int frame, int samples) {
 std::vector<render::Film> references(const Sequence& sequence) {
   Shot shot = sequence.shot;
   shot.render.denoise = false;
-  shot.render.samples = kReference;
+  shot.render.samples = reference;
   shot.render.seed = 1000;
   std::vector<render::Film> out;
-  for (int frame = kFirst; frame < kFirst + kMeasured; ++frame)
+  for (int frame = first; frame < first + measured; ++frame)
     out.push_back(render::render_frame(shot, frame, sequence.geometry(frame)));
   return out;
 }
@@ -118,10 +119,10 @@ Quality quality_of(const std::vector<render::Film>& films, const std::vector<ren
   return out;
 }
 
-/// Frames denoised by `radius` neighbours on either side; noisy[kRadius] is the first of them.
+/// Frames denoised by `radius` neighbours on either side; noisy[frame_radius] is the first of them.
 std::vector<render::Film> denoised(const std::vector<render::Film>& noisy, int radius) {
   std::vector<render::Film> out;
-  for (int f = kRadius; f < kRadius + kMeasured; ++f) {
+  for (int f = frame_radius; f < frame_radius + measured; ++f) {
     render::Neighbours neighbours;
     for (int k = 1; k <= radius; ++k) {
       neighbours.before.push_back(render::picture_of(noisy[size_t(f - k)]));
@@ -138,12 +139,12 @@ void emit_sequence(const Emit& emit, const Sequence& sequence) {
   const std::vector<render::Film> truth = references(sequence);
   for (const int samples : {16, 64}) {
     std::vector<render::Film> noisy;
-    for (int f = -kRadius; f < kMeasured + kRadius; ++f)
-      noisy.push_back(noisy_frame(sequence, kFirst + f, samples));
-    const std::vector<render::Film> bare(noisy.begin() + kRadius,
-                                         noisy.begin() + kRadius + kMeasured);
+    for (int f = -frame_radius; f < measured + frame_radius; ++f)
+      noisy.push_back(noisy_frame(sequence, first + f, samples));
+    const std::vector<render::Film> bare(noisy.begin() + frame_radius,
+                                         noisy.begin() + frame_radius + measured);
     Quality alone;
-    for (int radius = 0; radius <= kRadius; ++radius) {
+    for (int radius = 0; radius <= frame_radius; ++radius) {
       std::vector<render::Film> films;
       Line line;
       line.cost = measure([&] { films = denoised(noisy, radius); });
@@ -159,7 +160,7 @@ void emit_sequence(const Emit& emit, const Sequence& sequence) {
       line.more["rel_mse"] = quality.error;
       line.more["flicker"] = quality.flicker;
       line.more["noisy_rel_mse"] = quality_of(bare, truth).error;
-      line.more["cpu_s_a_frame"] = line.cost->cpu_s / kMeasured;
+      line.more["cpu_s_a_frame"] = line.cost->cpu_s / measured;
       emit(line);
     }
   }

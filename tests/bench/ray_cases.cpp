@@ -179,16 +179,16 @@ TileTime measure_tiles(const Shot& shot, const render::FrameGeometry& geometry) 
 
 void emit_share(const Emit& emit, const std::string& name, Shot shot,
                 const render::FrameGeometry& geometry, double needed) {
-  constexpr int kRuns = 11;
+  constexpr int run_count = 11;
   shot.render.width = 192;
   shot.render.height = 108;
   shot.render.samples = 16;
   std::vector<TileTime> runs;
-  for (int run = 0; run < kRuns; ++run) runs.push_back(measure_tiles(shot, geometry));
+  for (int run = 0; run < run_count; ++run) runs.push_back(measure_tiles(shot, geometry));
   const auto share = [](const TileTime& t) { return t.bare / t.traced; };
-  std::nth_element(runs.begin(), runs.begin() + kRuns / 2, runs.end(),
+  std::nth_element(runs.begin(), runs.begin() + run_count / 2, runs.end(),
                    [&](const TileTime& a, const TileTime& b) { return share(a) < share(b); });
-  const TileTime& median = runs[kRuns / 2];
+  const TileTime& median = runs[run_count / 2];
   Line line;
   line.method = name;
   line.resolution = "192 x 108 pixels, 16 samples";
@@ -216,7 +216,7 @@ const Registration render_rays_case{
 
 /// From the file of a mesh of a million triangles to the picture of one pixel.
 void render_load(const Emit& emit) {
-  constexpr int kRuns = 3;
+  constexpr int run_count = 3;
   const std::filesystem::path file = std::filesystem::temp_directory_path() /
                                      ("drench_render_load." + std::to_string(getpid()) + ".ply");
   for (const bool moving : {false, true}) {
@@ -229,21 +229,21 @@ void render_load(const Emit& emit) {
     shot.render.width = shot.render.height = shot.render.samples = 1;
     shot.render.photons = 0;
     std::vector<double> read, whole;
-    for (int run = 0; run < kRuns; ++run) {
+    for (int run = 0; run < run_count; ++run) {
       render::FrameGeometry geometry;
       read.push_back(measure([&] { geometry.fluid = read_mesh(file); }).cpu_s);
       whole.push_back(read.back() + render(shot, geometry, 1, 1).cost.cpu_s);
     }
-    std::nth_element(read.begin(), read.begin() + kRuns / 2, read.end());
-    std::nth_element(whole.begin(), whole.begin() + kRuns / 2, whole.end());
+    std::nth_element(read.begin(), read.begin() + run_count / 2, read.end());
+    std::nth_element(whole.begin(), whole.begin() + run_count / 2, whole.end());
     Line line;
     line.method = moving ? "mesh that moves" : "mesh that stands";
     line.resolution = std::to_string(pool.triangle.size()) + " triangles";
     line.threads = hardware_threads();
-    line.error = whole[kRuns / 2] / (1e-6 * double(pool.triangle.size()));
+    line.error = whole[run_count / 2] / (1e-6 * double(pool.triangle.size()));
     line.error_of = "CPU s per million triangles, from the file to the first ray";
     line.gate = 1.2;
-    line.more["read_cpu_s"] = read[kRuns / 2];
+    line.more["read_cpu_s"] = read[run_count / 2];
     emit(line);
   }
   std::filesystem::remove(file);
@@ -253,8 +253,8 @@ const Registration render_load_case{
     "render_load", "a frame of a million triangles, from the file to the first ray", render_load};
 
 void render_leaks(const Emit& emit) {
-  constexpr uint32_t kChains = 1u << 20;
-  constexpr int kLength = 100;
+  constexpr uint32_t chains = 1u << 20;
+  constexpr int length = 100;
   for (const bool waves : {false, true}) {
     Shot shot = pool_shot();
     shot.ground.present = false;
@@ -263,13 +263,13 @@ void render_leaks(const Emit& emit) {
     std::atomic<uint64_t> lost{0};
     Line line;
     line.cost = measure([&] {
-      tbb::parallel_for(0u, kChains, [&](uint32_t chain) {
+      tbb::parallel_for(0u, chains, [&](uint32_t chain) {
         const float x = render::unit_float(render::hash_bits(chain)) - 0.5f;
-        lost += render::test::loses_ray(scene, {3.9f * x, 0.1f, 0.3f}, chain, kLength);
+        lost += render::test::loses_ray(scene, {3.9f * x, 0.1f, 0.3f}, chain, length);
       });
     });
     line.method = waves ? "slab with waves" : "box";
-    line.resolution = std::to_string(uint64_t(kChains) * kLength) + " rays, " +
+    line.resolution = std::to_string(uint64_t(chains) * length) + " rays, " +
                       std::to_string(body.triangle.size()) + " triangles";
     line.threads = hardware_threads();
     line.error = double(lost);

@@ -6,7 +6,7 @@
 
 namespace drench::bench {
 
-inline constexpr int kSmallWidth = 96, kSmallHeight = 54;  // pixels
+inline constexpr int small_width = 96, small_height = 54;  // pixels
 
 /// A pleated sheet of 2 x cells x cells triangles.
 TriangleMesh pleated_sheet(uint32_t cells = 64);

@@ -196,7 +196,7 @@ TEST(GapInWater, ReflectsTotally) {
   // Not at an edge of the mesh.
   const V3d at(0.3, 0, 0.2);
   const auto from = [&](double degrees) {
-    return at + V3d(0.3 * std::tan(degrees * kPi64 / 180), 0.3, 0);
+    return at + V3d(0.3 * std::tan(degrees * pi64 / 180), 0.3, 0);
   };
   aim_narrow(pool.shot, from(60), at);
   pool.shot.light = {panel({0, -2, 0}, 8, 8, 1, Facing::up)};

@@ -189,23 +189,23 @@ TEST(GlossyLight, IsTheSameByAllEstimatorsWithALampInside) {
 TEST(GlossyLight, OfASquareIsTheIntegralOverIt) {
   const double alpha = 0.4;
   double expected = 0, white = 0;
-  constexpr int kSteps = 800;
+  constexpr int steps = 800;
   const auto lobe = [&](double tan2) {  // D G / (4 cos cos) cos of a half vector for cos(o) = 1
     const double cos = 1 / std::sqrt(1 + tan2), half2 = (1 - cos) / (1 + cos);  // tan^2(t/2)
     const double h2 = 1 / (1 + half2),
-                 d = alpha * alpha / (kPi64 * h2 * h2) / std::pow(alpha * alpha + half2, 2);
+                 d = alpha * alpha / (pi64 * h2 * h2) / std::pow(alpha * alpha + half2, 2);
     const double lambda = (std::sqrt(1 + alpha * alpha * tan2) - 1) / 2;
     return d / (1 + lambda) / 4;
   };
-  for (int i = 0; i < kSteps; ++i)
-    for (int j = 0; j < kSteps; ++j) {
-      const double x = -1 + 2 * (i + 0.5) / kSteps, z = -1 + 2 * (j + 0.5) / kSteps;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j) {
+      const double x = -1 + 2 * (i + 0.5) / steps, z = -1 + 2 * (j + 0.5) / steps;
       const double r2 = 1 + x * x + z * z;  // the lamp is 1 m above
-      expected += lobe(x * x + z * z) / (r2 * std::sqrt(r2)) * 4 / kSteps / kSteps;
+      expected += lobe(x * x + z * z) / (r2 * std::sqrt(r2)) * 4 / steps / steps;
     }
   for (int k = 0; k < 100000; ++k) {
     const double cos = (k + 0.5) / 100000;
-    white += lobe(1 / (cos * cos) - 1) * 2 * kPi64 / 100000;
+    white += lobe(1 / (cos * cos) - 1) * 2 * pi64 / 100000;
   }
   Shot shot = plain_shot(256);
   shot.material = {metal("ground", 1, std::sqrt(alpha))};

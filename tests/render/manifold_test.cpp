@@ -14,7 +14,7 @@
 namespace drench::render::test {
 namespace {
 
-constexpr double kIndex = 1.333;
+constexpr double water_index = 1.333;
 
 /// Water over a ground of reflectance 0.5.
 struct Pool {
@@ -23,7 +23,7 @@ struct Pool {
 
   explicit Pool(const TriangleMesh& water, float absorption = 0) {
     add_ground(shot, 0.5f, 6);
-    shot.material.push_back(dielectric("water", kIndex, V3f(absorption)));
+    shot.material.push_back(dielectric("water", water_index, V3f(absorption)));
     shot.camera.position = V3d(0, 3, 1);
     shot.camera.target = V3d(0, 0, 0);
     shot.camera.fov_deg = 20.0;
@@ -42,7 +42,7 @@ Surface ground_at(const Scene& scene, float x, float z) {
   return scene.surface(down, hit);
 }
 
-double passes(double a) { return 1 - double(fresnel_reflectance(float(std::cos(a)), kIndex)); }
+double passes(double a) { return 1 - double(fresnel_reflectance(float(std::cos(a)), water_index)); }
 
 // To a sun: along Snell's direction, d(water) / d(air) = cos(a) / (n^2 cos(b)), (1 - F) e^(-s d).
 TEST(Walks, FindTheSunThroughLevelWater) {
@@ -55,10 +55,10 @@ TEST(Walks, FindTheSunThroughLevelWater) {
     const auto way =
         walk_to_lamp(scene, ground_at(scene, 0.1f, 0.2f), 0, scene.fluid(), lamp, rays);
     ASSERT_TRUE(way) << a;
-    const double sin_b = std::sin(a) / kIndex, cos_b = std::sqrt(1 - sin_b * sin_b);
+    const double sin_b = std::sin(a) / water_index, cos_b = std::sqrt(1 - sin_b * sin_b);
     EXPECT_NEAR(way->direction.x, -sin_b, 1e-4);
     EXPECT_NEAR(way->direction.y, cos_b, 1e-4);
-    EXPECT_NEAR(way->density, std::cos(a) / (kIndex * kIndex * cos_b), 1e-3);
+    EXPECT_NEAR(way->density, std::cos(a) / (water_index * water_index * cos_b), 1e-3);
     EXPECT_NEAR(way->share.x, passes(a) * std::exp(-0.7 * 0.4 / cos_b), 1e-3);
     EXPECT_TRUE(std::isinf(way->distance));
     EXPECT_LE(rays, 2u);
@@ -68,15 +68,16 @@ TEST(Walks, FindTheSunThroughLevelWater) {
 // To a point at a height H over water of depth d: r = d tan(b) + (H - d) tan(a), sin(a) = n sin(b),
 // found by halving; the density is sin(b) db / (r dr).
 TEST(Walks, FindAPointThroughLevelWater) {
-  constexpr double kHeight = 2, kDepth = 0.4;
+  constexpr double lamp_height = 2, depth = 0.4;
   Pool pool(level_water());
-  pool.shot.light = {panel({0, kHeight, 0}, 1e-3, 1e-3, 50)};
+  pool.shot.light = {panel({0, lamp_height, 0}, 1e-3, 1e-3, 50)};
   const Scene scene = pool.scene();
   const auto reach = [&](double b) {
-    return kDepth * std::tan(b) + (kHeight - kDepth) * std::tan(std::asin(kIndex * std::sin(b)));
+    return depth * std::tan(b) +
+           (lamp_height - depth) * std::tan(std::asin(water_index * std::sin(b)));
   };
   for (const double r : {0.2, 1., 3.}) {
-    double low = 0, high = std::asin(1 / kIndex) - 1e-9;
+    double low = 0, high = std::asin(1 / water_index) - 1e-9;
     for (int k = 0; k < 60; ++k) (reach((low + high) / 2) < r ? low : high) = (low + high) / 2;
     const double slope = (reach(low + 1e-6) - reach(low - 1e-6)) / 2e-6;
     const Surface ground = ground_at(scene, float(r), 0);
@@ -86,9 +87,9 @@ TEST(Walks, FindAPointThroughLevelWater) {
     ASSERT_TRUE(way) << r;
     EXPECT_NEAR(way->direction.x, -std::sin(low), 1e-4) << r;
     EXPECT_NEAR(way->density / (std::sin(low) / (r * slope)), 1, 1e-3) << r;
-    const double a = std::asin(kIndex * std::sin(low));
+    const double a = std::asin(water_index * std::sin(low));
     EXPECT_NEAR(way->share.x, passes(a), 1e-3) << r;
-    EXPECT_NEAR(way->distance, (kHeight - kDepth) / std::cos(a), 1e-3) << r;
+    EXPECT_NEAR(way->distance, (lamp_height - depth) / std::cos(a), 1e-3) << r;
   }
 }
 
@@ -97,7 +98,7 @@ V3f lands(const Scene& scene, const Surface& from, const V3f& direction, float h
   const Ray ray{from.leave(direction), direction, 0};
   const Surface face = scene.surface(ray, scene.intersect(ray, Coherence::incoherent));
   const V3f n = interface_normal(direction, face.geometric_normal, face.shading_normal);
-  const V3f bent = split_at_interface(direction, n, 1 / float(kIndex)).refracted;
+  const V3f bent = split_at_interface(direction, n, 1 / float(water_index)).refracted;
   return face.position + bent * ((height - face.position.y) / bent.y);
 }
 
@@ -110,8 +111,8 @@ TEST(Walks, EndWhereRaysUnderWavesDo) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0, 1);
   int found = 0, close = 0;
-  constexpr int kPoints = 400;
-  for (int k = 0; k < kPoints; ++k) {
+  constexpr int points = 400;
+  for (int k = 0; k < points; ++k) {
     const Surface ground = ground_at(scene, 1.6f * unit(random) - 0.8f, 1.6f * unit(random) - 0.8f);
     const LampPoint lamp =
         scene.lights().sample_lamp_point(ground.position, 0.5f, {unit(random), unit(random)});
@@ -139,7 +140,7 @@ TEST(Walks, EndWhereRaysUnderWavesDo) {
     const V3f area = cross(moved[0], moved[1]);
     close += std::abs(way->density * std::sqrt(dot(area, area)) - 1) < 0.05 && off_slope < 0.05;
   }
-  EXPECT_GT(found, 0.95 * kPoints);
+  EXPECT_GT(found, 0.95 * points);
   EXPECT_GT(close, 0.95 * found);  // the others have an edge between their rays
 }
 

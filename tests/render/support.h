@@ -14,7 +14,7 @@
 
 namespace drench::render::test {
 
-inline constexpr double kPi64 = std::numbers::pi;
+inline constexpr double pi64 = std::numbers::pi;
 
 /// A shot that renders nothing yet: 16 x 16 pixels, no ground, no light, no blur, no photons, which
 /// err in all pixels together.
