@@ -95,7 +95,7 @@ class FilmPoints {
   std::array<V2f, samples_at_once> point_;
 };
 
-/// Calls back with the finished share of the samples that are expected, one tile at a time.
+/// Calls back with the finished fraction of the samples that are expected, one tile at a time.
 class Progress {
  public:
   explicit Progress(const std::function<void(double)>& report) : report_(report) {}
@@ -108,8 +108,8 @@ class Progress {
     const std::lock_guard lock(mutex_);
     done_ += samples;
     // What is expected may grow; what has been reported does not fall.
-    share_ = std::max(share_, std::min(double(done_) / expected_, 1.));
-    if (report_) report_(share_);
+    fraction_ = std::max(fraction_, std::min(double(done_) / expected_, 1.));
+    if (report_) report_(fraction_);
   }
   uint64_t samples() const { return done_; }
 
@@ -117,7 +117,7 @@ class Progress {
   const std::function<void(double)>& report_;
   std::mutex mutex_;
   uint64_t done_ = 0;
-  double expected_ = 1, share_ = 0;
+  double expected_ = 1, fraction_ = 0;
 };
 
 void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
@@ -195,7 +195,7 @@ void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& ph
       for (int round = sums.rounds.first(); round < sums.rounds.end(); ++round) {
         const bool last = round + 1 == sums.rounds.end();  // whose photons are told of
         if (!last && sums.is_through(round)) continue;
-        photons.turn_to(round, sums.rounds, rays);
+        photons.trace_round(round, sums.rounds, rays);
         job.path.walks = photons.caustics().walks;
         const auto until = [&] { return keeps ? Clock::now() + every : Clock::time_point::max(); };
         while (!render_tiles(job, round, sums, until(), rays, progress))
@@ -243,9 +243,9 @@ void denoise_plate(const Job& job, Sums& sums) {
   };
   if (sums.plate.has_catchers())
     sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)));
-  if (sums.plate.has_shares())
-    sums.plate.smooth_shares(clean(sums.plate.shares(job.width, job.height)),
-                             [&](size_t p) { return sums.layers.saw_something(p); });
+  if (sums.plate.has_coverage())
+    sums.plate.smooth_coverage(clean(sums.plate.coverage(job.width, job.height)),
+                               [&](size_t p) { return sums.layers.saw_something(p); });
   sums.settle();
 }
 
@@ -270,23 +270,6 @@ PlateFilm plate_film(const Shot& shot, const Scene& scene, size_t pixels) {
 }
 
 }  // namespace
-
-PixelFilter::PixelFilter() {
-  constexpr int steps = 4096;
-  std::array<double, steps + 1> cdf{};
-  for (int k = 0; k < steps; ++k) {
-    const double t = 2 * std::numbers::pi * (k + 0.5) / steps;
-    cdf[k + 1] = cdf[k] + 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) -
-                 0.01168 * std::cos(3 * t);
-  }
-  int k = 0;
-  for (int q = 0; q <= table_size; ++q) {
-    const double target = cdf[steps] * q / table_size;
-    while (k + 1 < steps && cdf[k + 1] < target) ++k;
-    const double within = (target - cdf[k]) / (cdf[k + 1] - cdf[k]);
-    inverse_[q] = float(((k + std::clamp(within, 0., 1.)) / steps - 0.5) * width);
-  }
-}
 
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                   const RenderOptions& options, RenderStats* stats,

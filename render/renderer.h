@@ -55,11 +55,11 @@ struct RenderStats {
   /// m: photons blur caustics by that at most, of several rounds in the mean; 0: all is right in
   /// the mean.
   double photon_radius = 0;
-  double walked = 0;  // share of photons' light that walks (manifold.h) would find
+  double walked = 0;  // fraction of photons' light that manifold walks (manifold.h) would find
 };
 
 /// Path-traces one frame. The same bits for any thread count and tile order.
-/// @param progress  called with the finished share 0..1; may throw to stop.
+/// @param progress  called with the finished fraction 0..1; may throw to stop.
 /// @throws Error for a map or texture that cannot be read, or a light or camera without extent.
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                   RenderStats* stats = nullptr, const std::function<void(double)>& progress = {});

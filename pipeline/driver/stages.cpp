@@ -118,7 +118,7 @@ class ShotStages final : public Stages {
       : shot_(shot),
         folder_(std::move(folder)),
         options_(options),
-        parts_(std::make_shared<render::KeptParts>(
+        cache_(std::make_shared<render::SceneCache>(
             render::PictureMemory::within(options.memory_gib))) {
     if (options.memory_gib > 0) {
       shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
@@ -201,7 +201,7 @@ class ShotStages final : public Stages {
     }
     render::RenderStats stats;
     render::RenderOptions options;
-    options.parts = parts_;
+    options.cache = cache_;
     options.checkpoint.file = folder / layout::frame_samples(shot_.name, frame);
     options.checkpoint.inputs = digest_of(attributes);
     const bool later = shot_.render.denoise && shot_.render.denoise_frames > 0;
@@ -288,7 +288,7 @@ class ShotStages final : public Stages {
   Shot shot_;
   fs::path folder_;
   StageOptions options_;
-  const std::shared_ptr<render::KeptParts> parts_;
+  const std::shared_ptr<render::SceneCache> cache_;
 };
 
 }  // namespace

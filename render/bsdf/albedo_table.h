@@ -11,12 +11,12 @@ namespace drench::render {
 
 class AlbedoTable {
  public:
-  struct Share {
+  struct Albedo {
     float reflected = 0, total = 1;  // of single scattering; total with what is refracted
   };
 
   /// @param cos  of the direction that light leaves by, 0..1
-  Share at(float cos) const;
+  Albedo at(float cos) const;
   /// Means over light from everywhere on this side: of reflected / total, and of total.
   float mean_reflected() const { return mean_reflected_; }
   float mean_total() const { return mean_total_; }
@@ -32,7 +32,7 @@ class AlbedoTable {
   template <class Fresnel>
   static AlbedoTable integrate(float alpha, float eta, const Fresnel& fresnel);
 
-  std::array<Share, nodes + 1> share_;
+  std::array<Albedo, nodes + 1> albedo_;
   float mean_reflected_ = 0, mean_total_ = 1;
 };
 

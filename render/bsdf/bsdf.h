@@ -3,7 +3,7 @@
 //   V3f value(const V3f& incoming, float& pdf) const   value x |cos|, and the density of `sample`
 //   Scatter sample(const V2f& u) const                 a rough dielectric takes one number more
 // and every surface, of one lobe or two,
-//   V3f albedo() const                                 share of the light that goes on, roughly
+//   V3f albedo() const                                 fraction of the light that goes on, roughly
 // The loop's parts are templates over them; which it is the material's type says.
 
 #include "render/vector.h"

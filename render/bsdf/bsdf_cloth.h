@@ -76,8 +76,8 @@ class ClothBsdf {
     // The smooth hemisphere reaches a little through the real surface: nothing comes from there.
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
     out.pdf = cos / pi * probability;
-    const V3f& share = reflect ? reflectance_ : transmittance_;
-    out.weight = share * (1 / probability);
+    const V3f& albedo = reflect ? reflectance_ : transmittance_;
+    out.weight = albedo * (1 / probability);
     return out;
   }
 

@@ -12,7 +12,7 @@ struct InterfaceSplit {
   float reflectance = 1;     // Fresnel's, unpolarised; 1 is total reflection, without `refracted`
 };
 
-/// Fresnel's share of unpolarised light, of the cosines on both sides.
+/// Fresnel's reflectance for unpolarised light, of the cosines on both sides.
 inline float fresnel_reflectance(float cos_in, float cos_out, float eta) {
   const float parallel = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
   const float perpendicular = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);

@@ -42,7 +42,7 @@ class MetalBsdf {
   MetalBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, float alpha,
             const MetalFresnel& fresnel, const AlbedoTable& albedo)
       : facets_(outgoing, geometric, shading, alpha), fresnel_(fresnel), gain_(1) {
-    // Light that misses the way out meets another facet, loses the mean there, and so on; a share
+    // Light that does not get out meets another facet, loses the mean there, and so on; a fraction
     // of `mean_total` leaves each time. Over what one facet sends back.
     const float single = albedo.at(facets_.cos()).total, leaves = albedo.mean_total();
     const V3f mean = fresnel.mean();

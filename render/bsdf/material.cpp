@@ -11,7 +11,7 @@ namespace drench::render {
 
 namespace {
 
-/// The dark squares of the built-in checker, as a share of the reflectance.
+/// The dark squares of the built-in checker, as a fraction of the reflectance.
 constexpr float dark_square = 0.45f;
 /// Below it facets would be narrower than float directions resolve: smooth.
 constexpr double min_roughness = 0.01;

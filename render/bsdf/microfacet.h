@@ -56,7 +56,7 @@ struct Ggx {
   }
 };
 
-/// One reflection off the facets, with Fresnel's share left to the caller.
+/// One reflection off the facets, with Fresnel's factor left to the caller.
 class GgxReflection {
  public:
   GgxReflection(const V3f& outgoing, const V3f& geometric, const V3f& shading, float alpha)

@@ -23,11 +23,11 @@ SheenTable::SheenTable(float roughness) : lobe_{1 / roughness, 1} {
           SheenLobe::sample({(float(k) + 0.5f) / lattice_points, 0.5f * around});  // even in y
       sum += double(lobe_.over_cos(o, i) * i.z / SheenLobe::pdf());
     }
-    share_[size_t(node)] = float(sum / lattice_points);
-    most = std::max(most, share_[size_t(node)]);
+    albedo_[size_t(node)] = float(sum / lattice_points);
+    most = std::max(most, albedo_[size_t(node)]);
   }
   lobe_.gain = 1 / most;
-  for (float& share : share_) share *= lobe_.gain;
+  for (float& albedo : albedo_) albedo *= lobe_.gain;
   constexpr int steps = 4096;
   double sum = 0;
   for (int k = 0; k < steps; ++k) {
@@ -41,7 +41,7 @@ float SheenTable::at(float cos) const {
   const float x = std::sqrt(std::clamp(cos, 0.f, 1.f)) * nodes;
   const int k = std::min(int(x), nodes - 1);
   const float t = x - float(k);
-  return share_[size_t(k)] + (share_[size_t(k) + 1] - share_[size_t(k)]) * t;
+  return albedo_[size_t(k)] + (albedo_[size_t(k) + 1] - albedo_[size_t(k)]) * t;
 }
 
 }  // namespace drench::render

@@ -47,7 +47,7 @@ class SheenTable {
   static constexpr int nodes = 64;  // over the root of the cosine
 
   SheenLobe lobe_;
-  std::array<float, nodes + 1> share_;
+  std::array<float, nodes + 1> albedo_;
   float mean_ = 0;
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 /// Of cellulose, cotton's and linen's; wool has 1.55, too, polyester more.
 constexpr double fibre_index = 1.55;
-/// Shares below it count as none: fibres that only absorb, or a sheet that lets nothing through.
+/// Fractions below it count as none: fibres that only absorb, or a sheet that lets nothing through.
 constexpr double min_fraction = 1e-7;
 
 /// What a smooth surface reflects of light from everywhere: the mean of Fresnel's over 2 cos dcos.
@@ -22,19 +22,19 @@ double mean_reflectance(double eta) {
   return sum;
 }
 
-struct Shares {
+struct Fractions {
   double reflected, transmitted;
 };
 
 /// Of a layer with a = 1 + k/s and scattering power s.
-Shares layer(double a_minus_1, double s) {
+Fractions layer(double a_minus_1, double s) {
   const double a = 1 + a_minus_1, b = std::sqrt(a_minus_1 * (a + 1));
   if (b * s < 1e-4) return {s / (1 + a * s), 1 / (1 + a * s)};  // sinh x = x: hardly absorbs
   const double e = std::exp(-2 * b * s), down = a * (1 - e) + b * (1 + e);
   return {(1 - e) / down, 2 * b * std::exp(-b * s) / down};
 }
 
-Shares wet(double r, double t, const WetFibres& fibres) {
+Fractions wet(double r, double t, const WetFibres& fibres) {
   if (r < min_fraction) return {0, std::pow(t, fibres.absorption)};
   const double a_minus_1 = std::max((1 - r - t) * (1 - r + t) / (2 * r), 0.);
   const double wet_a_minus_1 = a_minus_1 * fibres.absorption / fibres.scattering;
@@ -57,9 +57,10 @@ WetFibres::WetFibres(double liquid) {
 SheetColours wet_colours(const SheetColours& dry, const WetFibres& fibres) {
   SheetColours out;
   for (int c = 0; c < 3; ++c) {
-    const Shares shares = wet(double(dry.reflectance[c]), double(dry.transmittance[c]), fibres);
-    out.reflectance[c] = float(shares.reflected);
-    out.transmittance[c] = float(shares.transmitted);
+    const Fractions fractions =
+        wet(double(dry.reflectance[c]), double(dry.transmittance[c]), fibres);
+    out.reflectance[c] = float(fractions.reflected);
+    out.transmittance[c] = float(fractions.transmitted);
   }
   return out;
 }

@@ -28,17 +28,17 @@ YarnTable::YarnTable(float alpha) : facets_{alpha} {
     const double root = std::max(double(row) / rows, 1e-3);
     const float cos = float(root * root), sin = std::sqrt(1 - cos * cos);
     for (int column = 0; column <= columns; ++column) {
-      const float turn = 0.5f * pi * float(column) / columns;
-      share_[size_t(row)][size_t(column)] =
-          returned(facets_, {sin * std::cos(turn), sin * std::sin(turn), cos});
+      const float angle = 0.5f * pi * float(column) / columns;
+      albedo_[size_t(row)][size_t(column)] =
+          returned(facets_, {sin * std::cos(angle), sin * std::sin(angle), cos});
     }
   }
   constexpr int steps = 1024, angles = 48;
   double sum = 0;
   for (int k = 0; k < steps; ++k)
-    for (int turn = 0; turn < angles; ++turn) {
+    for (int angle = 0; angle < angles; ++angle) {
       const float cos = (float(k) + 0.5f) / steps;
-      sum += double(2 * cos * at(cos, (float(turn) + 0.5f) / angles)) / steps / angles;
+      sum += double(2 * cos * at(cos, (float(angle) + 0.5f) / angles)) / steps / angles;
     }
   mean_ = float(sum);
 }
@@ -47,15 +47,15 @@ float YarnTable::at(const V3f& o) const {
   return at(std::abs(o.z), std::atan2(std::abs(o.y), std::abs(o.x)) * (2 / pi));
 }
 
-/// @param turn  from along the yarn, 0, to across it, 1
-float YarnTable::at(float cos, float turn) const {
-  const float x = std::sqrt(std::clamp(cos, 0.f, 1.f)) * rows, y = turn * columns;
+/// @param angle  from along the yarn, 0, to across it, 1
+float YarnTable::at(float cos, float angle) const {
+  const float x = std::sqrt(std::clamp(cos, 0.f, 1.f)) * rows, y = angle * columns;
   const int row = std::min(int(x), rows - 1), column = std::min(int(y), columns - 1);
   const float s = x - float(row), t = y - float(column);
   const auto between = [t, column](const auto& of) {
     return of[size_t(column)] + (of[size_t(column) + 1] - of[size_t(column)]) * t;
   };
-  const float low = between(share_[size_t(row)]), high = between(share_[size_t(row) + 1]);
+  const float low = between(albedo_[size_t(row)]), high = between(albedo_[size_t(row) + 1]);
   return low + (high - low) * s;
 }
 

@@ -72,10 +72,10 @@ class YarnTable {
  private:
   static constexpr int rows = 48, columns = 16;  // over the root of the cosine, and the angle
 
-  float at(float cos, float turn) const;
+  float at(float cos, float angle) const;
 
   YarnFacets facets_;
-  std::array<std::array<float, columns + 1>, rows + 1> share_;
+  std::array<std::array<float, columns + 1>, rows + 1> albedo_;
   float mean_ = 0;
 };
 

@@ -8,7 +8,7 @@
 
 namespace drench::render {
 
-/// OpenColorIO's way from linear ACEScg to a display.
+/// OpenColorIO's transform from linear ACEScg to a display.
 class OcioView;
 
 /// The built-in view of linear ACEScg on an sRGB display, or one of an OpenColorIO config.

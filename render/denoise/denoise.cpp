@@ -37,7 +37,7 @@ constexpr float min_guide_variance = 1e-6f;
 constexpr float ridge = 1e-4f;
 /// Weight from which a neighbour's colour is one that a fit may have.
 constexpr float min_weight = 0.01f;
-constexpr int max_features = 9;              // with the two of the place in the picture
+constexpr int max_features = 9;              // with the two of the position in the picture
 constexpr int max_terms = max_features + 1;  // and the constant
 constexpr int max_columns = max_terms + 3;   // and the colours
 
@@ -62,7 +62,8 @@ struct Padded {
   }
 };
 
-/// A picture whose pixels join the windows, with the way to it from the picture that is denoised.
+/// A picture whose pixels join the windows, with the motion to it from the picture that is
+/// denoised.
 struct Source {
   const NoisyPicture* picture;
   const PixelMatch* match;  // null: that picture itself
@@ -449,7 +450,7 @@ void smooth_guides(const std::vector<Source>& sources, NoisyPicture& picture,
 
 /// @return glints, which are not in it any more
 std::vector<Plane> prepare(NoisyPicture& picture) {
-  std::vector<Plane> glints = tame_outliers(picture);
+  std::vector<Plane> glints = suppress_fireflies(picture);
   smooth_variance(picture);
   return glints;
 }

@@ -40,13 +40,13 @@ NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels);
 /// patches is that of Rousselle et al. 2012, equation 4. One bandwidth. Features are smoothed
 /// first, by a mean over what their own variance cannot tell apart: a sample of water mirrors or
 /// refracts, so that their noise is that of the picture. What noise is left weighs them less
-/// (ridge). Outliers are brought down first, and glints put back where they were (fireflies.h). The
-/// same bits for any thread count.
+/// (ridge). Fireflies are brought down first, and glints put back where they were (fireflies.h).
+/// The same bits for any thread count.
 ///
 /// Pixels of neighbours in time join the window, led there by their motion, in a smaller window of
-/// 9 x 9 since the same place comes first; a pixel that shows something else there counts nothing.
-/// What does not move as its surface does, a refraction say, is told by its patches. Neighbours are
-/// taken as they were rendered, so that a frame depends on those alone.
+/// 9 x 9 since the same position comes first; a pixel that shows something else there counts
+/// nothing. What does not move as its surface does, a refraction say, is told by its patches.
+/// Neighbours are taken as they were rendered, so that a frame depends on those alone.
 /// @return the three colours
 std::vector<NoisyPicture::Plane> denoise(NoisyPicture picture, Neighbours neighbours = {});
 

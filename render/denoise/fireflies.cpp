@@ -34,11 +34,11 @@ float beyond(std::vector<float>& list, size_t few) {
   return std::max(list[few], 0.f);
 }
 
-struct Outlier {
+struct Firefly {
   float factor = 1;     // takes it down to what is around it
   bool bright = false;  // as a glint is
   bool glint = false;
-  bool stays = false;  // its place is known
+  bool localized = false;  // its position is known
 };
 
 class Brightness {
@@ -60,7 +60,7 @@ class Brightness {
     for (const float median : block_) picture_ += median / float(block_.size());
   }
 
-  Outlier judge(size_t p, const std::vector<size_t>& window) {
+  Firefly classify(size_t p, const std::vector<size_t>& window) {
     if (window.size() <= half_of_window + 1) return {};
     around_.clear(), noisy_.clear();
     for (const size_t q : window) {
@@ -130,16 +130,16 @@ class Brightness {
 };
 
 /// Makes glints of what is as bright and hangs together with one.
-void follow_glints(int width, int height, std::vector<Outlier>& outliers) {
+void grow_glints(int width, int height, std::vector<Firefly>& fireflies) {
   std::vector<size_t> found;
-  for (size_t p = 0; p < outliers.size(); ++p)
-    if (outliers[p].glint) found.push_back(p);
+  for (size_t p = 0; p < fireflies.size(); ++p)
+    if (fireflies[p].glint) found.push_back(p);
   while (!found.empty()) {
     const size_t p = found.back();
     found.pop_back();
     for_each_near(width, height, p, window_radius, [&](size_t q) {
-      if (outliers[q].glint || !outliers[q].bright) return;
-      outliers[q].glint = true;
+      if (fireflies[q].glint || !fireflies[q].bright) return;
+      fireflies[q].glint = true;
       found.push_back(q);
     });
   }
@@ -162,15 +162,15 @@ void spread(int width, int height, size_t p, const V3f& lost, std::vector<Plane>
 
 }  // namespace
 
-std::vector<Plane> tame_outliers(NoisyPicture& picture) {
+std::vector<Plane> suppress_fireflies(NoisyPicture& picture) {
   Brightness bright(picture);
-  std::vector<Outlier> outliers(picture.variance[0].size());
+  std::vector<Firefly> fireflies(picture.variance[0].size());
   for_each_window(picture.width, picture.height, window_radius,
-                  [&](size_t p, const auto& window) { outliers[p] = bright.judge(p, window); });
-  follow_glints(picture.width, picture.height, outliers);
-  std::vector<Plane> glints(3, Plane(outliers.size(), 0.f));
-  for (size_t p = 0; p < outliers.size(); ++p) {
-    const Outlier& o = outliers[p];
+                  [&](size_t p, const auto& window) { fireflies[p] = bright.classify(p, window); });
+  grow_glints(picture.width, picture.height, fireflies);
+  std::vector<Plane> glints(3, Plane(fireflies.size(), 0.f));
+  for (size_t p = 0; p < fireflies.size(); ++p) {
+    const Firefly& o = fireflies[p];
     if (o.factor == 1) continue;
     V3f lost(0);
     for (size_t c = 0; c < 3; ++c) {
@@ -179,7 +179,7 @@ std::vector<Plane> tame_outliers(NoisyPicture& picture) {
       first[p] *= o.factor, second[p] *= o.factor;
       picture.variance[c][p] *= o.factor * o.factor;
     }
-    if (o.stays)
+    if (o.localized)
       for (size_t c = 0; c < 3; ++c) glints[c][p] += lost[int(c)];
     else if (o.glint)
       spread(picture.width, picture.height, p, lost, glints);

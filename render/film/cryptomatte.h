@@ -33,7 +33,7 @@ class CryptomattePixel {
   /// @param thing  index of a name, negative: nothing
   void add(int thing);
   void archive(CheckpointArchive& file);
-  /// Pairs of id and share, the largest first, of equals the lower index; zeros after the last.
+  /// Pairs of id and coverage, the largest first, of equals the lower index; zeros after the last.
   std::array<float, 2 * ranks> ranked(const std::vector<float>& ids, int samples) const;
 
  private:

@@ -26,7 +26,7 @@ class MemoryStream final : public Imf::OStream {
     at_ = end;
   }
   uint64_t tellp() override { return at_; }
-  void seekp(uint64_t place) override { at_ = size_t(place); }
+  void seekp(uint64_t offset) override { at_ = size_t(offset); }
 
   bool whole() const { return whole_; }
   std::string take() { return std::move(bytes_); }

@@ -28,7 +28,7 @@ struct Sums {
   /// Decides on the next pass. @return whether there is one
   bool begin_pass(double photon_error) {
     if (!plan.next(beauty(), photon_error)) return false;
-    rounds.begin_pass(plan.share());
+    rounds.begin_pass(plan.fraction());
     return true;
   }
   /// Samples that a pixel shall have after a round of this pass.

@@ -116,7 +116,8 @@ void LayerFilm::add_light(size_t pixel, const PathRecord& record) {
     caught_[pixel * groups + g] += Imath::V3d(record.matte.light[g]);
 }
 
-/// A group's part of the beauty: of what catchers have of it the share that the beauty has of all.
+/// A group's part of the beauty: of what catchers have of it the fraction that the beauty has of
+/// all.
 Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const {
   const size_t k = pixel * groups_.size() + group;
   Imath::V3d sum = light_[k];
@@ -184,9 +185,9 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
       for (size_t c = 0; c < n; ++c) out.back().value[n * p + c] = float(v[int(c)]);
     }
   };
-  const auto share = [&](const V3f& sum, size_t p) { return sum * (1.f / pixels[p].samples()); };
-  if (want_.albedo) fill("albedo", rgb, half, [&](size_t p) { return share(pixel_[p].albedo, p); });
-  if (want_.normal) fill("N", xyz, half, [&](size_t p) { return share(pixel_[p].normal, p); });
+  const auto mean = [&](const V3f& sum, size_t p) { return sum * (1.f / pixels[p].samples()); };
+  if (want_.albedo) fill("albedo", rgb, half, [&](size_t p) { return mean(pixel_[p].albedo, p); });
+  if (want_.normal) fill("N", xyz, half, [&](size_t p) { return mean(pixel_[p].normal, p); });
   if (want_.depth) fill("depth", {"Z"}, full, [&](size_t p) { return &pixel_[p].nearest.depth; });
   if (want_.position) fill("P", xyz, full, [&](size_t p) { return pixel_[p].nearest.position; });
   if (want_.motion) fill("motion", xyz, full, [&](size_t p) { return pixel_[p].nearest.motion; });

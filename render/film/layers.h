@@ -97,7 +97,7 @@ class LayerFilm {
   std::vector<Pixel> pixel_;
   std::vector<Imath::V3d> light_;       // by pixel, then group
   std::vector<Imath::V3d> caught_;      // that of shadow catchers in it; empty without any
-  std::vector<Imath::V3d> background_;  // shares of light from it; empty: not asked for
+  std::vector<Imath::V3d> background_;  // fractions of light from it; empty: not asked for
   bool catchers_;
 };
 

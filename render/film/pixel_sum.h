@@ -42,11 +42,11 @@ class PixelSum {
   float common_square(int channel) const {
     return whole_ < 2 ? 0 : mean(channel) * mean(channel) - variance(channel);
   }
-  /// This, less a share of the colours that the same samples add up to elsewhere.
-  PixelSum less(const PixelSum& other, const V3f& share) const {
+  /// This, less a fraction of the colours that the same samples add up to elsewhere.
+  PixelSum less(const PixelSum& other, const V3f& fraction) const {
     PixelSum out = *this;
-    for (int c = 0; c < 3; ++c) out.sum_[c] -= double(share[c]) * other.sum_[c];
-    for (int b = 0; b < max_batches; ++b) out.batch_[b] -= other.batch_[b] * share;
+    for (int c = 0; c < 3; ++c) out.sum_[c] -= double(fraction[c]) * other.sum_[c];
+    for (int b = 0; b < max_batches; ++b) out.batch_[b] -= other.batch_[b] * fraction;
     return out;
   }
   /// Means of a colour by every second batch: two pictures of independent errors. From two batches

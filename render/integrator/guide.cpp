@@ -9,7 +9,7 @@ constexpr float wave_angle = 0.08f;
 /// Aimed directions fall off as (core + h)^-2 in h = 1 - cos, out to a right angle: steep waves
 /// send a lamp's light far off the level course, and a lobe that ends would leave it to chance.
 constexpr float lobe_extent = 1;
-/// Share aimed where lamps give all the light. The rest finds what the lobes miss.
+/// Fraction aimed where lamps give all the light. The rest finds what the lobes miss.
 constexpr float max_guided = 0.8f;
 
 float lobe_density(float core, float h) {
@@ -76,7 +76,7 @@ float RefractedLightGuide::total_importance(const V3f& point) const {
   return total;
 }
 
-float RefractedLightGuide::share(const V3f& point) const {
+float RefractedLightGuide::probability(const V3f& point) const {
   const float lamps = total_importance(point);
   return lamps > 0 ? max_guided * lamps / (lamps + lights_.environment_importance()) : 0;
 }

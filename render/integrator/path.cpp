@@ -35,7 +35,7 @@ void trace(const Scene& scene, const PathSettings& settings, std::span<CameraSam
            uint64_t& rays) {
   using Path = PathTracer<features>;
   static_assert(std::is_trivially_destructible_v<Path>);
-  alignas(Path) std::byte place[paths_in_flight][sizeof(Path)];
+  alignas(Path) std::byte storage[paths_in_flight][sizeof(Path)];
   std::array<Path*, paths_in_flight> paths, going;
   size_t left = 0;
   const auto keep = [&](Path* path) {  // without a branch, which nothing foretells
@@ -43,7 +43,7 @@ void trace(const Scene& scene, const PathSettings& settings, std::span<CameraSam
     left += path->going();
   };
   for (size_t k = 0; k < samples.size(); ++k)
-    keep(paths[k] = new (place[k]) Path(scene, settings, samples[k]));
+    keep(paths[k] = new (storage[k]) Path(scene, settings, samples[k]));
   while (const size_t n = left) {
     for (size_t k = 0; k < n; ++k) going[k]->find();
     for (size_t k = 0; k < n; ++k) going[k]->fetch();

@@ -53,7 +53,7 @@ struct PathSettings {
   Background background = Background::sky;
   RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
   const PhotonMap* photons = nullptr;  // with it, paths leave out what lamps send through bodies
-  Walks walks = Walks::none;           // which find what the photons leave out
+  ManifoldWalks walks = ManifoldWalks::none;  // which find what the photons leave out
 };
 
 /// A camera sample to trace.

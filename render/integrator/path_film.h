@@ -30,10 +30,10 @@ class PathFilm {
 
   /// Ends the path on the plate.
   bool show_plate(const PathState& state) {
-    const V3f& share = state.throughput;
-    alpha_ -= (share.x + share.y + share.z) / 3;
+    const V3f& weight = state.throughput;
+    alpha_ -= (weight.x + weight.y + weight.z) / 3;
     if (!record_) return false;
-    record_->matte.background += share;
+    record_->matte.background += weight;
     record_->shaded = true;
     return false;
   }
@@ -73,7 +73,7 @@ class PathFilm {
     record_->shaded = true;
   }
 
-  /// The mirrored branch has an albedo of its own share.
+  /// The mirrored branch has an albedo of its own throughput.
   void begin_branch() {
     if constexpr (has_plate) plate.on_catcher = false;
     if (record_) record_->shaded = false;
@@ -98,7 +98,7 @@ class PathFilm {
   /// By how much one half of the photons adds more to that than the other.
   void split(const V3f& found) { split_ += found; }
 
-  [[no_unique_address]] std::conditional_t<has_plate, PlateWalk, std::monostate> plate;
+  [[no_unique_address]] std::conditional_t<has_plate, PlateState, std::monostate> plate;
 
  private:
   PathRecord* record_;

@@ -1,5 +1,5 @@
 #pragma once
-// A path on its way, for path.cpp.
+// The state of a path, for path.cpp.
 
 #include <array>
 
@@ -8,9 +8,9 @@
 namespace drench::render {
 
 /// Vertices before roulette may end a path: few are worth ending that may still leave the water for
-/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
-/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
-/// high because the few that last would otherwise come out of a glass as bright dots.
+/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the probability
+/// that survives it at most on long specular paths: total reflection alone would go on for ever. It
+/// is high because the few that last would otherwise come out of a glass as bright dots.
 inline constexpr int roulette_start = 10, long_path = 64;
 inline constexpr float long_path_survival = 0.99f;
 
@@ -19,8 +19,9 @@ inline constexpr float long_path_survival = 0.99f;
 /// nearly as much as all (docs/benchmarks.md).
 inline constexpr float small_branch = 0.25f;
 
-/// The share of a path's second and later diffuse vertices that gather photons: they are all over
-/// the scene, where each waits for memory, and light of light that a sample adds to many others.
+/// The fraction of a path's second and later diffuse vertices that gather photons: they are all
+/// over the scene, where each waits for memory, and light of light that a sample adds to many
+/// others.
 inline constexpr float later_gather_probability = 0.25f;
 
 /// Of a sample: more go round in a circle that rounding has closed, and would for ever.
@@ -59,21 +60,21 @@ struct PathState {
   bool dry_gap = false;
   int interfaces = 0;        // since the last diffuse surface
   bool has_photons = false;  // that surface, and nothing but smooth bodies since
-  bool clear = false;        // nothing but smooth bodies on the way, none of them a mirror
+  bool clear = false;        // nothing but smooth bodies on the path, none of them a mirror
   uint32_t branch = 0;
 };
 
 /// Cosine of the most that smooth bodies may bend the view for a plate to stand for what is seen
-/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate is another
-/// place; drops show the sky there.
+/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate shows
+/// something else; drops show the sky there.
 inline constexpr float max_bend_cosine = 0.9659258f;
 
 /// What a path must remember that may meet the plate.
-struct PlateWalk {
+struct PlateState {
   V3f view;                 // where the camera looks along this sample
   bool on_catcher = false;  // what is found comes from a shadow catcher
   bool caught = false;      // there was one:
-  PathState start;          // where the walk in the plate's world begins
+  PathState start;          // where the path in the plate's world begins
   Surface surface;
   Hit hit;
   World world = World::whole;  // now

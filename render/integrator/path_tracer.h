@@ -1,5 +1,5 @@
 #pragma once
-// A path: one camera sample, traced ray by ray. For path.cpp, which has several on their way.
+// A path: one camera sample, traced ray by ray. For path.cpp, which has several in flight.
 //
 // Radiance inside water is carried divided by the squared index (basic radiance), which stays
 // constant through interfaces. So lights inside water are given as basic radiance, and a camera
@@ -50,10 +50,10 @@ class PathTracer {
   PathSample sample() const { return film_.sample(); }
   uint64_t rays() const { return rays_; }
 
-  /// Traces the next ray, and then asks for what it met: others have their turn meanwhile.
+  /// Traces the next ray, and then asks for what it met: others are traced meanwhile.
   void find() {
     const Coherence coherence = state_.vertices == 0 ? Coherence::coherent : Coherence::incoherent;
-    // In its place: a copy of what is just being written would wait for it.
+    // Constructed in place: a copy of what is just being written would wait for it.
     new (&hit_) Hit(scene_.intersect(state_.ray, coherence, film_.world()));
     ++rays_;
     scene_.prefetch_triangle(hit_);
@@ -86,7 +86,7 @@ class PathTracer {
     return scatter(state, surface, hit) && survives(state);
   }
 
-  /// What is left to walk of the sample: the mirrored branch, or from the catcher on by the same
+  /// What is left to trace of the sample: the mirrored branch, or from the catcher on by the same
   /// numbers, in the plate's world.
   bool begin_next() {
     if constexpr (has_water)
@@ -110,7 +110,7 @@ class PathTracer {
 
   bool scatter(PathState& state, const Surface& surface, const Hit& hit) {
     if constexpr (has_water) {
-      // The side that was hit says for certain where the way leads on from. It led through the body
+      // The side that was hit says for certain where the path goes on from. It led through the body
       // only if the path had come in, too: a film that the shutter turns inside out is met from
       // within by rays from far away.
       const bool outwards = dot(state.ray.direction, surface.geometric_normal) > 0;
@@ -389,7 +389,7 @@ class PathTracer {
     const VertexNumbers u = numbers(state);
     if (photons) add_caustics(state, surface, u, base);
     add_direct(state, surface, state.in, u, coat, base);
-    const bool follow_coat = u[scatter_side].x < bsdf.coat_share();
+    const bool follow_coat = u[scatter_side].x < bsdf.coat_probability();
     state.interfaces = 0;
     state.has_photons = photons && !follow_coat;
     state.survival *= bsdf.albedo();
@@ -437,7 +437,7 @@ class PathTracer {
     const VertexNumbers u = numbers(state);
     if (photons) add_caustics(state, surface, u, bsdf.soft());
     add_direct(state, surface, state.in, u, bsdf.soft(), bsdf.glints());
-    const bool glint = u[scatter_side].x < bsdf.glint_share();
+    const bool glint = u[scatter_side].x < bsdf.glint_probability();
     state.interfaces = 0;
     state.has_photons = photons && !glint;
     state.survival *= bsdf.albedo();
@@ -477,9 +477,9 @@ class PathTracer {
     using Aim = RefractedLightGuide::Aim;
     const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior,
                                     state.has_photons ? Aim::meshes : Aim::all);
-    const float share = guide.share(surface.position);
-    if (share == 0) return bsdf.sample(uv);
-    return sample_mixed(bsdf, guide, share, surface.position, u[scatter_side].x, uv);
+    const float probability = guide.probability(surface.position);
+    if (probability == 0) return bsdf.sample(uv);
+    return sample_mixed(bsdf, guide, probability, surface.position, u[scatter_side].x, uv);
   }
 
   bool gathers_photons(const Surface& surface) const {
@@ -493,29 +493,29 @@ class PathTracer {
     if (!(u[light_choice].y < gathers)) return;
     GatheredLight light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
-    const unsigned hand = settings_.photons->hand_at(sampler_.one(time_dimension));
+    const unsigned subset = settings_.photons->subset_at(sampler_.one(time_dimension));
     if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
-      light = settings_.photons->irradiance(hand, at, normal, bsdf.front());
+      light = settings_.photons->irradiance(subset, at, normal, bsdf.front());
     else
       settings_.photons->for_each_near(
-          hand, at, normal, [&](const V3f& flight, const V3f& power, float share, float half) {
+          subset, at, normal, [&](const V3f& flight, const V3f& power, float weight, float half) {
             Irradiance one;
-            bsdf.receive(one, -flight, power * share);
+            bsdf.receive(one, -flight, power * weight);
             light.all.add(one, 1);
             light.split.add(one, half);
           });
     film_.split(state.throughput * bsdf.radiance(light.split) * (1 / gathers));
     V3f found = bsdf.radiance(light.all);
-    if (settings_.walks == Walks::some) found += walked_light(state, surface, u, bsdf);
+    if (settings_.walks == ManifoldWalks::some) found += manifold_light(state, surface, u, bsdf);
     film_.deposit(state.throughput * found * (1 / gathers), scene_.lights().caustics_group());
   }
 
-  /// What comes from a lamp by the way that a walk finds.
+  /// What comes from a lamp by the path that a manifold walk finds.
   template <class Bsdf>
-  V3f walked_light(const PathState& state, const Surface& surface, const VertexNumbers& u,
-                   const Bsdf& bsdf) {
-    const auto light = walk_to_lamps(scene_, surface, state.ray, state.in, u[light_choice].x,
-                                     u[light_point], rays_);
+  V3f manifold_light(const PathState& state, const Surface& surface, const VertexNumbers& u,
+                     const Bsdf& bsdf) {
+    const auto light = sample_manifold(scene_, surface, state.ray, state.in, u[light_choice].x,
+                                       u[light_point], rays_);
     float pdf = 0;
     const V3f found = light ? bsdf.value(light->direction, pdf) * light->radiance : V3f(0);
     return finite(found) ? found : V3f(0);

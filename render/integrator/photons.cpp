@@ -37,12 +37,12 @@ constexpr double max_disc_fraction = 0.1;
 constexpr float crowd_factor = 4;         // times the photons of the median one's disc
 constexpr uint32_t min_crowd = 400;       // photons of a crowded cell: noise above blur
 constexpr unsigned max_subsets_log2 = 3;  // log2: any eight samples in a row see all photons
-// Rounds after which hands are twice as many, log2: time is divided ever finer, and noise still
+// Rounds after which subsets are twice as many, log2: time is divided ever finer, and noise still
 // falls where eight samples in a row then miss photons of a round.
 constexpr unsigned rounds_per_doubling_log2 = 4;
-constexpr double min_subset_photons = 4;  // photons of the median one's disc in a hand, at least
-// Share of the light that walks must find to be taken: each costs a path four rays, and where much
-// is left to photons the error is theirs (render_walks).
+constexpr double min_subset_photons = 4;  // photons of the median one's disc in a subset, at least
+// Fraction of the light that walks must find to be taken: each costs a path four rays, and where
+// much is left to photons the error is theirs (render_walks).
 constexpr double calm_fraction = 0.8;
 constexpr uint32_t photon_seed = 0x70686f74u;  // photons and camera paths draw apart
 
@@ -68,7 +68,7 @@ class InterfacePoints {
   /// m^2, at shutter open
   float area() const { return upto_.empty() ? 0.f : float(upto_.back()); }
 
-  /// The triangle at a share of the area.
+  /// The triangle at a fraction of the area.
   size_t triangle_at(double u) const {
     const auto found = std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back());
     return std::min(size_t(found - upto_.begin()), upto_.size() - 1);
@@ -77,7 +77,7 @@ class InterfacePoints {
     Hit hit;
     float area_ratio;  // of the triangle at this time over shutter open
   };
-  /// @param u     share of the area
+  /// @param u     fraction of the area
   /// @param from  where the search begins: no triangle behind that of u. Becomes that of u
   Start sample(double u, const V2f& uv, float time, size_t& from) const {
     while (from + 1 < upto_.size() && upto_[from] <= u * upto_.back()) ++from;
@@ -111,13 +111,13 @@ struct Flight {
   uint32_t gaps = 0;    // and gaps that it fell through
   int lamp = 0;
   V3f start, lit_from;  // where it met the body, and from which direction
-  float most_gain = 0;  // of flux, that smooth normals in place of the real ones may still add
+  float most_gain = 0;  // of flux, that smooth normals instead of the real ones may still add
 };
 
 class PhotonTracer {
  public:
   PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count, int rounds,
-               Walks walks)
+               ManifoldWalks walks)
       : scene_(scene),
         starts_(starts),
         count_(count),
@@ -127,7 +127,7 @@ class PhotonTracer {
 
   enum class Fate { lost, lies, walked };
 
-  /// A photon, if it starts and comes to lie on something, and whether a walk finds its way. In
+  /// A photon, if it starts and comes to lie on something, and whether a walk finds its path. In
   /// their order they start along the bodies' surface: an even spread, and neighbours in memory one
   /// after the other.
   /// @param from  triangle of the photon before, or one before that of this
@@ -170,30 +170,30 @@ class PhotonTracer {
     const float facing = dot(light.direction, surface.geometric_normal);
     if (!(light.pdf > 0) || !(facing > 0)) return false;
     ++rays;
-    const float share =
+    const float transmittance =
         scene_.transmitted({surface.leave(light.direction), light.direction, flight.ray.time},
                            {light.distance, light.lamp});
-    if (share == 0) return false;
+    if (transmittance == 0) return false;
     flight.ray.direction = -light.direction;
     flight.most_gain = most_power_ / facing;
     flight.lamp = light.lamp, flight.start = surface.position, flight.lit_from = light.direction;
-    flight.power = light.radiance *
-                   (share * facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
+    flight.power = light.radiance * (transmittance * facing * area_ratio * starts_.area() /
+                                     (light.pdf * float(count_)));
     return true;
   }
 
   bool is_walked(const Flight& flight, const Surface& surface, uint64_t& rays) const {
-    if (walks_ == Walks::none || flight.interfaces > 1 || flight.gaps > 0) return false;
+    if (walks_ == ManifoldWalks::none || flight.interfaces > 1 || flight.gaps > 0) return false;
     if (!std::has_single_bit(flight.in)) return false;
     const LampPoint lamp = scene_.lights().lamp_point_of(size_t(flight.lamp), surface.position,
                                                          flight.start, flight.lit_from);
-    return walk_finds(scene_, surface, flight.ray.time, flight.in, lamp, flight.ray.direction,
-                      rays);
+    return manifold_walk_finds(scene_, surface, flight.ray.time, flight.in, lamp,
+                               flight.ray.direction, rays);
   }
 
   /// Reflects or refracts at a body's surface. Snell's law keeps n^2 cos dw about the normal
   /// that bends the light; flux through the real surface has the cosine with that one's, so where
-  /// the two differ it takes the ratio, and photons carry what paths find the other way.
+  /// the two differ it takes the ratio, and photons carry what paths find in reverse.
   bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
     if (++flight.interfaces > max_interfaces) return false;
     const uint32_t dimension = PhotonDimension::interfaces + 2 * uint32_t(flight.interfaces);
@@ -277,7 +277,7 @@ class PhotonTracer {
   const Scene& scene_;
   const InterfacePoints& starts_;
   uint32_t count_;
-  Walks walks_;
+  ManifoldWalks walks_;
   float most_power_;
 };
 
@@ -332,16 +332,16 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, int rounds) {
   radius_ = choose_radius(photons, reach_) / std::sqrt(std::sqrt(float(rounds)));
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
-  const unsigned most_hands =
+  const unsigned max_log2 =
       max_subsets_log2 + unsigned(std::bit_width(unsigned(rounds)) - 1) / rounds_per_doubling_log2;
   const double wanted = wanted_count(double(size_) * rounds);
-  while (hands_log2_ < most_hands && int(2 * hands()) <= samples &&
-         wanted >= min_subset_photons * 2 * hands())
-    ++hands_log2_;
+  while (subsets_log2_ < max_log2 && int(2 * subsets()) <= samples &&
+         wanted >= min_subset_photons * 2 * subsets())
+    ++subsets_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
-  while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
+  while ((size_t{mask_} + 1) * subsets() < size_) mask_ = 2 * mask_ + 1;
   choose_radii(photons, rounds);
-  deal(photons);
+  sort_into_buckets(photons);
 }
 
 void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
@@ -354,20 +354,20 @@ void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
     radius2_.push_back(radius_ * radius_ * (c > crowd ? float(crowd) / float(c) : 1.f));
 }
 
-void PhotonMap::deal(const std::vector<Photon>& photons) {
+void PhotonMap::sort_into_buckets(const std::vector<Photon>& photons) {
   const auto bucket = [&](size_t k) {
-    return hand_at(photons[k].turn) * buckets() + bucket_of(cell_of(photons[k].position));
+    return subset_at(photons[k].time_sample) * buckets() + bucket_of(cell_of(photons[k].position));
   };
-  first_.assign(hands() * buckets() + 1, 0);
+  first_.assign(subsets() * buckets() + 1, 0);
   for (size_t k = 0; k < size_; ++k) ++first_[bucket(k) + 1];
   for (size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
   std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
   pack_.resize((size_ + 7) / 8);
   for (size_t j = 0; j < size_; ++j) {
     const Photon& p = photons[j];
-    const V3f power = p.power * float(hands());
-    const uint32_t place = next[bucket(j)]++, k = place % 8;
-    PhotonPack& pack = pack_[place / 8];
+    const V3f power = p.power * float(subsets());
+    const uint32_t slot = next[bucket(j)]++, k = slot % 8;
+    PhotonPack& pack = pack_[slot / 8];
     pack.x[k] = p.position.x, pack.y[k] = p.position.y, pack.z[k] = p.position.z;
     pack.red[k] = power.x, pack.green[k] = power.y, pack.blue[k] = power.z;
     pack.normal[k] = pack_unit(p.normal);
@@ -375,17 +375,17 @@ void PhotonMap::deal(const std::vector<Photon>& photons) {
   }
 }
 
-GatheredLight PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& normal,
+GatheredLight PhotonMap::irradiance(unsigned subset, const V3f& point, const V3f& normal,
                                     const V3f& front) const {
   __m256 sum[2][3] = {};
-  for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
+  for_each_pack_near(subset, point, normal, [&](const PhotonPack& p, __m256 weight) {
     const __m256 along = unpack_unit<0>(p.flight) * front.x + unpack_unit<1>(p.flight) * front.y +
                          unpack_unit<2>(p.flight) * front.z;
     const __m256 there = _mm256_cmp_ps(along, _mm256_setzero_ps(), _CMP_LT_OQ);
-    const __m256 shares[2] = {_mm256_and_ps(there, share), _mm256_andnot_ps(there, share)};
+    const __m256 weights[2] = {_mm256_and_ps(there, weight), _mm256_andnot_ps(there, weight)};
     const std::array<float, 8>* const power[3] = {&p.red, &p.green, &p.blue};
     for (int side = 0; side < 2; ++side)
-      for (int c = 0; c < 3; ++c) sum[side][c] += shares[side] * _mm256_load_ps(power[c]->data());
+      for (int c = 0; c < 3; ++c) sum[side][c] += weights[side] * _mm256_load_ps(power[c]->data());
   });
   const auto total = [&](int side, const auto& factor) {
     V3f out(0);
@@ -402,8 +402,8 @@ bool can_trace_photons(const Scene& scene) {
   return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
-Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
-                       uint64_t& rays, const PhotonRound& round) {
+Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
+                       ManifoldWalks walks, uint64_t& rays, const PhotonRound& round) {
   constexpr uint32_t chunk = 4096;
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
@@ -441,12 +441,13 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
     }
   Caustics out;
   if (light > 0) out.walked = float(walked / light);
-  if (walks == Walks::if_calm) walks = out.walked > calm_fraction ? Walks::some : Walks::none;
+  if (walks == ManifoldWalks::if_calm)
+    walks = out.walked > calm_fraction ? ManifoldWalks::some : ManifoldWalks::none;
   out.walks = walks;
   std::vector<Photon> left;
   for (const std::vector<Found>& part : found)
     for (const Found& f : part)
-      if (walks == Walks::none || !f.walked) left.push_back(f.photon);
+      if (walks == ManifoldWalks::none || !f.walked) left.push_back(f.photon);
   out.photons = PhotonMap(std::move(left), samples, round.rounds);
   return out;
 }

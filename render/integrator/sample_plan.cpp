@@ -62,7 +62,7 @@ void SamplePlan::archive(CheckpointArchive& file) {
   file.column(wanted_);
 }
 
-double SamplePlan::share() const {
+double SamplePlan::fraction() const {
   if (wanted_.empty()) return 1;
   double sum = 0;
   for (const int wanted : wanted_) sum += wanted;

@@ -36,7 +36,7 @@ class SamplePlan {
   int wanted(size_t pixel) const { return wanted_.empty() ? most_ : wanted_[pixel]; }
   void archive(CheckpointArchive& file);
   /// Samples that all pixels will have after this pass, over the most.
-  double share() const;
+  double fraction() const;
   /// How many all pixels are expected to have at the end.
   double expected() const { return expected_; }
 

@@ -21,20 +21,20 @@ AliasTable::AliasTable(const std::vector<float>& weights)
   const size_t n = weights.size();
   double total = 0;
   for (float w : weights) total += w;
-  std::vector<double> share(n);
+  std::vector<double> scaled(n);
   std::vector<uint32_t> small, large;
   for (size_t k = 0; k < n; ++k) {
     const double p = total > 0 ? weights[k] / total : 1.0 / double(n);
     probability_[k] = float(p);
-    share[k] = p * double(n);
-    (share[k] < 1 ? small : large).push_back(uint32_t(k));
+    scaled[k] = p * double(n);
+    (scaled[k] < 1 ? small : large).push_back(uint32_t(k));
   }
   while (!small.empty() && !large.empty()) {
     const uint32_t low = small.back(), high = large.back();
     small.pop_back();
-    bins_[low] = {float(share[low]), high};
-    share[high] -= 1 - share[low];
-    if (share[high] < 1) {
+    bins_[low] = {float(scaled[low]), high};
+    scaled[high] -= 1 - scaled[low];
+    if (scaled[high] < 1) {
       large.pop_back();
       small.push_back(high);
     }
@@ -63,19 +63,19 @@ Environment::Environment(const Light& light, Sampling sampling, PictureMemory& m
       rotation_(float(light.rotation_deg / 360 - std::floor(light.rotation_deg / 360))) {
   if (!light.map.empty()) {
     read_map(light, memory);
-    if (light.split_suns) suns_ = split_suns(map_, rotation_);
-    for (MapSun& sun : suns_) sun.irradiance *= scale_;
+    if (light.split_suns) suns_ = extract_suns(map_, rotation_);
+    for (ExtractedSun& sun : suns_) sun.irradiance *= scale_;
   }
   const int columns = is_map() ? map_.width : gradient_columns;
   const int rows = is_map() ? map_.height : gradient_rows;
   V3f sum(0);
   for (int r = 0; r < rows; ++r) {
-    const float share = (row_cosine(r, rows) - row_cosine(r + 1, rows)) / 2 / float(columns);
+    const float weight = (row_cosine(r, rows) - row_cosine(r + 1, rows)) / 2 / float(columns);
     V3f row(0);
     for (int c = 0; c < columns; ++c)
       row += is_map() ? map_.texel[size_t(r) * columns + c] * scale_
                       : radiance(from_map({0.5f, (float(r) + 0.5f) / float(rows)}));
-    sum += row * share;
+    sum += row * weight;
   }
   mean_ = sum;
   if (sampling == Sampling::on) build_tables(columns, rows);

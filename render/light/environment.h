@@ -57,7 +57,7 @@ class Environment {
   /// Mean radiance over the sphere.
   V3f mean() const { return mean_; }
   /// Suns that were taken out, as they stand in the sky.
-  const std::vector<MapSun>& suns() const { return suns_; }
+  const std::vector<ExtractedSun>& suns() const { return suns_; }
   bool is_map() const { return map_.width > 0; }
 
  private:
@@ -69,7 +69,7 @@ class Environment {
   V3f scale_, horizon_, ground_, mean_;
   float rotation_ = 0;  // turns of the map, 0..1
   SkyMap map_;
-  std::vector<MapSun> suns_;
+  std::vector<ExtractedSun> suns_;
   int columns_ = 0, rows_ = 0;
   AliasTable row_table_;
   std::vector<AliasTable> column_tables_;

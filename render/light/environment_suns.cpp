@@ -44,24 +44,24 @@ RowMoments moments_of_row(int row, int rows) {
 
 using Region = std::vector<uint32_t>;  // texels
 
-class SunFinder {
+class SunExtractor {
  public:
-  SunFinder(SkyMap& map, float rotation) : map_(map), rotation_(rotation) {
+  SunExtractor(SkyMap& map, float rotation) : map_(map), rotation_(rotation) {
     for (int r = 0; r < map.height; ++r) rows_.push_back(moments_of_row(r, map.height));
     total_ = sum_below(std::numeric_limits<double>::infinity()).light;
   }
 
-  std::vector<MapSun> split() {
+  std::vector<ExtractedSun> extract() {
     const double threshold = min_contrast * background();
     Region bright;
     for (uint32_t t = 0; t < map_.texel.size(); ++t)
       if (luminance(map_.texel[t]) > threshold) bright.push_back(t);
-    std::vector<MapSun> suns;
+    std::vector<ExtractedSun> suns;
     if (bright.empty()) return suns;
     state_.resize(map_.texel.size());
     std::vector<Region> regions;
     find_regions(bright, threshold, regions);
-    for (const Region& region : regions) suns.push_back(take_out(region));
+    for (const Region& region : regions) suns.push_back(extract_sun(region));
     return suns;
   }
 
@@ -158,13 +158,13 @@ class SunFinder {
   /// Integral of direction over the tent of a texel.
   Imath::V3d moment(uint32_t texel) const {
     const RowMoments& row = rows_[texel / uint32_t(map_.width)];
-    const double turn = (texel % uint32_t(map_.width) + 0.5) / map_.width - rotation_ - 0.5;
-    const double half = step() / 2, phi = turn * 2 * std::numbers::pi;
+    const double angle = (texel % uint32_t(map_.width) + 0.5) / map_.width - rotation_ - 0.5;
+    const double half = step() / 2, phi = angle * 2 * std::numbers::pi;
     const double across = row.sine2 * step() * std::pow(std::sin(half) / half, 2);
     return {across * std::sin(phi), row.sine_cosine * step(), -across * std::cos(phi)};
   }
 
-  MapSun take_out(const Region& region) {
+  ExtractedSun extract_sun(const Region& region) {
     const V3f left = around(region);
     Imath::V3d vector[3] = {Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)}, toward(0);
     double sum = 0, square = 0;
@@ -180,7 +180,7 @@ class SunFinder {
       square += light * light * solid_angle(t);
     }
     toward.normalize();
-    MapSun out;
+    ExtractedSun out;
     out.toward = V3f(toward);
     for (int c = 0; c < 3; ++c) out.irradiance[c] = float(std::max(vector[c].dot(toward), 0.));
     out.solid_angle = float(sum * sum / square);  // that of a disc, if it is one
@@ -198,8 +198,8 @@ class SunFinder {
 
 }  // namespace
 
-std::vector<MapSun> split_suns(SkyMap& map, float rotation) {
-  return SunFinder(map, rotation).split();
+std::vector<ExtractedSun> extract_suns(SkyMap& map, float rotation) {
+  return SunExtractor(map, rotation).extract();
 }
 
 }  // namespace drench::render

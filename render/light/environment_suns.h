@@ -10,7 +10,7 @@
 namespace drench::render {
 
 /// What a region sends beyond its surroundings, as a disc far away.
-struct MapSun {
+struct ExtractedSun {
   V3f toward;             // unit, to its mean direction
   V3f irradiance;         // facing it; radiance of the map x sr
   float solid_angle = 0;  // sr
@@ -21,6 +21,6 @@ struct MapSun {
 /// sun whole and whose texels all have one hue. A map without suns stays as it is, to the bit.
 /// @param map       latitude-longitude, as Environment reads it: bilinear, +Y at the top
 /// @param rotation  of the map, turns
-std::vector<MapSun> split_suns(SkyMap& map, float rotation);
+std::vector<ExtractedSun> extract_suns(SkyMap& map, float rotation);
 
 }  // namespace drench::render

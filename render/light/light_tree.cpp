@@ -16,7 +16,7 @@ constexpr float relative_slack = 1e-5f;  // of boxes, for their rounding
 struct Cluster {
   Imath::Box3f bounds;
   double power = 0, flat = 0, square = 0;
-  V3d normal = V3d(0), place = V3d(0);
+  V3d normal = V3d(0), weighted_center = V3d(0);
 
   void add(const LightTree::Light& light) {
     bounds.extendBy(light.bounds);
@@ -25,10 +25,10 @@ struct Cluster {
     power += p;
     if (!is_black(light.normal)) flat += p;
     normal += V3d(light.normal) * p;
-    place += center * p;
+    weighted_center += center * p;
     square += p * (center.length2() + double(light.bounds.size().length2()) / 8);
   }
-  V3d center() const { return power > 0 ? place / power : V3d(bounds.center()); }
+  V3d center() const { return power > 0 ? weighted_center / power : V3d(bounds.center()); }
   double spread() const {
     const double least = 1e-12 * double(bounds.size().length2());
     return power > 0 ? std::max(square / power - center().length2(), least) : 0;
@@ -49,13 +49,13 @@ LightTree::LightTree(const std::array<std::vector<Light>, 2>& kinds) {
     has_[k] = first[k] < first[k + 1];
     if (has_[k]) root_[k] = build(lights, first[k], first[k + 1], 0);
   }
-  place_.resize(order_.size());
-  for (uint32_t place = 0; place < order_.size(); ++place) place_[order_[place]] = place;
+  slot_.resize(order_.size());
+  for (uint32_t slot = 0; slot < order_.size(); ++slot) slot_[order_[slot]] = slot;
 }
 
 uint32_t LightTree::build(std::span<const Light> lights, uint32_t first, uint32_t last, int depth) {
   Cluster all;
-  for (uint32_t place = first; place < last; ++place) all.add(lights[order_[place]]);
+  for (uint32_t slot = first; slot < last; ++slot) all.add(lights[order_[slot]]);
   const uint32_t number = uint32_t(nodes_.size());
   Node node;
   const V3f slack = (absolute(all.bounds.center()) + all.bounds.size()) * relative_slack;
@@ -75,7 +75,7 @@ uint32_t LightTree::build(std::span<const Light> lights, uint32_t first, uint32_
   return number;
 }
 
-/// Orders places from `first` to `last` so that those before the returned one are the first child.
+/// Orders slots from `first` to `last` so that those before the returned one are the first child.
 /// Deep down in halves: 2^32 lights end above max_depth.
 uint32_t LightTree::split(std::span<const Light> lights, uint32_t first, uint32_t last, int depth) {
   const auto begin = order_.begin() + first, end = order_.begin() + last;

@@ -26,7 +26,7 @@ class LightTree {
   };
 
   LightTree() = default;
-  /// @param kinds  lights whose number is their place in all of these together. Draws are from all
+  /// @param kinds  lights whose number is their index in all of these together. Draws are from all
   ///               kinds or from the first alone
   explicit LightTree(const std::array<std::vector<Light>, 2>& kinds);
 
@@ -69,11 +69,11 @@ class LightTree {
     V3f normal = V3f(0);           // mean of those that have one
     float flat = 0;                // power of these
     float round = 0;               // power of the others
-    uint32_t first = 0, last = 0;  // its lights' places
+    uint32_t first = 0, last = 0;  // its lights' slots
     uint32_t second = 0;           // child; the other one follows the node
 
     bool is_leaf() const { return last - first == 1; }
-    bool holds(uint32_t place) const { return first <= place && place < last; }
+    bool holds(uint32_t slot) const { return first <= slot && slot < last; }
   };
 
   uint32_t build(std::span<const Light> lights, uint32_t first, uint32_t last, int depth);
@@ -85,8 +85,8 @@ class LightTree {
     const Node& n = nodes_[node];
     return n.is_leaf() ? importance(order_[n.first]) : cluster_importance(n, from);
   }
-  /// Goes down from `node`; `first(share)` tells whether by the first child, whose share it is
-  /// given.
+  /// Goes down from `node`; `first(probability)` tells whether by the first child, whose
+  /// probability it is given.
   template <class Importance, class First>
   std::pair<uint32_t, float> descend(uint32_t node, const V3f& from, const Importance& importance,
                                      const First& first) const;
@@ -94,8 +94,8 @@ class LightTree {
   std::vector<Node> nodes_;
   std::array<uint32_t, 2> root_ = {};
   std::array<bool, 2> has_ = {};
-  std::vector<uint32_t> order_;  // the light at each place
-  std::vector<uint32_t> place_;  // of each light
+  std::vector<uint32_t> order_;  // the light in each slot
+  std::vector<uint32_t> slot_;   // of each light
 };
 
 template <class Importance>
@@ -129,9 +129,9 @@ std::pair<uint32_t, float> LightTree::descend(uint32_t node, const V3f& from,
     const uint32_t second = nodes_[node].second;
     const float a = weight(node + 1, from, importance), b = weight(second, from, importance);
     if (!(a + b > 0)) return {0, 0.f};
-    const float share = a / (a + b);
-    const bool by_first = first(node + 1, share);
-    probability *= by_first ? share : 1 - share;
+    const float first_probability = a / (a + b);
+    const bool by_first = first(node + 1, first_probability);
+    probability *= by_first ? first_probability : 1 - first_probability;
     node = by_first ? node + 1 : second;
   }
   return {order_[nodes_[node].first], probability};
@@ -144,23 +144,22 @@ std::pair<uint32_t, float> LightTree::choose(const Cut& cut, const V3f& from, fl
   while (k + 1 < cut.size && target >= cut.weight[k]) target -= cut.weight[k++];
   if (k >= cut.size) return {0, 0.f};
   float u = target / cut.weight[k];
-  const auto [light, probability] =
-      descend(cut.node[k], from, importance, [&](uint32_t, float share) {
-        const bool first = u < share;
-        u = first ? u / share : (u - share) / (1 - share);
-        return first;
-      });
+  const auto [light, probability] = descend(cut.node[k], from, importance, [&](uint32_t, float p) {
+    const bool first = u < p;
+    u = first ? u / p : (u - p) / (1 - p);
+    return first;
+  });
   return {light, probability * cut.weight[k]};
 }
 
 template <class Importance>
 float LightTree::part(const Cut& cut, const V3f& from, uint32_t light,
                       const Importance& importance) const {
-  const uint32_t place = place_[light];
+  const uint32_t slot = slot_[light];
   for (uint32_t k = 0; k < cut.size; ++k)
-    if (nodes_[cut.node[k]].holds(place))
+    if (nodes_[cut.node[k]].holds(slot))
       return cut.weight[k] * descend(cut.node[k], from, importance, [&](uint32_t first, float) {
-                               return nodes_[first].holds(place);
+                               return nodes_[first].holds(slot);
                              }).second;
   return 0;
 }

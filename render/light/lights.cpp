@@ -94,7 +94,7 @@ SunLight make_sun(const Light& light) {
   return out;
 }
 
-SunLight make_sun(const MapSun& sun) {
+SunLight make_sun(const ExtractedSun& sun) {
   SunLight out;
   out.toward = sun.toward;
   out.one_minus_cos = sun.solid_angle / (2 * pi);
@@ -193,7 +193,7 @@ bool SunLight::covers(const V3f& direction) const {
 }
 
 Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
-               KeptParts& parts) {
+               SceneCache& cache) {
   for (const Light& light : lights) {
     check_radiance(light);
     switch (light.type) {
@@ -218,10 +218,10 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         sample_environment_ =
             sample_environment == SampleEnvironment::always ||
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
-        environment_ = parts.environment(
+        environment_ = cache.environment(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
         environment_group_ = group_of(light);
-        for (const MapSun& sun : environment_->suns()) {
+        for (const ExtractedSun& sun : environment_->suns()) {
           suns_.push_back(make_sun(sun));
           suns_.back().group = environment_group_;
         }
@@ -301,8 +301,8 @@ float Lights::choice_probability(size_t index, const V3f& from) const {
   const bool alone =
       tree_.empty() || index >= environment_index() || (index >= shapes_.size() && index < lamps());
   if (alone) return importance(index, from) / total;
-  const size_t place = index < shapes_.size() ? index : index - suns_.size();
-  return tree_.part(cut, from, uint32_t(place), tree_importance(from)) / total;
+  const size_t number = index < shapes_.size() ? index : index - suns_.size();
+  return tree_.part(cut, from, uint32_t(number), tree_importance(from)) / total;
 }
 
 float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const {
@@ -316,8 +316,8 @@ Lights::Choice Lights::choose_of_many(size_t count, const V3f& from, float u_lig
   if (!(total > 0)) return {0, 0.f};
   float target = u_light * total;
   if (target < cut.total) {
-    const auto [place, part] = tree_.choose(cut, from, target, tree_importance(from));
-    return {place < shapes_.size() ? place : place + suns_.size(), part / total};
+    const auto [number, part] = tree_.choose(cut, from, target, tree_importance(from));
+    return {number < shapes_.size() ? number : number + suns_.size(), part / total};
   }
   target -= cut.total;
   size_t chosen = 0;

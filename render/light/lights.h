@@ -44,14 +44,14 @@ struct SunLight {
   bool covers(const V3f& direction) const;
 };
 
-class KeptParts;
+class SceneCache;
 
 class Lights {
  public:
   enum class SampleEnvironment { automatic, always, never };
 
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
-  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment, KeptParts& parts);
+  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment, SceneCache& cache);
 
   /// Adds an object that shines. @return its number among them
   int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {
@@ -154,9 +154,9 @@ class Lights {
   void for_each_alone(size_t count, const Visit& visit) const;
   LightTree::Cut cut(size_t count, const V3f& from) const;
   auto tree_importance(const V3f& from) const {
-    return [this, &from](uint32_t place) {
-      return place < shapes_.size() ? shapes_[place].importance(from)
-                                    : meshes_[place - shapes_.size()].importance(from);
+    return [this, &from](uint32_t number) {
+      return number < shapes_.size() ? shapes_[number].importance(from)
+                                     : meshes_[number - shapes_.size()].importance(from);
     };
   }
   LampPoint aim_at(size_t lamp, const V3f& from) const;

@@ -54,7 +54,7 @@ ShutterCurve::ShutterCurve(const Camera& camera)
       closing_(float(camera.shutter_closing)),
       late_(float(camera.rolling_shutter)),
       open_(1 - (opening_ + closing_) / 2),
-      share_(1 / (1 + late_)) {
+      row_fraction_(1 / (1 + late_)) {
   if (!(opening_ >= 0 && closing_ >= 0 && opening_ + closing_ <= 1 + 1e-6f))
     throw Error(
         fmt::format("camera: shutter_opening is {} and shutter_closing is {}; neither may be "

@@ -28,7 +28,7 @@ class ShutterCurve {
       t = std::sqrt(2 * opening_ * y);
     else if (y > open_ - closing_ / 2)
       t = 1 - std::sqrt(2 * closing_ * (open_ - y));
-    return (t + std::clamp(row, 0.f, 1.f) * late_) * share_;
+    return (t + std::clamp(row, 0.f, 1.f) * late_) * row_fraction_;
   }
   bool rolls() const { return late_ > 0; }
   /// Film frame at which the last row is done.
@@ -39,8 +39,8 @@ class ShutterCurve {
 
  private:
   float opening_, closing_, late_;
-  float open_;   // integral of the trapezoid
-  float share_;  // of one row's time in that of all
+  float open_;          // integral of the trapezoid
+  float row_fraction_;  // of one row's time in that of all
 };
 
 /// The camera at one instant.

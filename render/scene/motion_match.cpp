@@ -9,20 +9,20 @@ namespace drench::render {
 
 namespace {
 
-/// Pixels by which the way there and back may miss: half of one is lost to rounding each way, and
-/// what speeds up, or turns, comes back elsewhere by a part of its motion.
+/// Pixels by which the motion there and back may miss: half of one is lost to rounding each time,
+/// and what speeds up, or turns, comes back elsewhere by a part of its motion.
 constexpr float max_missed = 1.5f, missed_fraction = 0.25f;
 /// Squared difference of guides, about 1 in size, that one surface may have between frames, and
 /// beyond it in units of their variance.
 constexpr float max_difference = 0.25f, noise_factor = 9;
 
-struct Place {
+struct PixelPosition {
   int x = 0, y = 0;
   bool inside = false;
 };
 
 /// The pixel that a motion from a pixel ends in, the nearest of the picture if it is none.
-Place arrival(const NoisyPicture& picture, int x, int y, Side side) {
+PixelPosition arrival(const NoisyPicture& picture, int x, int y, Side side) {
   const size_t p = size_t(y) * size_t(picture.width) + size_t(x);
   const float u = float(x) + picture.motion[int(side)][0][p];
   const float v = float(y) + picture.motion[int(side)][1][p];
@@ -66,12 +66,11 @@ PixelMatch match_pixels(const NoisyPicture& from, const NoisyPicture& to, Side s
   tbb::parallel_for(0, from.height, [&](int y) {
     for (int x = 0; x < from.width; ++x) {
       const size_t p = size_t(y) * size_t(from.width) + size_t(x);
-      const Place place = arrival(from, x, y, side);
-      const size_t q = size_t(place.y) * size_t(to.width) + size_t(place.x);
+      const PixelPosition end = arrival(from, x, y, side);
+      const size_t q = size_t(end.y) * size_t(to.width) + size_t(end.x);
       match.pixel[p] = int32_t(q);
       match.same[p] =
-          place.inside && leads_back(from, to, p, q, side) && looks_alike(from, to, p, q) ? 1.f
-                                                                                          : 0.f;
+          end.inside && leads_back(from, to, p, q, side) && looks_alike(from, to, p, q) ? 1.f : 0.f;
     }
   });
   return match;

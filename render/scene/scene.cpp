@@ -59,13 +59,13 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
       fps_(shot.timeline.fps),
       keeps_velocities_(shot.layers.motion || shot.render.denoise),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
-      parts_(options.parts ? options.parts : std::make_shared<KeptParts>()),
+      cache_(options.cache ? options.cache : std::make_shared<SceneCache>()),
       lights_(shot.light,
               options.environment == EnvironmentSampling::always ? Lights::SampleEnvironment::always
               : options.environment == EnvironmentSampling::never
                   ? Lights::SampleEnvironment::never
                   : Lights::SampleEnvironment::automatic,
-              *parts_) {
+              *cache_) {
   if (!(close_ >= open_)) throw Error("camera: shutter_close lies before shutter_open; swap them");
   if (shot.ground.present) {
     has_ground_ = true;
@@ -113,11 +113,11 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
 
 Scene::~Scene() {
   for (SceneObject& object : objects_)
-    if (object.contents != Digest{}) parts_->give_back(std::move(object));
+    if (object.contents != Digest{}) cache_->give_back(std::move(object));
 }
 
 uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
-  materials_.push_back(parts_->material(shot, name));
+  materials_.push_back(cache_->material(shot, name));
   material_names_.push_back(name);
   return uint32_t(materials_.size() - 1);
 }
@@ -125,15 +125,15 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
 void Scene::add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   Matte matte = Matte::none;
-  std::optional<Turn> turn;
+  std::optional<RotationalMotion> motion;
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) {
       material = o.material, matte = o.matte;
-      if (o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1) turn.emplace(o, frame);
+      if (o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1) motion.emplace(o, frame);
     }
   const std::string what = fmt::format("obstacle '{}'", obstacle.name);
   add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material), matte,
-             turn ? &*turn : nullptr);
+             motion ? &*motion : nullptr);
   check_yarns(objects_.back(), what);
   add_wetness(objects_.back(), obstacle.mesh, what);
 }
@@ -196,7 +196,7 @@ void Scene::find_mesh_lights() {
 
 /// One table for each pair of roughness and index that facets of the frame have.
 void Scene::find_albedos() {
-  const auto table = [&](float alpha, float eta) { return parts_->albedo(alpha, eta); };
+  const auto table = [&](float alpha, float eta) { return cache_->albedo(alpha, eta); };
   for (ShadingMaterial& m : materials_) {
     if (!m.has_facets()) continue;
     if (m.type == MaterialType::metal) {
@@ -307,10 +307,10 @@ namespace {
 
 /// Where a ray met a sphere, on it to rounding.
 void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surface& s) {
-  Imath::V4f sphere = object.sphere[hit.triangle], way(0);
+  Imath::V4f sphere = object.sphere[hit.triangle], displacement(0);
   if (object.moves()) {
-    way = object.sphere_close[hit.triangle] - sphere;
-    sphere += way * ray.time;
+    displacement = object.sphere_close[hit.triangle] - sphere;
+    sphere += displacement * ray.time;
   }
   const V3f center(sphere.x, sphere.y, sphere.z);
   s.geometric_normal = s.shading_normal =
@@ -318,7 +318,8 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.position = center + s.geometric_normal * sphere.w;
   s.uv = V2f(0);
   s.small = true;
-  const V3f size = absolute(center) + absolute(V3f(way.x, way.y, way.z)) + V3f(sphere.w);
+  const V3f size = absolute(center) +
+                   absolute(V3f(displacement.x, displacement.y, displacement.z)) + V3f(sphere.w);
   const V3f error = size * relative_position_error + V3f(largest(size) * shared_position_error);
   s.reach = dot(absolute(s.geometric_normal), error);
 }
@@ -364,7 +365,7 @@ std::pair<Packed, Packed> SceneObject::moved_vertex(uint32_t vertex, float time)
           between(key[first].normal, key[first + 1].normal, at)};
 }
 
-V3f SceneObject::way(const Hit& hit, float time) const {
+V3f SceneObject::displacement(const Hit& hit, float time) const {
   const size_t first = key.empty() ? 0 : segment(time);
   const auto& open = key.empty() ? position : key[first].position;
   const auto& close = key.empty() ? position_close : key[first + 1].position;
@@ -396,7 +397,7 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   const float w = 1 - hit.u - hit.v;
   const Packed position = a * w + b * hit.u + c * hit.v;
   Packed size = absolute(a) * w + absolute(b) * hit.u + absolute(c) * hit.v;
-  if (object.moves()) size = size + Packed(object.way(hit, ray.time));
+  if (object.moves()) size = size + Packed(object.displacement(hit, ray.time));
   const Packed error =
       size * relative_position_error + Packed(_mm_set1_ps(largest(size) * shared_position_error));
   position.store(s.position);
@@ -416,8 +417,8 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   s.triangle = hit.triangle;
   if (s.material->normal_map && !object.uv.empty()) {
     const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
-    const float turn = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
-    const V3f e = (b - a).unpacked() * turn, f = (c - a).unpacked() * turn;
+    const float side = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
+    const V3f e = (b - a).unpacked() * side, f = (c - a).unpacked() * side;
     map_normal(s, e * q.y - f * p.y, f * p.x - e * q.x);
   }
   s.contact = !object.contact.empty() && object.contact[hit.triangle];

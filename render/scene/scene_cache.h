@@ -1,6 +1,6 @@
 #pragma once
 // What the frames of a shot share: pictures, tables and Embree scenes of objects that stand. Safe
-// from several frames at once; a frame has the same bits with parts kept and without.
+// from several frames at once; a frame has the same bits with a cache and without.
 
 #include <map>
 #include <memory>
@@ -15,10 +15,10 @@
 
 namespace drench::render {
 
-class KeptParts {
+class SceneCache {
  public:
   /// @param picture_memory  what all pictures may take together
-  explicit KeptParts(PictureMemory picture_memory = {});
+  explicit SceneCache(PictureMemory picture_memory = {});
 
   const EmbreeDevice& device() const { return device_; }
   /// find_material of the shot, read once.

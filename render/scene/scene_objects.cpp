@@ -125,12 +125,12 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
 }
 
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                       uint32_t material, Matte matte, const Turn* turn) {
+                       uint32_t material, Matte matte, const RotationalMotion* motion) {
   check_mesh(mesh, what);
-  const int segments = turn ? segments_of(mesh, *turn) : 0;
+  const int segments = motion ? segments_of(mesh, *motion) : 0;
   const bool moves = segments > 0 || moves_visibly(mesh);
   const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);
-  if (std::optional<SceneObject> kept = moves ? std::nullopt : parts_->take(contents)) {
+  if (std::optional<SceneObject> kept = moves ? std::nullopt : cache_->take(contents)) {
     kept->material = material;
     kept->light = -1;
     kept->matte = matte;
@@ -158,7 +158,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
     return moved;
   };
   if (segments > 0) {
-    turn_object(object, mesh, *turn, segments);
+    add_motion_keys(object, mesh, *motion, segments);
   } else if (moves) {
     object.position = at(open_);
     object.position_close = at(close_);
@@ -209,7 +209,7 @@ void Scene::add_foam(const FoamFrame& foam) {
 }
 
 EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  EmbreeGeometry geometry(rtcNewGeometry(cache_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
   const std::vector<const V3f*> keys = object.keys();
   rtcSetGeometryTimeStepCount(geometry.get(), unsigned(keys.size()));
@@ -223,7 +223,7 @@ EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
 }
 
 EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
+  EmbreeGeometry geometry(rtcNewGeometry(cache_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
   unsigned step = 0;
   for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
@@ -239,14 +239,14 @@ void Scene::build(SceneObject& object) {
   const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
   rtcSetGeometryMask(geometry.get(), 0xffffffffu);
   rtcCommitGeometry(geometry.get());
-  object.scene.reset(rtcNewScene(parts_->device().get()));
+  object.scene.reset(rtcNewScene(cache_->device().get()));
   if (materials_[object.material].type == MaterialType::dielectric)
     rtcSetSceneFlags(object.scene.get(), RTC_SCENE_FLAG_ROBUST);
   // High quality would split triangles differently for different thread counts.
   rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   rtcAttachGeometry(object.scene.get(), geometry.get());
   rtcJoinCommitScene(object.scene.get());
-  check_embree(parts_->device().get());
+  check_embree(cache_->device().get());
 }
 
 }  // namespace drench::render

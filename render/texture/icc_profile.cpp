@@ -67,9 +67,9 @@ ColourCode::Curve sampled_curve(Bytes data) {
   std::vector<float> value(count);
   for (size_t k = 0; k < count; ++k) value[k] = float(number(data, 12 + 2 * k, 2)) / 65535;
   return [value](float x) {
-    const float place = x * float(value.size() - 1);
-    const size_t k = std::min(size_t(place), value.size() - 2);
-    const float t = place - float(k);
+    const float position = x * float(value.size() - 1);
+    const size_t k = std::min(size_t(position), value.size() - 2);
+    const float t = position - float(k);
     return value[k] * (1 - t) + value[k + 1] * t;
   };
 }

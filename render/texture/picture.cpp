@@ -47,7 +47,7 @@ constexpr Format known_formats[] = {
     {"TIFF", "MM\0+"sv, read_tiff},
 };
 
-/// What a file is by bytes that stand at a place in it.
+/// What a file is by bytes that stand at an offset in it.
 struct Signature {
   size_t at;
   std::string_view bytes, name;

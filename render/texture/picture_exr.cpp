@@ -67,7 +67,7 @@ Choice choice_in(const Imf::Header& header, int part, const std::string& layer) 
        {std::array{"R", "G", "B"}, std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}})
     if (all({names[0], names[1], names[2]}))
       return {Kind::rgb, part, layer, {layer + names[0], layer + names[1], layer + names[2]}};
-  if (all({"X", "Y"})) return {};  // a place or direction
+  if (all({"X", "Y"})) return {};  // a position or direction
   if (all({"Y", "RY", "BY"}))
     return {Kind::luminance_chroma, part, layer, {layer + "Y", layer + "RY", layer + "BY"}};
   if (all({"Y"})) return {Kind::grey, part, layer, {layer + "Y"}};
@@ -113,7 +113,7 @@ class ByteStream : public Imf::IStream {
     return at_ < bytes_.size();
   }
   uint64_t tellg() override { return at_; }
-  void seekg(uint64_t place) override { at_ = place; }
+  void seekg(uint64_t offset) override { at_ = offset; }
 
  private:
   const std::vector<std::byte>& bytes_;
@@ -253,7 +253,7 @@ class ExrReader {
     }
   }
 
-  /// Copies what is seen of a row of the data window into its place.
+  /// Copies what is seen of a row of the data window to where it belongs.
   void place_row(Raster& picture, int y, const std::byte* row) const {
     const size_t pixel = size_t(picture.colours) * bytes_of(picture.sample);
     const size_t to =

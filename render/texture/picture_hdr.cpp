@@ -27,19 +27,19 @@ class HdrReader {
 
   Raster read() {
     read_header();
-    const Orientation place = read_resolution();
+    const Orientation orientation = read_resolution();
     Raster picture;
     picture.sample = Raster::Sample::f32;
     picture.code = ColourCode::linear(primaries_);
     // Runs hold 255 pixels or, of the old kind, any number; what is cut off is seen as it is read.
-    file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()));
+    file_.make_room(picture, uint64_t(orientation.width()), uint64_t(orientation.height()));
     std::vector<Rgbe> line(static_cast<size_t>(columns_));
     auto* texel = reinterpret_cast<float*>(picture.bytes.data());
     for (int row = 0; row < rows_; ++row) {
       read_line(line, row);
       for (int column = 0; column < columns_; ++column) {
         const V3f rgb = radiance_of(line[size_t(column)]);
-        std::memcpy(texel + 3 * place.pixel(column, row), &rgb, sizeof rgb);
+        std::memcpy(texel + 3 * orientation.pixel(column, row), &rgb, sizeof rgb);
       }
     }
     if (at_ < file_.bytes().size())

@@ -96,7 +96,7 @@ bool read_header(Jpeg& state, const std::byte* data, size_t size) {
   return true;
 }
 
-/// 4 inks to R, G and B without their press: each takes its share of the light that the other
+/// 4 inks to R, G and B without their press: each takes its part of the light that the other
 /// inks and black leave. With Adobe's marker the samples are 255 where there is no ink.
 void from_inks(const uint8_t* inks, uint8_t* rgb, size_t pixels, bool inverted) {
   for (size_t p = 0; p < pixels; ++p)
@@ -238,12 +238,12 @@ class JpegReader {
 
   void warn_of_orientation() const {
     for (const jpeg_marker_struct* m = state_.library.marker_list; m; m = m->next) {
-      const int turned = exif_orientation(m->data, m->data_length);
-      if (m->marker != JPEG_APP0 + 1 || turned == 1) continue;
+      const int orientation = exif_orientation(m->data, m->data_length);
+      if (m->marker != JPEG_APP0 + 1 || orientation == 1) continue;
       file_.warn(
           fmt::format("its EXIF orientation {} is not applied: texture coordinates count "
                       "on the pixels as they are stored. Turn the pixels if that is meant",
-                      turned));
+                      orientation));
       return;
     }
   }

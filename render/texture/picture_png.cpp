@@ -16,7 +16,7 @@ namespace drench::render {
 
 namespace {
 
-/// File gammas nearer to sRGB's 1/2.2 than this share are taken as sRGB, as libpng does.
+/// File gammas nearer to sRGB's 1/2.2 than this fraction are taken as sRGB, as libpng does.
 constexpr double same_gamma = 0.05;
 /// No deflate stream unpacks to more bytes than this for one of its own.
 constexpr uint64_t max_compression_ratio = 1032;

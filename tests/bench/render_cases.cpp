@@ -162,7 +162,7 @@ void render_caustics(const Emit& emit) {
   for (size_t k = 0; k < half.rgba.size(); ++k)
     reference.rgba[k] = 0.5f * (reference.rgba[k] + half.rgba[k]);
   render::RenderOptions none;
-  none.walks = render::Walks::none;
+  none.walks = render::ManifoldWalks::none;
   const std::tuple<const char*, const Shot*, render::RenderOptions> ways[] = {
       {"paths", &paths, {}}, {"photons", &photons, none}, {"photons and walks", &photons, {}}};
   for (const int samples : {4, 16, 64, 256}) {
@@ -214,9 +214,9 @@ void render_walks(const Emit& emit) {
     const render::Film a = render(paths, geometry, reference_spp, 1000).film,
                        b = render(paths, geometry, reference_spp, 1001).film;
     double least = 1e30;  // relative MSE x CPU s
-    for (const auto& [name, walks] : {std::pair{"photons", render::Walks::none},
-                                      {"photons and walks", render::Walks::some},
-                                      {"what is chosen", render::Walks::if_calm}}) {
+    for (const auto& [name, walks] : {std::pair{"photons", render::ManifoldWalks::none},
+                                      {"photons and walks", render::ManifoldWalks::some},
+                                      {"what is chosen", render::ManifoldWalks::if_calm}}) {
       render::RenderOptions options;
       options.walks = walks;
       double error = 0, cpu_s = 0;
@@ -229,7 +229,7 @@ void render_walks(const Emit& emit) {
       line.method = fmt::format("pool, waves of {:.2f} m, {}", 0.03 * double(waves), name);
       line.more["rel_mse"] = error, line.more["cpu_s"] = cpu_s;
       line.more["walked"] = last.stats.walked;
-      if (walks == render::Walks::if_calm) {
+      if (walks == render::ManifoldWalks::if_calm) {
         line.error = error * cpu_s / least, line.gate = 1.15;
         line.error_of = "error x time over that of the better";
       }

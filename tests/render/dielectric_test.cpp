@@ -276,9 +276,9 @@ TEST(WaterGuide, LeavesTheMeanAsItIs) {
 TEST(WaterGuide, HasTheDensityItClaims) {
   // The density integrates to 1 over the directions that reach the surface below the critical
   // angle, less what the cones hold beyond the horizon: none here.
-  KeptParts parts;
+  SceneCache cache;
   const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6)}, Lights::SampleEnvironment::automatic,
-                      parts);
+                      cache);
   const RefractedLightGuide guide(lights, float(water_index));
   const V3f point(0.1f, 0, 0);
   double integral = 0, drawn = 0;
@@ -307,13 +307,13 @@ TEST(WaterGuide, HasTheDensityItClaims) {
 
 // What a surface under water draws: a diffuse direction, or one aimed at the lamp.
 TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
-  KeptParts parts;
+  SceneCache cache;
   const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6), sky(0.5f)},
-                      Lights::SampleEnvironment::automatic, parts);
+                      Lights::SampleEnvironment::automatic, cache);
   const RefractedLightGuide guide(lights, float(water_index));
   const V3f point(0.1f, 0, 0), up(0, 1, 0);
   const ClothBsdf floor({0, 1, 0}, up, up, V3f(0.5f), V3f(0));
-  const float share = guide.share(point);
+  const float share = guide.probability(point);
   ASSERT_GT(share, 0.2);
   ASSERT_LT(share, 0.9);
   const auto number = [](std::mt19937& random) {

@@ -92,7 +92,7 @@ void expect_the_light_of(const Light& light, int width, const std::vector<V3d>& 
   for (size_t k = 0; k < normals.size(); ++k)
     for (int c = 0; c < 3; ++c) {
       double all = found[k][c];
-      for (const MapSun& sun : after.suns())
+      for (const ExtractedSun& sun : after.suns())
         all += sun.irradiance[c] * std::max(0., normals[k].dot(V3d(sun.toward)));
       EXPECT_NEAR(all, expected[k][c], 1e-4 * expected[k][c]) << k << ' ' << c;
     }
@@ -100,7 +100,7 @@ void expect_the_light_of(const Light& light, int width, const std::vector<V3d>& 
 
 const V3d sun_toward = V3d(0.5, 0.7, -0.4).normalized();
 
-TEST(MapSuns, KeepTheIrradianceOfEveryPlane) {
+TEST(ExtractedSuns, KeepTheIrradianceOfEveryPlane) {
   const TemporaryFolder folder;
   // Planes that see the sun or see it not, but none that it sets on.
   const std::vector<V3d> normals{{0, 1, 0},
@@ -119,7 +119,7 @@ TEST(MapSuns, KeepTheIrradianceOfEveryPlane) {
 }
 
 // At the zenith rows end, at -X..+X of +Z columns do.
-TEST(MapSuns, KeepTheIrradianceAtPolesAndAtTheSeam) {
+TEST(ExtractedSuns, KeepTheIrradianceAtPolesAndAtTheSeam) {
   const TemporaryFolder folder;
   const std::vector<V3d> normals{{0, 1, 0}, {0, 0, 1}, V3d(1, 2, 3).normalized()};
   constexpr int map_width = 720;
@@ -136,7 +136,7 @@ TEST(MapSuns, KeepTheIrradianceAtPolesAndAtTheSeam) {
 }
 
 // A single texel of 5.6 degrees: what it lights is its tent, twice as wide.
-TEST(MapSuns, KeepTheIrradianceOfOneLargeTexel) {
+TEST(ExtractedSuns, KeepTheIrradianceOfOneLargeTexel) {
   const TemporaryFolder folder;
   constexpr int map_width = 64;
   SkyMap map = sky_map(map_width, {});
@@ -145,10 +145,10 @@ TEST(MapSuns, KeepTheIrradianceOfOneLargeTexel) {
                       {{0, 1, 0}, direction_of(20, 12, map_width, map_width / 2)});
 }
 
-TEST(MapSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
+TEST(ExtractedSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
   for (const double diameter : {0.5, 2.}) {
     SkyMap map = sky_map(2048, {{sun_toward, diameter, V3f(9000, 8000, 6000)}});
-    const std::vector<MapSun> suns = split_suns(map, 0);
+    const std::vector<ExtractedSun> suns = extract_suns(map, 0);
     ASSERT_EQ(suns.size(), 1u);
     const double half = diameter * pi64 / 360;
     EXPECT_NEAR((V3d(suns[0].toward) - sun_toward).length(), 0, 1e-4);
@@ -164,10 +164,10 @@ TEST(MapSuns, HaveTheDirectionSizeAndColourOfTheDisc) {
   }
 }
 
-TEST(MapSuns, AreAsManyAsThereAre) {
+TEST(ExtractedSuns, AreAsManyAsThereAre) {
   const V3d other = V3d(-0.8, 0.3, 0.2).normalized();
   SkyMap map = sky_map(1024, {{sun_toward, 1, V3f(9000)}, {other, 2, V3f(3000, 100, 100)}});
-  const std::vector<MapSun> suns = split_suns(map, 0);
+  const std::vector<ExtractedSun> suns = extract_suns(map, 0);
   ASSERT_EQ(suns.size(), 2u);
   const bool first = (V3d(suns[0].toward) - sun_toward).length() < 0.1;
   EXPECT_NEAR((V3d(suns[first].toward) - other).length(), 0, 1e-3);
@@ -175,10 +175,10 @@ TEST(MapSuns, AreAsManyAsThereAre) {
 }
 
 // A glow of 12 degrees is no sun, but the disc in it is.
-TEST(MapSuns, StandInAGlowThatStays) {
+TEST(ExtractedSuns, StandInAGlowThatStays) {
   SkyMap map = sky_map(1024, {{sun_toward, 12, V3f(150)}, {sun_toward, 1, V3f(40000)}});
   const SkyMap before = map;
-  const std::vector<MapSun> suns = split_suns(map, 0);
+  const std::vector<ExtractedSun> suns = extract_suns(map, 0);
   ASSERT_EQ(suns.size(), 1u);
   const double half = 0.5 * pi64 / 180;
   EXPECT_NEAR(suns[0].irradiance.x, 40000 * pi64 * half * half, 0.02 * suns[0].irradiance.x);
@@ -194,19 +194,19 @@ TEST(MapSuns, StandInAGlowThatStays) {
 }
 
 // Windows are too large, and specks too faint, to be worth a lamp.
-TEST(MapSuns, AreNotInMapsOfLargeOrFaintLights) {
+TEST(ExtractedSuns, AreNotInMapsOfLargeOrFaintLights) {
   for (const Disc& disc : {Disc{sun_toward, 20, V3f(500)}, Disc{sun_toward, 0.5, V3f(300)},
                            Disc{sun_toward, 3, V3f(5)}}) {
     SkyMap map = sky_map(512, {disc});
     const SkyMap before = map;
-    EXPECT_TRUE(split_suns(map, 0).empty()) << disc.diameter_deg;
+    EXPECT_TRUE(extract_suns(map, 0).empty()) << disc.diameter_deg;
     EXPECT_EQ(map.texel, before.texel);
   }
   SkyMap black{8, 4, std::vector<V3f>(32, V3f(0))};
-  EXPECT_TRUE(split_suns(black, 0).empty());
+  EXPECT_TRUE(extract_suns(black, 0).empty());
 }
 
-TEST(MapSuns, LightAPlaneAsTheFormulaSays) {
+TEST(ExtractedSuns, LightAPlaneAsTheFormulaSays) {
   const TemporaryFolder folder;
   Shot shot = plain_shot(256);
   add_ground(shot, 0.5f);
@@ -226,7 +226,7 @@ TEST(MapSuns, LightAPlaneAsTheFormulaSays) {
   }
 }
 
-TEST(MapSuns, AreSeenInTheSky) {
+TEST(ExtractedSuns, AreSeenInTheSky) {
   const TemporaryFolder folder;
   Shot shot = plain_shot(16, 64);
   shot.light = {map_light(sky_map(1440, {{sun_toward, 2, V3f(20000)}}), folder / "sun.exr")};
@@ -238,7 +238,7 @@ TEST(MapSuns, AreSeenInTheSky) {
 }
 
 // Under waves: photons and guided rays of the sun against a map that is left whole, by paths alone.
-TEST(MapSuns, GiveTheCausticThatPathsFindInTheMap) {
+TEST(ExtractedSuns, GiveTheCausticThatPathsFindInTheMap) {
   const TemporaryFolder folder;
   Shot shot = puddle_shot(V3f(0.3f));
   shot.light = {map_light(sky_map(360, {{sun_toward, 6, V3f(300)}}), folder / "sun.exr")};

@@ -126,7 +126,8 @@ Kind kind(float reflectance, float transmittance, float wetness, float sheen = 0
 }
 
 Scatter sample(const FabricBsdf& bsdf, const Draw& u) {
-  return u.side < bsdf.glint_share() ? bsdf.glints().sample(u.point) : bsdf.soft().sample(u.point);
+  return u.side < bsdf.glint_probability() ? bsdf.glints().sample(u.point)
+                                           : bsdf.soft().sample(u.point);
 }
 
 double density(const FabricBsdf& bsdf, const V3f& d) {
@@ -204,7 +205,7 @@ TEST(Fabric, SoakedIsASheetBetweenTwoFilms) {
     front = k2 * up, back = k2 * down;
   }
   for (const float cos : {1.f, 0.4f}) {
-    const AlbedoTable::Share film = soaked.film.at(cos);
+    const AlbedoTable::Albedo film = soaked.film.at(cos);
     const double reflected = film.reflected / film.total;
     EXPECT_NEAR(soaked.seen(leaving(cos)).albedo().x,
                 reflected + (1 - reflected) * (out_front + out_back), 1e-5);

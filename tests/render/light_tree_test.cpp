@@ -42,12 +42,12 @@ std::vector<Light> many_lamps(uint32_t seed, const V3d& about, double spread, do
 
 /// Every third a shining body, the others lamps.
 struct Crowd {
-  KeptParts parts;
+  SceneCache cache;
   std::vector<TriangleMesh> ball;
   Lights lights;
 
   explicit Crowd(uint32_t seed)
-      : lights(many_lamps(seed, {0, 0, 0}, 2, 0.2), Lights::SampleEnvironment::never, parts) {
+      : lights(many_lamps(seed, {0, 0, 0}, 2, 0.2), Lights::SampleEnvironment::never, cache) {
     std::mt19937 random(seed + 1);
     std::normal_distribution<float> normal;
     for (int k = 0; k < many / 2; ++k) {
@@ -164,9 +164,9 @@ TEST(LightTree, DrawsNearlyByWhatEachLightGives) {
 
 TEST(LightTree, MeetsWhatALookAtEachLampMeets) {
   for (const double spread : {0.3, 2., 500.}) {
-    KeptParts parts;
+    SceneCache cache;
     Lights lights(many_lamps(5, {1000, -3, 20}, spread, 0.2), Lights::SampleEnvironment::never,
-                  parts);
+                  cache);
     lights.finish();
     ASSERT_FALSE(lights.tree().empty());
     std::mt19937 random(11);

@@ -27,7 +27,8 @@ const MetalFresnel mirror(V3f(1), V3f(1));
 Scatter sample(const RoughBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point, u.side); }
 Scatter sample(const MetalBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point); }
 Scatter sample(const CoatedBsdf& bsdf, const Draw& u) {
-  return u.side < bsdf.coat_share() ? bsdf.coat().sample(u.point) : bsdf.base().sample(u.point);
+  return u.side < bsdf.coat_probability() ? bsdf.coat().sample(u.point)
+                                          : bsdf.base().sample(u.point);
 }
 
 template <class Bsdf>

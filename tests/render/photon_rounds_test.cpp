@@ -23,7 +23,7 @@ struct Puddle {
   Puddle() {
     shot.render.width = shot.render.height = 32;
     shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sky(0.2f)};
-    options.walks = Walks::none;
+    options.walks = ManifoldWalks::none;
   }
   Film picture() { return render_frame(shot, 1001, geometry, options, &stats); }
 };

@@ -15,13 +15,13 @@ namespace {
 
 constexpr double water_index = 1.333;
 
-/// Calls f(direction of flight, power, share) for the photons near a point, whosever hand.
+/// Calls f(direction of flight, power, share) for the photons near a point, whosever subset.
 template <class F>
 void for_each_near(const PhotonMap& map, const V3f& at, const F& f) {
-  for (unsigned hand = 0; hand < map.hands(); ++hand)
-    map.for_each_near(hand, at, V3f(0, 1, 0),
+  for (unsigned subset = 0; subset < map.subsets(); ++subset)
+    map.for_each_near(subset, at, V3f(0, 1, 0),
                       [&](const V3f& flight, const V3f& power, float share, float) {
-                        f(flight, power, share / float(map.hands()));
+                        f(flight, power, share / float(map.subsets()));
                       });
 }
 
@@ -40,7 +40,7 @@ PhotonMap photons_of(const Shot& shot, const TriangleMesh& fluid, uint32_t count
                      uint32_t seed = 1) {
   const Scene scene(shot, 1001, {fluid, {}}, {});
   uint64_t rays = 0;
-  PhotonMap map = trace_photons(scene, seed, count, 64, Walks::none, rays).photons;
+  PhotonMap map = trace_photons(scene, seed, count, 64, ManifoldWalks::none, rays).photons;
   EXPECT_GT(rays, count / 8);
   return map;
 }
@@ -170,7 +170,7 @@ TEST(Photons, AreAllFoundOnce) {
                          V3f(0, k % 3 ? -1.f : 1.f, 0), V3f(0, k % 2 ? -1.f : 1.f, 0),
                          V3f(1 + place(random)), 0.5f + 0.5f * place(random)});
     const PhotonMap map(photons, 64);
-    EXPECT_EQ(map.hands(), count == 100000 ? 4 : 1);
+    EXPECT_EQ(map.subsets(), count == 100000 ? 4 : 1);
     const float r2 = map.radius() * map.radius();
     for (int k = 0; k < (count > 3000 ? 100 : 2000); ++k) {
       const V3f at = k % 2 ? photons[size_t(k) % photons.size()].position
@@ -186,9 +186,9 @@ TEST(Photons, AreAllFoundOnce) {
         near += double(power.x) * share;
       });
       Irradiance found;
-      for (unsigned hand = 0; hand < map.hands(); ++hand) {
-        const GatheredLight part = map.irradiance(hand, at, V3f(0, 1, 0), V3f(0, 1, 0));
-        found.add(part.all, 1 / float(map.hands()));
+      for (unsigned subset = 0; subset < map.subsets(); ++subset) {
+        const GatheredLight part = map.irradiance(subset, at, V3f(0, 1, 0), V3f(0, 1, 0));
+        found.add(part.all, 1 / float(map.subsets()));
       }
       const double slack = 1e-4 * (1 + side[0] + side[1]);
       ASSERT_NEAR(found.front.x, side[0], slack) << count << " " << k;
@@ -328,26 +328,26 @@ TEST(Photons, AreThoseOfTheirTime) {
   std::uniform_real_distribution<float> place(-1, 1);
   std::vector<Photon> photons;
   for (int k = 0; k < photon_count; ++k) {
-    const float turn = (float((k * 7) % photon_count) + 0.5f) / photon_count;
-    photons.push_back(
-        {V3f(place(random), 0, place(random)), V3f(0, -1, 0), V3f(0, 1, 0), V3f(1, turn, 0), turn});
+    const float time_sample = (float((k * 7) % photon_count) + 0.5f) / photon_count;
+    photons.push_back({V3f(place(random), 0, place(random)), V3f(0, -1, 0), V3f(0, 1, 0),
+                       V3f(1, time_sample, 0), time_sample});
   }
-  EXPECT_EQ(PhotonMap(photons, 4).hands(), 4u) << "no more than a pixel has samples";
+  EXPECT_EQ(PhotonMap(photons, 4).subsets(), 4u) << "no more than a pixel has samples";
   const PhotonMap map(photons, 64);
-  ASSERT_EQ(map.hands(), 8u);
-  for (const float turn : {0.f, 0.3f, 0.61f, 0.9999999f, 1.f}) {
-    const float eighth = std::min(std::floor(turn * 8), 7.f) / 8;
+  ASSERT_EQ(map.subsets(), 8u);
+  for (const float time_sample : {0.f, 0.3f, 0.61f, 0.9999999f, 1.f}) {
+    const float eighth = std::min(std::floor(time_sample * 8), 7.f) / 8;
     double light = 0, points = 0;
     for (float x = -0.8f; x < 0.8f; x += 0.05f)
       for (float z = -0.8f; z < 0.8f; z += 0.05f, ++points)
-        map.for_each_near(map.hand_at(turn), V3f(x, 0, z), V3f(0, 1, 0),
+        map.for_each_near(map.subset_at(time_sample), V3f(x, 0, z), V3f(0, 1, 0),
                           [&](const V3f&, const V3f& power, float share, float) {
                             const float its = power.y / power.x;
                             ASSERT_GE(its, eighth);
                             ASSERT_LT(its, eighth + 0.125f);
                             light += double(power.x) * share;
                           });
-    EXPECT_NEAR(light / points, photon_count / 4., 0.03 * photon_count / 4) << turn;
+    EXPECT_NEAR(light / points, photon_count / 4., 0.03 * photon_count / 4) << time_sample;
   }
 }
 

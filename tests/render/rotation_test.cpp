@@ -47,7 +47,7 @@ Turning blade(double degrees_a_frame) {
 
 /// Its tips stay on their circle, and each ring has the darkness of the blade's area in it, spread
 /// over the angle that it sweeps. Straight courses would reach out by 8 % and miss both.
-TEST(Turn, KeepsABladeInItsCircle) {
+TEST(RotationalMotion, KeepsABladeInItsCircle) {
   const double sweep = 0.5 * 90;  // degrees: the shutter is open for half a frame
   const Turning scene = blade(90);
   ASSERT_EQ(scene.shot.camera.shutter_close - scene.shot.camera.shutter_open, 0.5);
@@ -73,7 +73,7 @@ TEST(Turn, KeepsABladeInItsCircle) {
 }
 
 /// Keys of its place and velocities of its vertices say the same of what slides.
-TEST(Turn, SlidesAsVelocitiesSay) {
+TEST(RotationalMotion, SlidesAsVelocitiesSay) {
   Turning keyed({0.5, 0.3, 0.2}, {0, 0, 0});
   keyed.shot.camera.position = V3d(0, 0.4, 10);
   keyed.shot.camera.target = V3d(0, 0, 0);
@@ -103,7 +103,7 @@ TEST(Turn, SlidesAsVelocitiesSay) {
 }
 
 /// A face that turns about an edge under a sun: the mean cosine over the shutter.
-TEST(Turn, TurnsNormalsToo) {
+TEST(RotationalMotion, TurnsNormalsToo) {
   Turning scene({1, 1, 1}, {0, 0, 80});
   scene.shot.obstacle[0].rotation_deg.keys = {{991, {0, 0, -800 + 50}}, {1011, {0, 0, 800 + 50}}};
   scene.look();
@@ -124,7 +124,7 @@ TEST(Turn, TurnsNormalsToo) {
 }
 
 /// Paths that meet it and samples of it as a light.
-TEST(Turn, OfWhatShinesAgreesForAllEstimators) {
+TEST(RotationalMotion, OfWhatShinesAgreesForAllEstimators) {
   Turning scene({0.8, 0.1, 0.3}, {30, 0, 90});
   scene.shot.material.back().emission = V3f(5);
   scene.shot.render.width = scene.shot.render.height = 16;
@@ -136,7 +136,7 @@ TEST(Turn, OfWhatShinesAgreesForAllEstimators) {
   expect_estimators_agree(scene.shot, scene.geometry);
 }
 
-TEST(Turn, TakesKeysOnlyWhereItsBendShows) {
+TEST(RotationalMotion, TakesKeysOnlyWhereItsBendShows) {
   EXPECT_EQ(blade(0.5).keys(), 0);
   const int some = blade(30).keys(), many = blade(60).keys();
   EXPECT_GT(some, 2);

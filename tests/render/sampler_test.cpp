@@ -179,8 +179,8 @@ double shape_density(const Lights& lights, const V3f& from, const V3f& d) {
 }
 
 void expect_shape_density(const std::vector<Light>& list, const V3f& from) {
-  KeptParts parts;
-  const Lights lights(list, Lights::SampleEnvironment::automatic, parts);
+  SceneCache cache;
+  const Lights lights(list, Lights::SampleEnvironment::automatic, cache);
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) {
                   const float u = uniform2(r).x;

@@ -232,13 +232,13 @@ inline void expect_photons_as_paths(Shot shot, const FrameGeometry& geometry) {
   const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
   EXPECT_LT(paths.error, 0.01 * paths.value);
   shot.render.photons = 6;
-  for (const Walks walks : {Walks::none, Walks::some}) {
+  for (const ManifoldWalks walks : {ManifoldWalks::none, ManifoldWalks::some}) {
     RenderOptions options;
     options.walks = walks;
     const Mean photons = mean_over_seeds(shot, geometry, options, 16);
     EXPECT_NEAR(photons.value, paths.value,
                 4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value)
-        << (walks == Walks::some ? "with walks" : "without");
+        << (walks == ManifoldWalks::some ? "with walks" : "without");
   }
 }
 
