@@ -251,7 +251,10 @@ void denoise_plate(const Job& job, Sums& sums) {
 
 Film developed(const Job& job, const Sums& sums) {
   const std::vector<PixelSum>& pixels = sums.beauty();
-  Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
+  Film film{.width = job.width,
+            .height = job.height,
+            .rgba = std::vector<float>(4 * sums.pixel.size()),
+            .window = job.window};
   for (size_t p = 0; p < pixels.size(); ++p) {
     for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
     const V3f seen = sums.plate.seen(p);
@@ -290,23 +293,23 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   if (photons.any()) path.photons = &photons.caustics().photons;
   const FilmWindow window = window_of(shot.render);
   const bool whole = window.frame_width == 0;
-  Job job{scene,
-          path,
-          path_function(scene.features() | options.force_features),
-          PixelFilter(),
-          options.pixel_order,
-          seed,
-          uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
-          window,
-          whole ? shot.render.width : shot.render.crop_max.x - window.x,
-          whole ? shot.render.height : shot.render.crop_max.y - window.y};
+  Job job{.scene = scene,
+          .path = path,
+          .trace = path_function(scene.features() | options.force_features),
+          .filter = PixelFilter(),
+          .order = options.pixel_order,
+          .seed = seed,
+          .slots_log2 = uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
+          .window = window,
+          .width = whole ? shot.render.width : shot.render.crop_max.x - window.x,
+          .height = whole ? shot.render.height : shot.render.crop_max.y - window.y};
   const size_t pixels = size_t(job.width) * job.height;
-  Sums sums{std::vector<PixelSum>(pixels),
-            LayerFilm(shot, frame, scene, job.width, job.height),
-            plate_film(shot, scene, pixels),
-            SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
-            photons.rounds(shot.render, options.most_photons),
-            std::vector<PixelSum>(photons.any() ? pixels : 0)};
+  Sums sums{.pixel = std::vector<PixelSum>(pixels),
+            .layers = LayerFilm(shot, frame, scene, job.width, job.height),
+            .plate = plate_film(shot, scene, pixels),
+            .plan = SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
+            .rounds = photons.rounds(shot.render, options.most_photons),
+            .split = std::vector<PixelSum>(photons.any() ? pixels : 0)};
   Progress report(progress);
   uint64_t rays = 0;
   render_passes(job, options.checkpoint, photons, sums, rays, report);
@@ -315,13 +318,13 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
     const double by_photons = photon_error(sums.beauty(), sums.split);
-    *stats = {report.samples(),
-              rays,
-              picture_error(sums.beauty()) + by_photons,
-              by_photons,
-              process_cpu_seconds() - cpu_start,
-              sums.rounds.radius(photons.caustics().photons.radius()),
-              photons.caustics().walked};
+    *stats = {.camera_samples = report.samples(),
+              .rays = rays,
+              .relative_mse = picture_error(sums.beauty()) + by_photons,
+              .photon_error = by_photons,
+              .cpu_s = process_cpu_seconds() - cpu_start,
+              .photon_radius = sums.rounds.radius(photons.caustics().photons.radius()),
+              .walked = photons.caustics().walked};
   }
   return film;
 }

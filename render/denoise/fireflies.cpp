@@ -71,11 +71,17 @@ class Brightness {
     const bool one_sample = !(scatter_[p] < one_sample_error * mean_[p]);
     const float usual = beyond(around_, half_of_window);
     if (!one_sample && mean_[p] > glint_ratio * std::max(beyond(noisy_, half_of_window), picture_))
-      return {usual / mean_[p], true, seen(window), knows_shape(window)};
+      return {.factor = usual / mean_[p],
+              .bright = true,
+              .glint = seen(window),
+              .localized = knows_shape(window)};
     if (scatter_[p] < firefly_error * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
     if (mean_[p] > glint_ratio * far)
-      return {std::min(usual, far) / mean_[p], true, seen(window), knows_shape(window)};
+      return {.factor = std::min(usual, far) / mean_[p],
+              .bright = true,
+              .glint = seen(window),
+              .localized = knows_shape(window)};
     if (one_sample) return {mean_[p] > firefly_ratio * usual ? usual / mean_[p] : 1};
     const float most = firefly_ratio * beyond(around_, few);
     return {mean_[p] > most ? most / mean_[p] : 1};

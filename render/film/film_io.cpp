@@ -140,7 +140,9 @@ Film read_pixels(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
-  Film film{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, {}};
+  Film film{.width = window.max.x - window.min.x + 1,
+            .height = window.max.y - window.min.y + 1,
+            .rgba = {}};
   for (const char* name : {"R", "G", "B"}) {
     const Imf::Channel* channel = header.channels().findChannel(name);
     if (!channel) fail_read(path, fmt::format("it has no channel {}", name));
@@ -178,7 +180,10 @@ Film read_all(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
-  Film film{window.size().x + 1, window.size().y + 1, {}, film_window(header)};
+  Film film{.width = window.size().x + 1,
+            .height = window.size().y + 1,
+            .rgba = {},
+            .window = film_window(header)};
   const size_t pixels = size_t(film.width) * size_t(film.height);
   film.rgba.resize(4 * pixels);
   film.layer = layers_of(header, pixels);

@@ -104,7 +104,7 @@ V3f LayerFilm::motion_of(const PathRecord& record, const CameraPose& eye, float 
 V3f LayerFilm::motion_of_sky(size_t pixel, const CameraPose& eye) const {
   const V2f film(float(corner_.x + int(pixel % size_t(width_))) + 0.5f,
                  float(corner_.y + int(pixel / size_t(width_))) + 0.5f);
-  const Ray ray = frame_camera_.ray<false, false>(film, V2f(0), 0);
+  const Ray ray = frame_camera_.ray<CameraMotion::still, Lens::pinhole>(film, V2f(0), 0);
   const V2f to = frame_camera_.project(eye, eye.position + ray.direction);
   return {to.x - film.x, film.y - to.y, 0};
 }

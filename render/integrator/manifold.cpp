@@ -182,14 +182,15 @@ std::optional<RefractedPath> manifold_walk(const Scene& scene, const Surface& su
       if (!(density < max_focus * straight && dot(along, n) * dot(to, n) > 0)) return {};
       const V3f absorbed = scene.medium(at.face.body).absorption * at.distance,
                 bent = at.bent.unpacked();
+      const V3f transmittance(std::exp(-absorbed.x), std::exp(-absorbed.y), std::exp(-absorbed.z));
       return RefractedPath{
-          along,
-          V3f(std::exp(-absorbed.x), std::exp(-absorbed.y), std::exp(-absorbed.z)) *
-              (1 - fresnel_reflectance(at.cos, at.cos_out, 1 / at.index)),
-          density,
-          {at.face.leave(bent), bent, time},
-          distance_to(scene.lights(), lamp, at),
-          {a.unpacked(), b.unpacked()}};
+          .direction = along,
+          .transmittance =
+              transmittance * (1 - fresnel_reflectance(at.cos, at.cos_out, 1 / at.index)),
+          .density = density,
+          .beyond = {at.face.leave(bent), bent, time},
+          .distance = distance_to(scene.lights(), lamp, at),
+          .slope = {a.unpacked(), b.unpacked()}};
     }
     Packed step_angle =
         (cross(b, direction) * at.miss.x + cross(direction, a) * at.miss.y) * (1 / area);

@@ -28,15 +28,17 @@ class PathTracer {
   static constexpr bool has_sampled_lights = features & Feature::sampled_lights;
   static constexpr bool has_facets = features & Feature::glossy;
   static constexpr bool has_plate = features & Feature::mattes;
+  static constexpr CameraMotion camera_motion =
+      has_motion ? CameraMotion::moving : CameraMotion::still;
+  static constexpr Lens lens = features & Feature::thin_lens ? Lens::thin : Lens::pinhole;
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const CameraSample& sample)
       : scene_(scene), settings_(settings), sampler_(sample.sampler), film_(sample.record) {
     const V2f& at = sample.film;
     const float time = has_motion ? scene_.camera().time(sampler_.one(time_dimension), at) : 0.f;
-    const V2f lens = (features & Feature::thin_lens) ? sampler_.two(lens_dimension) : V2f(0);
-    state_.ray = scene_.camera().template ray<has_motion, (features & Feature::thin_lens) != 0>(
-        at, lens, time);
+    const V2f on_lens = lens == Lens::thin ? sampler_.two(lens_dimension) : V2f(0);
+    state_.ray = scene_.camera().template ray<camera_motion, lens>(at, on_lens, time);
     state_.vertex = state_.ray.origin;
     if (has_water) state_.in = settings_.camera_in;
     if constexpr (has_plate) {
@@ -269,7 +271,7 @@ class PathTracer {
     } else {
       if (state.vertices == 0 && !lights.has_environment()) film_.show_nothing();
       lights.for_each_infinite(
-          state.vertex, direction, state.bsdf_pdf > 0,
+          state.vertex, direction, state.bsdf_pdf,
           left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
           [&](const V3f& radiance, float pdf, uint32_t group) {
             film_.deposit(state.throughput * radiance * emission_weight(state, pdf), group);

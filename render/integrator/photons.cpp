@@ -87,7 +87,11 @@ class InterfacePoints {
     const SceneObject& body = scene_.object(index);
     const float root = std::sqrt(uv.x);  // uniform on the triangle
     const float at_open = area_of(body, triangle, 0);
-    return {{Hit::Kind::object, 0, index, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
+    return {{.kind = Hit::Kind::object,
+             .index = index,
+             .triangle = uint32_t(triangle),
+             .u = root * (1 - uv.y),
+             .v = root * uv.y},
             at_open > 0 ? area_of(body, triangle, time) / at_open : 0.f};
   }
 

@@ -337,11 +337,21 @@ LampPoint Lights::aim_at(size_t lamp, const V3f& from) const {
   if (lamp >= shapes_.size()) {
     const SunLight& sun = suns_[lamp - shapes_.size()];
     const float density = 1 / (2 * pi * sun.one_minus_cos);
-    return {sun.toward, -sun.toward, sun.radiance, density, std::sqrt(sun.sin2), true, lamp};
+    return {.at = sun.toward,
+            .normal = -sun.toward,
+            .radiance = sun.radiance,
+            .density = density,
+            .extent = std::sqrt(sun.sin2),
+            .sun = true,
+            .lamp = lamp};
   }
   const ShapeLight& shape = shapes_[lamp];
-  LampPoint out{shape.center, shape.normal, shape.radiance, 1 / shape.area, shape.radius,
-                false,        lamp};
+  LampPoint out{.at = shape.center,
+                .normal = shape.normal,
+                .radiance = shape.radiance,
+                .density = 1 / shape.area,
+                .extent = shape.radius,
+                .lamp = lamp};
   if (shape.type == LightType::sphere) {
     out.normal = normalized(from - shape.center);
     out.density = 1 / (pi * shape.radius * shape.radius);
@@ -400,7 +410,12 @@ LightSample Lights::sample_sun(const Choice& choice, const V2f& u) const {
   const SunLight& sun = suns_[choice.light - shapes_.size()];
   const V3f direction = Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos));
   const float pdf = 1 / (2 * pi * sun.one_minus_cos) * choice.probability;
-  return {direction, infinity, sun.radiance, pdf, sun.group, -1, int(choice.light)};
+  return {.direction = direction,
+          .distance = infinity,
+          .radiance = sun.radiance,
+          .pdf = pdf,
+          .group = sun.group,
+          .lamp = int(choice.light)};
 }
 
 LightSample Lights::sample_mesh(const Choice& choice, const V3f& from, float time,
@@ -420,8 +435,11 @@ LightSample Lights::sample_chosen(const Choice& choice, const V3f& from, float t
   if (choice.light < lamps()) return sample_sun(choice, u);
   if (choice.light < environment_index()) return sample_mesh(choice, from, time, u);
   const DirectionSample d = environment_->sample(u);
-  return {d.direction, infinity, environment_->radiance(d.direction), d.pdf * choice.probability,
-          environment_group_};
+  return {.direction = d.direction,
+          .distance = infinity,
+          .radiance = environment_->radiance(d.direction),
+          .pdf = d.pdf * choice.probability,
+          .group = environment_group_};
 }
 
 }  // namespace drench::render

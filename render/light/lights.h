@@ -98,10 +98,12 @@ class Lights {
   enum class Suns { seen, hidden };
 
   /// Calls `found(radiance, density, group)` for each light at infinity that shines along a
-  /// direction, where the density is that of `sample` at `from`; 0 if it is not asked for.
+  /// direction; the density is that of `sample` at `from`.
+  /// @param bsdf_pdf  of the direction; 0: lights were not sampled there, and no density is found
   template <class Found>
-  void for_each_infinite(const V3f& from, const V3f& direction, bool weighed, Suns suns,
+  void for_each_infinite(const V3f& from, const V3f& direction, float bsdf_pdf, Suns suns,
                          const Found& found) const {
+    const bool weighed = bsdf_pdf > 0;
     if (environment_) {
       const float pdf =
           weighed && sample_environment_

@@ -105,7 +105,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
-  find_bodies(has_fluid);
+  find_bodies(has_fluid ? FirstObject::fluid : FirstObject::other);
   find_albedos();
   find_fabrics();
   find_features(shot.render.background);
@@ -140,7 +140,7 @@ void Scene::add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obsta
 
 /// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
 /// first, is the lowest.
-void Scene::find_bodies(bool has_fluid) {
+void Scene::find_bodies(FirstObject first) {
   for (uint32_t k = 0; k < objects_.size(); ++k)
     if (materials_[objects_[k].material].type == MaterialType::dielectric) bodies_.push_back(k);
   constexpr size_t most = std::numeric_limits<Bodies>::digits;
@@ -156,7 +156,7 @@ void Scene::find_bodies(bool has_fluid) {
     SceneObject& object = objects_[bodies_[bit]];
     object.body = Bodies{1} << bit;
     medium_.push_back({materials_[object.material].absorption, materials_[object.material].ior});
-    if (has_fluid && bodies_[bit] == 0) fluid_ = object.body;
+    if (first == FirstObject::fluid && bodies_[bit] == 0) fluid_ = object.body;
     find_lights_in(bodies_[bit]);
   }
 }
@@ -273,7 +273,8 @@ Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
     if (hit.distance < infinity) hit.kind = Hit::Kind::ground;
   }
   const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
-  if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
+  if (light.light >= 0)
+    hit = {.kind = Hit::Kind::light, .distance = light.distance, .index = uint32_t(light.light)};
   if (objects_.empty()) return hit;
   const BoxTest box(ray.origin, ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {

@@ -250,7 +250,8 @@ class Scene {
   void find_fabrics();
   void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
   uint32_t add_material(const Shot& shot, const std::string& name);
-  void find_bodies(bool has_fluid);
+  enum class FirstObject { fluid, other };
+  void find_bodies(FirstObject first);
   void find_mesh_lights();
   void find_lights_in(uint32_t body);
   /// Whether anything in a box may lie within a body, or on its surface, while the shutter is open.

@@ -67,14 +67,15 @@ class HdrReader {
                     max_length));
   }
 
+  enum class Sign { any, positive };
   /// Numbers after the '='. Fewer than `count`, or such that are not finite, or not above 0 where
   /// they must be: none.
-  std::vector<float> numbers(const std::string& line, size_t count, bool positive = false) {
+  std::vector<float> numbers(const std::string& line, size_t count, Sign sign = Sign::any) {
     std::vector<float> out;
     const char* from = line.c_str() + line.find('=') + 1;
     for (char* to = nullptr; out.size() < count; from = to) {
       const float value = std::strtof(from, &to);
-      if (to == from || !std::isfinite(value) || (positive && value <= 0)) break;
+      if (to == from || !std::isfinite(value) || (sign == Sign::positive && value <= 0)) break;
       out.push_back(value);
     }
     if (out.size() == count) return out;
@@ -92,10 +93,10 @@ class HdrReader {
         if (!xyz_ && line.find("rgbe") == std::string::npos)
           file_.fail(fmt::format("its {} is not known; give 32-bit_rle_rgbe", line.substr(0, 60)));
       } else if (begins("EXPOSURE=")) {  // each multiplied the pixels by so much
-        const auto found = numbers(line, 1, true);
+        const auto found = numbers(line, 1, Sign::positive);
         if (!found.empty()) scale_ *= 1 / found[0];
       } else if (begins("COLORCORR=")) {
-        const auto found = numbers(line, 3, true);
+        const auto found = numbers(line, 3, Sign::positive);
         if (!found.empty()) scale_ *= V3f(1 / found[0], 1 / found[1], 1 / found[2]);
       } else if (begins("PRIMARIES=")) {
         read_primaries(line);

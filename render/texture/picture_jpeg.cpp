@@ -96,13 +96,15 @@ bool read_header(Jpeg& state, const std::byte* data, size_t size) {
   return true;
 }
 
+enum class Inks { plain, inverted };
+
 /// 4 inks to R, G and B without their press: each takes its part of the light that the other
 /// inks and black leave. With Adobe's marker the samples are 255 where there is no ink.
-void from_inks(const uint8_t* inks, uint8_t* rgb, size_t pixels, bool inverted) {
+void from_inks(const uint8_t* inks, uint8_t* rgb, size_t pixels, Inks stored) {
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) {
       const int ink = inks[4 * p + c], black = inks[4 * p + 3];
-      const int product = inverted ? ink * black : (255 - ink) * (255 - black);
+      const int product = stored == Inks::inverted ? ink * black : (255 - ink) * (255 - black);
       rgb[3 * p + c] = uint8_t((product + 127) / 255);
     }
 }
@@ -117,7 +119,8 @@ bool read_rows(Jpeg& state, uint8_t* to, uint8_t* inks) {
     uint8_t* row = to + stride * j.output_width * j.output_scanline;
     uint8_t* into = inks ? inks : row;
     jpeg_read_scanlines(&j, &into, 1);
-    if (inks) from_inks(inks, row, j.output_width, j.saw_Adobe_marker);
+    if (inks)
+      from_inks(inks, row, j.output_width, j.saw_Adobe_marker ? Inks::inverted : Inks::plain);
   }
   jpeg_finish_decompress(&j);
   return true;

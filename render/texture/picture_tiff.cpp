@@ -192,6 +192,7 @@ class TiffReader {
 
   std::string described() const {
     const char* names[] = {"grey, white at 0", "grey", "RGB", "palette", "mask", "CMYK", "YCbCr"};
+    static_assert(PHOTOMETRIC_MINISWHITE == 0 && PHOTOMETRIC_YCBCR + 1 == std::size(names));
     const bool other_inks = photometric_ == PHOTOMETRIC_SEPARATED && !is_cmyk();
     const std::string colours = other_inks                                ? "inks other than CMYK"
                                 : size_t(photometric_) < std::size(names) ? names[photometric_]

@@ -17,7 +17,7 @@ std::vector<Imath::V2d> lens_points(const Camera& camera, uint32_t count) {
   std::vector<Imath::V2d> out;
   for (uint32_t k = 0; k < count; ++k) {
     const Sampler sampler(PixelOrder::separate, 1, 0, 0, 17, k);
-    const V3f p = shutter.ray<false, true>({32, 32}, sampler.two(1), 0).origin;
+    const V3f p = shutter.ray<CameraMotion::still, Lens::thin>({32, 32}, sampler.two(1), 0).origin;
     out.push_back({p.x / camera.lens_radius.at(1001), p.y / camera.lens_radius.at(1001)});
   }
   return out;
@@ -75,7 +75,7 @@ TEST(Aperture, OfARoundUnsqueezedLensKeepsItsBits) {
     const Sampler sampler(PixelOrder::separate, 1, 0, 0, 10, k);
     const ShutterCamera shutter(lens_camera(), 1001, 1001, 64, 64);
     const V2f d = sample_disc(sampler.two(1)) * 0.1f;
-    const V3f p = shutter.ray<false, true>({32, 32}, sampler.two(1), 0).origin;
+    const V3f p = shutter.ray<CameraMotion::still, Lens::thin>({32, 32}, sampler.two(1), 0).origin;
     EXPECT_EQ(p, V3f(1, 0, 0) * d.x + V3f(0, 1, 0) * d.y);
   }
 }

@@ -17,8 +17,8 @@ TEST(Camera, SpansItsHorizontalFieldOfView) {
   camera.target = V3d(0, 0, -1);
   camera.fov_deg = 60.0;
   const ShutterCamera shutter(camera, 1001, 1001, 200, 100);
-  const V3f left = shutter.ray<false, false>({0, 50}, {0, 0}, 0).direction;
-  const V3f top = shutter.ray<false, false>({100, 0}, {0, 0}, 0).direction;
+  const V3f left = shutter.ray<CameraMotion::still, Lens::pinhole>({0, 50}, {0, 0}, 0).direction;
+  const V3f top = shutter.ray<CameraMotion::still, Lens::pinhole>({100, 0}, {0, 0}, 0).direction;
   EXPECT_NEAR(std::atan2(-left.x, -left.z) * 180 / pi64, 30, 1e-4);
   EXPECT_NEAR(top.y / -top.z, std::tan(pi64 / 6) / 2, 1e-6);
 }
