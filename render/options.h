@@ -1,9 +1,11 @@
 #pragma once
 // How an image is estimated, for tests and measurements: every choice gives the same mean.
 
+#include <filesystem>
+#include <memory>
+
 #include "pipeline/contract/hash.h"
-#include "render/integrator/sampler.h"
-#include "render/renderer.h"
+#include "render/sampler.h"
 
 namespace drench::render {
 
@@ -62,10 +64,5 @@ struct RenderOptions {
   Denoised denoised = Denoised::alone;
   std::shared_ptr<SceneCache> cache{};  // of earlier frames of the shot; null: none
 };
-
-/// render_frame with explicit options.
-Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
-                  const RenderOptions& options, RenderStats* stats = nullptr,
-                  const std::function<void(double)>& progress = {});
 
 }  // namespace drench::render

@@ -13,11 +13,11 @@
 #include "pipeline/contract/error.h"
 #include "render/denoise/noisy_frame.h"
 #include "render/film/filter.h"
-#include "render/film/frame_checkpoint.h"
+#include "render/frame_checkpoint.h"
 #include "render/integrator/path.h"
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
 #include "render/options.h"
+#include "render/sampler.h"
 
 namespace drench::render {
 

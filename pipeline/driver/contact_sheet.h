@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/files/files.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 
 namespace drench {
 

@@ -11,8 +11,8 @@
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
-#include "render/color/view_transform.h"
 #include "render/denoise/oidn.h"
+#include "render/display/view_transform.h"
 
 namespace drench {
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "render/denoise/fireflies.h"
-#include "render/scene/motion_match.h"
+#include "render/denoise/motion_match.h"
 
 namespace drench::render {
 
@@ -303,20 +303,6 @@ void smooth_variance(NoisyPicture& picture) {
     });
   }
 }
-
-}  // namespace
-
-NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels) {
-  NoisyPicture picture;
-  for (const PixelSum& pixel : pixels)
-    for (int c = 0; c < 3; ++c) {
-      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
-      picture.variance[c].push_back(2 * pixel.variance(c));
-    }
-  return picture;
-}
-
-namespace {
 
 /// The picture itself, the frames before it and those after it.
 class Sources {

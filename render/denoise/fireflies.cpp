@@ -9,9 +9,9 @@ namespace {
 
 using Plane = NoisyPicture::Plane;
 
-/// Luck is this many times brighter than all but a few of the 24 pixels around it, and its own
-/// samples do not know its brightness to this part. Many may lie together that one or two samples
-/// found each: these are held against half of what is around them, and brought down to it.
+/// A firefly is this many times brighter than all but a few of the 24 pixels around it, and its own
+/// samples do not know its brightness to this relative error. Many may lie together that one or two
+/// samples found each: these are compared with the median around them, and brought down to it.
 constexpr float firefly_ratio = 4, firefly_error = 0.25f, one_sample_error = 0.9f;
 constexpr size_t few = 3, half_of_window = 12;
 /// A glint is this many times brighter than half of what is around it, with its noise; if few of
@@ -23,8 +23,8 @@ constexpr float glint_ratio = 16, glint_error = 0.4f;
 constexpr int window_radius = 2;
 /// What a pixel of a glint shows stays there if noise is less than this part of it in the squares
 /// of 25 pixels, which takes three samples of each. Else it is spread to the pixels beside it by a
-/// normal distribution of so many pixels: more would blur edges more than it fills holes
-/// (docs/benchmarks.md).
+/// normal distribution of so many pixels: more would blur edges more than it fills holes (decision
+/// 0105).
 constexpr float shape_noise = 0.5f, spread_deviation = 0.65f;
 constexpr int block_size = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 

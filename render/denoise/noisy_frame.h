@@ -9,8 +9,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "pipeline/contract/shot/shot.h"
 #include "render/denoise/denoise.h"
-#include "render/renderer.h"
+#include "render/film/film.h"
 
 namespace drench::render {
 

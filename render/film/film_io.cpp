@@ -19,7 +19,7 @@
 #include "pipeline/contract/log.h"
 #include "render/color/color.h"
 #include "render/film/exr_memory.h"
-#include "render/renderer.h"
+#include "render/film/film.h"
 
 namespace drench::render {
 

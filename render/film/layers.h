@@ -4,12 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "render/denoise/denoise.h"
 #include "render/film/checkpoint_archive.h"
 #include "render/film/cryptomatte.h"
+#include "render/film/film.h"
+#include "render/film/matte.h"
+#include "render/film/noisy_picture.h"
+#include "render/film/path_record.h"
 #include "render/film/pixel_sum.h"
-#include "render/integrator/path.h"
-#include "render/renderer.h"
 #include "render/scene/scene.h"
 
 namespace drench::render {

@@ -25,18 +25,12 @@
 #include <functional>
 #include <vector>
 
-#include "render/denoise/denoise.h"
 #include "render/film/checkpoint_archive.h"
+#include "render/film/noisy_picture.h"
+#include "render/film/path_record.h"
 #include "render/film/pixel_sum.h"
 
 namespace drench::render {
-
-/// What one camera sample met of the plate, fractions of light by colour.
-struct MatteRecord {
-  V3f background{0, 0, 0}, catcher{0, 0, 0};  // b, c
-  V3f with{0, 0, 0}, without{0, 0, 0};        // W, O in W/(sr m^2)
-  std::vector<V3f> light;                     // W of each group of lights; empty: not asked for
-};
 
 /// Adds up samples of the plate, what of them is needed: 150 bytes a pixel each of W, O and c for
 /// shadow catchers, of b and c for fractions of light that the denoiser is to smooth.

@@ -5,24 +5,12 @@
 #include <span>
 #include <vector>
 
-#include "render/film/matte.h"
+#include "render/film/path_record.h"
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
+#include "render/scene/features.h"
 
 namespace drench::render {
-
-/// What the loop must be able to do for a frame. What is absent costs no branch.
-struct Feature {
-  enum : unsigned {
-    motion_blur = 1,     // something, or the camera, moves in the shutter
-    dielectric = 2,      // water: refraction, absorption, medium on the path
-    sampled_lights = 4,  // lights are sampled, with multiple importance sampling
-    thin_lens = 8,
-    glossy = 16,        // metal, coats, rough dielectrics, fabric
-    combinations = 32,  // of these
-    mattes = 32,        // a plate goes behind; such frames have all the others switched on
-  };
-};
 
 /// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.
 enum CameraDimension : uint32_t { filter_dimension, lens_dimension, time_dimension };
@@ -31,17 +19,6 @@ struct PathSample {
   V3f radiance;     // W/(sr m^2)
   float alpha = 1;  // less where the camera sees the background or a holdout
   V3f split{0.f};   // of what photons bring: GatheredLight
-};
-
-/// What a camera sample met, for the layers of a film.
-struct PathRecord {
-  std::vector<V3f> light;  // W/(sr m^2), what each group of lights gave; empty: not asked for
-  Hit first;               // the ground or object met first, if any
-  V3f position, normal;    // of it; normal to the side seen
-  float time = 0;          // in the shutter
-  V3f albedo;              // of the first diffuse surfaces, through water and glass
-  bool shaded = false;     // whether there was one on this branch
-  MatteRecord matte;
 };
 
 struct PathSettings {

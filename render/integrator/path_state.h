@@ -8,20 +8,20 @@
 namespace drench::render {
 
 /// Vertices before roulette may end a path: few are worth ending that may still leave the water for
-/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the probability
-/// that survives it at most on long specular paths: total reflection alone would go on for ever. It
-/// is high because the few that last would otherwise come out of a glass as bright dots.
+/// the sky (decision 0100). And the probability of survival at most on long specular paths: total
+/// reflection alone would go on for ever. It is high because the few that last would otherwise come
+/// out of a glass as bright dots.
 inline constexpr int roulette_start = 10, long_path = 64;
 inline constexpr float long_path_survival = 0.99f;
 
 /// What a camera sample's first interface mirrors is followed beside what it lets through, where it
 /// is less than this by roulette: water from above mirrors 2 %, of which one sample in twelve knows
-/// nearly as much as all (docs/benchmarks.md).
+/// nearly as much as all (decision 0101).
 inline constexpr float small_branch = 0.25f;
 
 /// The fraction of a path's second and later diffuse vertices that gather photons: they are all
-/// over the scene, where each waits for memory, and light of light that a sample adds to many
-/// others.
+/// over the scene, where each waits for memory, and find indirect light that many samples add up
+/// (decision 0102).
 inline constexpr float later_gather_probability = 0.25f;
 
 /// Of a sample: more go round in a circle that rounding has closed, and would for ever.

@@ -8,7 +8,7 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/integrator/manifold.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/embree.h"
 
 namespace drench::render {
@@ -42,7 +42,7 @@ constexpr unsigned max_subsets_log2 = 3;  // log2: any eight samples in a row se
 constexpr unsigned rounds_per_doubling_log2 = 4;
 constexpr double min_subset_photons = 4;  // photons of the median one's disc in a subset, at least
 // Fraction of the light that walks must find to be taken: each costs a path four rays, and where
-// much is left to photons the error is theirs (render_walks).
+// much is left to photons the error is theirs (decision 0103).
 constexpr double calm_fraction = 0.8;
 constexpr uint32_t photon_seed = 0x70686f74u;  // photons and camera paths draw apart
 

@@ -12,7 +12,7 @@
 // Where a disc holds many, no sample needs to see them all: they are divided among the samples of
 // a pixel, each of which looks up one subset, a map of its own with as much light. Together they
 // see what each would have seen, at a fraction of the cost. They are divided by their time in the
-// shutter, so that a sample of what moves finds those of about its own time.
+// shutter, so that a sample of what moves finds those of about its own time (decision 0106).
 //
 // More photons than fit into memory come in rounds, each a map of its own that lights a part of
 // every pixel's samples (photon_rounds.h). Radius and power are those of all rounds together, whose

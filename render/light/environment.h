@@ -3,6 +3,7 @@
 // map.
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "pipeline/contract/shot/shot.h"
@@ -73,6 +74,14 @@ class Environment {
   int columns_ = 0, rows_ = 0;
   AliasTable row_table_;
   std::vector<AliasTable> column_tables_;
+};
+
+/// Where lights take their environment from, so that frames may share one.
+class EnvironmentSource {
+ public:
+  virtual ~EnvironmentSource() = default;
+  virtual std::shared_ptr<const Environment> environment(const Light& light,
+                                                         Environment::Sampling sampling) = 0;
 };
 
 }  // namespace drench::render

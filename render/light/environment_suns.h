@@ -17,7 +17,7 @@ struct ExtractedSun {
 };
 
 /// Takes the suns out of a map; their texels are left with the light of those around them. The
-/// irradiance that map and suns give together is the map's before, exactly for planes that see a
+/// irradiance that map and suns give together is the whole map's, exactly for planes that see a
 /// sun whole and whose texels all have one hue. A map without suns stays as it is, to the bit.
 /// @param map       latitude-longitude, as Environment reads it: bilinear, +Y at the top
 /// @param rotation  of the map, turns

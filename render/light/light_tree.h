@@ -2,7 +2,8 @@
 // A tree over many lights: draws one of them, and finds those that a ray may meet, without asking
 // each. After Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree
 // Splitting": a cluster that a point is among is split, others are weighed whole. They weigh one by
-// a bound of what its lights give, here it is an estimate: bounds draw distant clusters too often.
+// a bound of what its lights give, here it is an estimate (decision 0104): bounds draw distant
+// clusters too often.
 
 #include <Imath/ImathBox.h>
 
@@ -12,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/scene/box_test.h"
+#include "render/box_test.h"
 #include "render/vector.h"
 
 namespace drench::render {

@@ -8,7 +8,6 @@
 #include "pipeline/contract/error.h"
 #include "render/color/color.h"
 #include "render/sampling.h"
-#include "render/scene/scene_cache.h"
 
 namespace drench::render {
 
@@ -193,7 +192,7 @@ bool SunLight::covers(const V3f& direction) const {
 }
 
 Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
-               SceneCache& cache) {
+               EnvironmentSource& environments) {
   for (const Light& light : lights) {
     check_radiance(light);
     switch (light.type) {
@@ -218,7 +217,7 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         sample_environment_ =
             sample_environment == SampleEnvironment::always ||
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
-        environment_ = cache.environment(
+        environment_ = environments.environment(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
         environment_group_ = group_of(light);
         for (const ExtractedSun& sun : environment_->suns()) {

@@ -44,14 +44,13 @@ struct SunLight {
   bool covers(const V3f& direction) const;
 };
 
-class SceneCache;
-
 class Lights {
  public:
   enum class SampleEnvironment { automatic, always, never };
 
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
-  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment, SceneCache& cache);
+  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
+         EnvironmentSource& environments);
 
   /// Adds an object that shines. @return its number among them
   int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {

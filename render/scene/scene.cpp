@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "pipeline/contract/error.h"
-#include "render/integrator/path.h"
-#include "render/scene/box_test.h"
+#include "render/box_test.h"
+#include "render/scene/features.h"
 #include "render/scene/rotation.h"
 #include "render/scene/scene_cache.h"
 

@@ -11,6 +11,7 @@
 #include "pipeline/contract/hash.h"
 #include "render/bsdf/bsdf.h"
 #include "render/bsdf/material.h"
+#include "render/frame_geometry.h"
 #include "render/light/lights.h"
 #include "render/options.h"
 #include "render/packed.h"

@@ -15,7 +15,7 @@
 
 namespace drench::render {
 
-class SceneCache {
+class SceneCache final : public EnvironmentSource {
  public:
   /// @param picture_memory  what all pictures may take together
   explicit SceneCache(PictureMemory picture_memory = {});
@@ -24,7 +24,8 @@ class SceneCache {
   /// find_material of the shot, read once.
   ShadingMaterial material(const Shot& shot, const std::string& name);
   /// The shot's one environment, read once.
-  std::shared_ptr<const Environment> environment(const Light& light, Environment::Sampling);
+  std::shared_ptr<const Environment> environment(const Light& light,
+                                                 Environment::Sampling sampling) override;
   /// Of facets that divide indices of ratio `eta`; 0: of mirrors.
   std::shared_ptr<const AlbedoTable> albedo(float alpha, float eta);
 

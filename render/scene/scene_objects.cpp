@@ -234,7 +234,7 @@ EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
 }
 
 void Scene::build(SceneObject& object) {
-  if (object.scene) return;  // it was kept
+  if (object.scene) return;  // from the cache
   object.bounds = bounds_of(object);
   const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
   rtcSetGeometryMask(geometry.get(), 0xffffffffu);

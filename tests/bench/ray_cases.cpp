@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "pipeline/contract/files/mesh_file.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene.h"
 #include "tests/bench/render_scenes.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "tests/contract/sphere_mesh.h"
 
 namespace drench::bench {

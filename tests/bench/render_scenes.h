@@ -2,6 +2,7 @@
 // Pictures that the renderer's cases are measured on.
 
 #include "render/options.h"
+#include "render/renderer.h"
 #include "tests/bench/bench.h"
 
 namespace drench::bench {

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/driver/movie.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/driver/folder.h"
 
 namespace drench {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "render/film/filter.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/camera.h"
 #include "tests/render/support.h"

@@ -8,7 +8,7 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/bsdf_fabric.h"
 #include "render/bsdf/material.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

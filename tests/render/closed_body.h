@@ -1,7 +1,7 @@
 #pragma once
 // Rays that must not leave a closed body.
 
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene.h"
 

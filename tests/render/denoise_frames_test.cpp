@@ -8,8 +8,8 @@
 #include <random>
 
 #include "render/denoise/denoise.h"
+#include "render/denoise/motion_match.h"
 #include "render/denoise/noisy_frame.h"
-#include "render/scene/motion_match.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

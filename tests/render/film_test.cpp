@@ -14,7 +14,7 @@
 #include <random>
 
 #include "render/color/color.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "render/texture/texture.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/scene.h"
 #include "tests/render/puddle.h"
 

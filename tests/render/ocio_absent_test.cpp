@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/error.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::render::test {

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "render/color/color.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 

@@ -8,9 +8,9 @@
 #include <set>
 
 #include "render/film/filter.h"
-#include "render/integrator/sampler.h"
 #include "render/light/environment.h"
 #include "render/light/lights.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene_cache.h"
 #include "tests/render/support.h"

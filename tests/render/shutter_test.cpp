@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "render/film/filter.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/camera.h"
 #include "tests/render/strip.h"
 

@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/error.h"
 #include "render/options.h"
+#include "render/renderer.h"
 
 namespace drench::render::test {
 

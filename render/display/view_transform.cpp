@@ -6,11 +6,11 @@
 // channels lets bright saturated colours whiten as film does, and greys stay grey. Then AP1 to Rec.
 // 709, whatever leaves that gamut clipped, and the sRGB curve: 18 % grey shows as code 0.46.
 
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 
 #include "pipeline/contract/error.h"
 #include "render/color/color.h"
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
 namespace drench::render {
 

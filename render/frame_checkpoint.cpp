@@ -1,4 +1,4 @@
-#include "render/film/frame_checkpoint.h"
+#include "render/frame_checkpoint.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "render/scene/motion_match.h"
+#include "render/denoise/motion_match.h"
 
 #include <tbb/parallel_for.h>
 

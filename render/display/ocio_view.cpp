@@ -1,4 +1,4 @@
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
 #include <OpenColorIO/OpenColorIO.h>
 #include <fmt/format.h>

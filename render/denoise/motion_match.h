@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/denoise/denoise.h"
+#include "render/film/noisy_picture.h"
 
 namespace drench::render {
 

@@ -1,6 +1,6 @@
 // What the scene knows of cloth at a point of it: its fuzz, its yarns, its gaps, how wet it is.
 
-#include "render/bsdf/fabric.h"
+#include "render/scene/fabric.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 #include "pipeline/contract/error.h"
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
 namespace drench::render {
 

@@ -4,7 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "render/renderer.h"
+#include "pipeline/contract/shot/shot.h"
+#include "render/film/film.h"
 
 namespace drench::render {
 
