@@ -47,7 +47,7 @@ inline uint32_t sobol_second_reversed(uint32_t x) {
   return x;
 }
 
-/// By way of a signed number, which packs convert in one instruction.
+/// Through a signed number, which packs convert in one instruction.
 inline float unit_float(uint32_t bits) { return float(int32_t(bits >> 8)) * 0x1p-24f; }
 
 /// Interleaves the low 16 bits of x and y: pixels near each other get indices near each other.

@@ -28,10 +28,10 @@ constexpr int window_radius = 2;
 constexpr float shape_noise = 0.5f, spread_deviation = 0.65f;
 constexpr int block_size = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
-/// The value that only `few` of a list are above.
-float beyond(std::vector<float>& list, size_t few) {
-  std::nth_element(list.begin(), list.begin() + long(few), list.end(), std::greater<>());
-  return std::max(list[few], 0.f);
+/// The value that only `count` of a list are above.
+float beyond(std::vector<float>& list, size_t count) {
+  std::nth_element(list.begin(), list.begin() + long(count), list.end(), std::greater<>());
+  return std::max(list[count], 0.f);
 }
 
 struct Firefly {

@@ -41,7 +41,7 @@ struct CameraSample {
   PathSample found;
 };
 
-/// Camera samples that are on their way at once.
+/// Camera samples that are traced at once.
 inline constexpr size_t paths_in_flight = 4;
 
 /// Traces that many samples or fewer; `rays` counts rays traced.

@@ -62,6 +62,12 @@ struct PathState {
   bool has_photons = false;  // that surface, and nothing but smooth bodies since
   bool clear = false;        // nothing but smooth bodies on the path, none of them a mirror
   uint32_t branch = 0;
+
+  /// Of its next vertex.
+  uint32_t dimension(VertexDimension which) const {
+    return first_vertex_dimension + branch * branch_stride +
+           uint32_t(vertices) * vertex_dimensions + which;
+  }
 };
 
 /// Cosine of the most that smooth bodies may bend the view for a plate to stand for what is seen

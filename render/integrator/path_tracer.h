@@ -28,8 +28,7 @@ class PathTracer {
   static constexpr bool has_sampled_lights = features & Feature::sampled_lights;
   static constexpr bool has_facets = features & Feature::glossy;
   static constexpr bool has_plate = features & Feature::mattes;
-  static constexpr CameraMotion camera_motion =
-      has_motion ? CameraMotion::moving : CameraMotion::still;
+  static constexpr CameraMotion motion = has_motion ? CameraMotion::moving : CameraMotion::still;
   static constexpr Lens lens = features & Feature::thin_lens ? Lens::thin : Lens::pinhole;
 
  public:
@@ -38,7 +37,7 @@ class PathTracer {
     const V2f& at = sample.film;
     const float time = has_motion ? scene_.camera().time(sampler_.one(time_dimension), at) : 0.f;
     const V2f on_lens = lens == Lens::thin ? sampler_.two(lens_dimension) : V2f(0);
-    state_.ray = scene_.camera().template ray<camera_motion, lens>(at, on_lens, time);
+    state_.ray = scene_.camera().template ray<motion, lens>(at, on_lens, time);
     state_.vertex = state_.ray.origin;
     if (has_water) state_.in = settings_.camera_in;
     if constexpr (has_plate) {
@@ -579,15 +578,11 @@ class PathTracer {
     return true;
   }
 
-  uint32_t dimension(const PathState& state, VertexDimension which) const {
-    return first_vertex_dimension + state.branch * branch_stride +
-           uint32_t(state.vertices) * vertex_dimensions + which;
-  }
   float number(const PathState& state, VertexDimension which) const {
-    return sampler_.one(dimension(state, which));
+    return sampler_.one(state.dimension(which));
   }
   VertexNumbers numbers(const PathState& state) const {
-    return sampler_.four(dimension(state, light_choice));
+    return sampler_.four(state.dimension(light_choice));
   }
 
   const Scene& scene_;

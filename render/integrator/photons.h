@@ -5,7 +5,7 @@
 //
 // A photon starts at a point of a smooth body's surface that a lamp reaches unhindered, so that
 // none misses the body, goes on through it and lies where it first meets a diffuse surface; rough
-// bodies and metal end it, and paths keep what they find by way of those. Of N photons the map's
+// bodies and metal end it, and paths keep what they find over those. Of N photons the map's
 // radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that both its blur, as
 // N^(-1/2), and its noise, as N^(-1/4), vanish.
 //

@@ -118,15 +118,16 @@ class SunExtractor {
   /// it, above a higher threshold.
   void find_regions(const Region& among, double threshold, std::vector<Region>& suns) {
     std::vector<Region> too_large;
-    for (const uint32_t t : among) state_[t] = luminance(map_.texel[t]) > threshold ? waits : out;
+    for (const uint32_t t : among)
+      state_[t] = luminance(map_.texel[t]) > threshold ? waiting : outside;
     for (const uint32_t seed : among) {
-      if (state_[seed] != waits) continue;
+      if (state_[seed] != waiting) continue;
       Region region{seed};
-      state_[seed] = out;
+      state_[seed] = outside;
       for (size_t k = 0; k < region.size(); ++k)
         for_each_beside(region[k], [&](uint32_t t) {
-          if (state_[t] != waits) return;
-          state_[t] = out;
+          if (state_[t] != waiting) return;
+          state_[t] = outside;
           region.push_back(t);
         });
       double size = 0, light = 0;
@@ -151,7 +152,7 @@ class SunExtractor {
         sum += Imath::V3d(map_.texel[beside]) * solid_angle(beside);
         size += solid_angle(beside);
       });
-    for (const uint32_t t : region) state_[t] = out;
+    for (const uint32_t t : region) state_[t] = outside;
     return size > 0 ? V3f(sum / size) : V3f(0);
   }
 
@@ -187,7 +188,7 @@ class SunExtractor {
     return out;
   }
 
-  enum State : uint8_t { out, waits, inside };
+  enum State : uint8_t { outside, waiting, inside };
 
   SkyMap& map_;
   double rotation_;

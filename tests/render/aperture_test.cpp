@@ -54,7 +54,7 @@ TEST(Aperture, OfBladesIsFilledEvenly) {
       const double edge = edge_of_polygon(x, y, blades, 20 * pi64 / 180);
       const double part = (x * x + y * y) / (edge * edge);  // uniform, for every direction
       ASSERT_LT(part, 1 + 1e-4);
-      // Area swept from the middle, by its share.
+      // Area swept from the middle, by its fraction.
       const double sector = 2 * pi64 / blades;
       double angle = std::atan2(x, y) - 20 * pi64 / 180;
       if (angle < 0) angle += 2 * pi64;
@@ -65,7 +65,7 @@ TEST(Aperture, OfBladesIsFilledEvenly) {
       count[std::min(int(part * rings), rings - 1) * sectors +
             std::clamp(int(swept * sectors), 0, sectors - 1)] += 1;
     }
-    // Well stratified points: each bin holds its share to 2 %.
+    // Well stratified points: each bin holds its part to 2 %.
     for (const int n : count) EXPECT_NEAR(n, draws / (rings * sectors), 0.02 * n) << blades;
   }
 }

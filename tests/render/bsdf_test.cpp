@@ -94,17 +94,17 @@ TEST(Cloth, SpreadsThePixelsSamplesEvenlyOnBothSides) {
       const V3f d = bsdf.sample(u).direction;
       return d.y * side > 0 && d.x + 0.5f * d.z > 0.3f ? 1. : 0.;
     };
-    double share = 0, squares = 0;
+    double fraction = 0, squares = 0;
     for (int i = 0; i < 512; ++i)
       for (int j = 0; j < 512; ++j)
-        share += beyond({(float(i) + 0.5f) / 512, (float(j) + 0.5f) / 512}) / (512. * 512);
+        fraction += beyond({(float(i) + 0.5f) / 512, (float(j) + 0.5f) / 512}) / (512. * 512);
     for (uint32_t pixel = 0; pixel < pixels; ++pixel) {
       double mean = 0;
       for (uint32_t s = 0; s < samples; ++s)
         mean += beyond(Sampler(PixelOrder::separate, 1, pixel, 0, 6, s).two(11)) / samples;
-      squares += std::pow(mean - share, 2) / pixels;
+      squares += std::pow(mean - fraction, 2) / pixels;
     }
-    EXPECT_LT(std::sqrt(squares), 0.5 * std::sqrt(share * (1 - share) / samples)) << side;
+    EXPECT_LT(std::sqrt(squares), 0.5 * std::sqrt(fraction * (1 - fraction) / samples)) << side;
   }
 }
 

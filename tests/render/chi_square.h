@@ -14,7 +14,7 @@ namespace drench::render::test {
 struct ChiSquare {
   double p_value = 0;   // chance of a fit as bad as this for a true density
   double integral = 0;  // of the density over the sphere
-  double drawn = 0;     // share of samples that were directions at all
+  double drawn = 0;     // fraction of samples that were directions at all
 };
 
 /// Chance that chi-square with so many degrees of freedom exceeds x: Wilson and Hilferty 1931.
@@ -36,9 +36,9 @@ ChiSquare chi_square(uint32_t seed, const Draw& draw, const Density& density) {
       const double z = 1 - 2 * (r + 0.5) / (rows * inner);
       const double phi = 2 * pi * (c + 0.5) / (columns * inner), s = std::sqrt(1 - z * z);
       const V3f d(float(s * std::cos(phi)), float(s * std::sin(phi)), float(z));
-      const double share = density(d) * 4 * pi / (rows * inner) / (columns * inner);
-      expected[size_t(r / inner * columns + c / inner)] += share * samples;
-      out.integral += share;
+      const double fraction = density(d) * 4 * pi / (rows * inner) / (columns * inner);
+      expected[size_t(r / inner * columns + c / inner)] += fraction * samples;
+      out.integral += fraction;
     }
   std::mt19937 random(seed);
   for (int k = 0; k < samples; ++k) {

@@ -176,7 +176,7 @@ TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
 /// The sun in a moving drop is a line of pixels that have a sample of it each, or two. What single
 /// samples found beside it may stay; as bright ones elsewhere go.
 template <class Width>
-void expect_whole_streak(const Width& width, double share) {
+void expect_whole_streak(const Width& width, double fraction) {
   NoisyPicture picture = made([](int, int) { return 1.f; }, none, noise_level, 16);
   std::mt19937 random(17);
   const auto within = [&](int x, int y, int reach) {
@@ -199,7 +199,7 @@ void expect_whole_streak(const Width& width, double share) {
     for (int x = 0; x < picture_size; ++x)
       if (within(x, y, 1) || !within(x, y, 4))
         (within(x, y, 1) ? streak : elsewhere) += out[1][size_t(y * picture_size + x)] - 1;
-  EXPECT_GT(streak, share * found);
+  EXPECT_GT(streak, fraction * found);
   EXPECT_LT(elsewhere, 0.05 * found);
 }
 

@@ -145,12 +145,12 @@ TEST(RenderedBits, ChangeWithTheSeedAndTheFrame) {
 
 TEST(Progress, RisesToOneAndMayStopTheRender) {
   const Everything scene;
-  std::vector<double> shares;
+  std::vector<double> fractions;
   render_frame(scene.shot, 1001, scene.geometry, nullptr,
-               [&](double share) { shares.push_back(share); });
-  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-  EXPECT_EQ(shares.back(), 1);
-  EXPECT_GT(shares.size(), 4u);
+               [&](double fraction) { fractions.push_back(fraction); });
+  EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+  EXPECT_EQ(fractions.back(), 1);
+  EXPECT_GT(fractions.size(), 4u);
   EXPECT_THROW(render_frame(scene.shot, 1001, scene.geometry, nullptr,
                             [](double) { throw Stopped("enough"); }),
                Stopped);

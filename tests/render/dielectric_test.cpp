@@ -289,9 +289,9 @@ TEST(WaterGuide, HasTheDensityItClaims) {
       const double y = (i + 0.5) / steps, phi = 2 * pi64 * (j + 0.5) / steps;
       const V3f d(float(std::sqrt(1 - y * y) * std::cos(phi)), float(y),
                   float(std::sqrt(1 - y * y) * std::sin(phi)));
-      const double share = guide.pdf(point, d) * 2 * pi64 / steps / steps;
-      integral += share;
-      mean += V3d(d) * share;
+      const double weight = guide.pdf(point, d) * 2 * pi64 / steps / steps;
+      integral += weight;
+      mean += V3d(d) * weight;
     }
   for (uint32_t k = 0; k < 1u << 16; ++k) {
     const Sampler sampler(PixelOrder::separate, 1, 0, 0, 16, k);
@@ -313,9 +313,9 @@ TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
   const RefractedLightGuide guide(lights, float(water_index));
   const V3f point(0.1f, 0, 0), up(0, 1, 0);
   const ClothBsdf floor({0, 1, 0}, up, up, V3f(0.5f), V3f(0));
-  const float share = guide.probability(point);
-  ASSERT_GT(share, 0.2);
-  ASSERT_LT(share, 0.9);
+  const float probability = guide.probability(point);
+  ASSERT_GT(probability, 0.2);
+  ASSERT_LT(probability, 0.9);
   const auto number = [](std::mt19937& random) {
     return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random);
   };
@@ -323,12 +323,12 @@ TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
       7,
       [&](std::mt19937& random) {
         const float u = number(random), v = number(random), w = number(random);
-        return sample_mixed(floor, guide, share, point, u, {v, w});
+        return sample_mixed(floor, guide, probability, point, u, {v, w});
       },
       [&](const V3f& d) {
         float pdf = 0;
         floor.value(d, pdf);
-        return pdf > 0 ? double(share * guide.pdf(point, d) + (1 - share) * pdf) : 0.;
+        return pdf > 0 ? double(probability * guide.pdf(point, d) + (1 - probability) * pdf) : 0.;
       });
   EXPECT_GT(fit.p_value, 0.01);
   // The guide's density grows without bound at the critical angle.

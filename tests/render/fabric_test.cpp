@@ -192,7 +192,7 @@ TEST(Fabric, ReturnsItsAlbedoWhenItIsNot) {
 }
 
 // Light that enters goes to and fro between the sheet and the films on its two sides, of which each
-// sends a share k2 of diffuse light back: added up bounce by bounce. k2 = 1 - (1 - <R>) / n^2.
+// sends a fraction k2 of diffuse light back: added up bounce by bounce. k2 = 1 - (1 - <R>) / n^2.
 TEST(Fabric, SoakedIsASheetBetweenTwoFilms) {
   const Kind soaked = kind(0.55f, 0.2f, 1);
   const SheetColours wet = soaked.at().wet;

@@ -284,14 +284,14 @@ TEST(Cryptomatte, CoversTheAreaOfThings) {
   double area = 0;
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x) {
-      const float share = at(film, "CryptoObject00", x, y, 1);
-      if (share > 0) {
+      const float fraction = at(film, "CryptoObject00", x, y, 1);
+      if (fraction > 0) {
         EXPECT_EQ(at(film, "CryptoObject00", x, y, 0), cryptomatte_id("ball"));
         EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 0), cryptomatte_id("steel"));
       }
-      EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 1), share);
+      EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 1), fraction);
       EXPECT_EQ(at(film, "samples", x, y, 0), 64);
-      area += share;
+      area += fraction;
     }
   // The silhouette of a sphere of radius 1 seen from 40: tan(asin(1 / 40)).
   const double radius = std::tan(std::asin(1. / 40)) * 32 / (2 * std::tan(2 * pi64 / 180));

@@ -102,8 +102,8 @@ V3f lands(const Scene& scene, const Surface& from, const V3f& direction, float h
   return face.position + bent * ((height - face.position.y) / bent.y);
 }
 
-// Under waves: rays along the way found and beside it, one by one, say where it leads and how dense
-// the directions lie.
+// Under waves: rays along the path found and beside it, one by one, say where it leads and how
+// dense the directions lie.
 TEST(ManifoldWalks, EndWhereRaysUnderWavesDo) {
   Pool pool(waves());
   pool.shot.light = {panel({0.3, 2, 0.2}, 0.05, 0.05, 50)};

@@ -493,8 +493,8 @@ TEST(ShadowCatcher, IsSeenThroughClearWater) {
   geometry.fluid = box_mesh({0.2f, -1, -1}, {0.4f, 1, 1});  // before it, not over it
   aim_narrow(shot, {1, 0.5, 0}, {-0.5, 0, 0});
   const Film film = render_frame(shot, 1001, geometry);
-  const double way = 0.2 * std::sqrt(1.5 * 1.5 + 0.5 * 0.5) / 1.5;
-  EXPECT_NEAR(channel_mean(film, 3).value, 1 - std::exp(-0.8 * way), 1e-3);
+  const double length = 0.2 * std::sqrt(1.5 * 1.5 + 0.5 * 0.5) / 1.5;
+  EXPECT_NEAR(channel_mean(film, 3).value, 1 - std::exp(-0.8 * length), 1e-3);
 }
 
 }  // namespace

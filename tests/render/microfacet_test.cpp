@@ -310,7 +310,7 @@ TEST(Metal, HasTheColoursItIsGiven) {
   }
 }
 
-// Facets of 1e-4 stand as one: Fresnel's share goes the mirror's way, the rest by Snell's law.
+// Facets of 1e-4 stand as one: Fresnel's part goes the mirror's direction, the rest by Snell's law.
 TEST(RoughDielectric, BecomesTheSmoothOne) {
   for (const float eta : {1.5f, 1 / 1.5f})
     for (const float cos : {1.f, 0.9f, 0.5f}) {

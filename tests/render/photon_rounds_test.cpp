@@ -132,10 +132,10 @@ TEST(PhotonRounds, GiveTheSameBitsAfterStops) {
   const TemporaryFolder folder;
   frame.options.checkpoint.file = folder / "frame.samples";
   frame.options.checkpoint.inputs = {1, 2};
-  for (const double share : {0.05, 0.3, 0.6, 0.9, 0.9999})
+  for (const double fraction : {0.05, 0.3, 0.6, 0.9, 0.9999})
     EXPECT_THROW(render_frame(frame.shot, 1001, frame.geometry, frame.options, nullptr,
                               [&](double done) {
-                                if (done >= share) throw Stopped{};
+                                if (done >= fraction) throw Stopped{};
                               }),
                  Stopped);
   EXPECT_EQ(frame.picture().rgba, whole.rgba);

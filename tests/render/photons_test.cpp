@@ -15,13 +15,13 @@ namespace {
 
 constexpr double water_index = 1.333;
 
-/// Calls f(direction of flight, power, share) for the photons near a point, whosever subset.
+/// Calls f(direction of flight, power, weight) for the photons near a point, whosever subset.
 template <class F>
 void for_each_near(const PhotonMap& map, const V3f& at, const F& f) {
   for (unsigned subset = 0; subset < map.subsets(); ++subset)
     map.for_each_near(subset, at, V3f(0, 1, 0),
-                      [&](const V3f& flight, const V3f& power, float share, float) {
-                        f(flight, power, share / float(map.subsets()));
+                      [&](const V3f& flight, const V3f& power, float weight, float) {
+                        f(flight, power, weight / float(map.subsets()));
                       });
 }
 
@@ -32,7 +32,7 @@ double irradiance(const PhotonMap& map, double s, int n = 40) {
     for (int j = 0; j < n; ++j)
       for_each_near(
           map, V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
-          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
+          [&](const V3f&, const V3f& power, float weight) { sum += double(power.x) * weight; });
   return sum / n / n;
 }
 
@@ -68,7 +68,7 @@ TEST(Photons, LieUnderLevelWaterAsSnellAndFresnelSay) {
   EXPECT_NEAR(irradiance(map, 1.5), expected, 0.02 * expected);
 }
 
-// A lamp's light falls as the form factor of its square says, whatever the share of the surface.
+// A lamp's light falls as the form factor of its square says, whatever the fraction of the surface.
 TEST(Photons, OfALampCarryItsFormFactor) {
   Shot shot = pool_shot(1, 0);  // water that bends nothing
   shot.light = {panel({0, 2, 0}, 0.1, 0.1, 50)};
@@ -182,8 +182,8 @@ TEST(Photons, AreAllFoundOnce) {
         if (square < 1 && off.y * off.y <= 0.25f * r2)
           side[p.direction.y < 0 ? 0 : 1] += double(p.power.x) * 2 * (1 - square) / (pi64 * r2);
       }
-      for_each_near(map, at, [&](const V3f&, const V3f& power, float share) {
-        near += double(power.x) * share;
+      for_each_near(map, at, [&](const V3f&, const V3f& power, float weight) {
+        near += double(power.x) * weight;
       });
       Irradiance found;
       for (unsigned subset = 0; subset < map.subsets(); ++subset) {
@@ -280,7 +280,7 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
       double sum = 0;
       for_each_near(
           map, V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)),
-          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
+          [&](const V3f&, const V3f& power, float weight) { sum += double(power.x) * weight; });
       values.push_back(sum);
     }
     return values;
@@ -341,11 +341,11 @@ TEST(Photons, AreThoseOfTheirTime) {
     for (float x = -0.8f; x < 0.8f; x += 0.05f)
       for (float z = -0.8f; z < 0.8f; z += 0.05f, ++points)
         map.for_each_near(map.subset_at(time_sample), V3f(x, 0, z), V3f(0, 1, 0),
-                          [&](const V3f&, const V3f& power, float share, float) {
+                          [&](const V3f&, const V3f& power, float weight, float) {
                             const float its = power.y / power.x;
                             ASSERT_GE(its, eighth);
                             ASSERT_LT(its, eighth + 0.125f);
-                            light += double(power.x) * share;
+                            light += double(power.x) * weight;
                           });
     EXPECT_NEAR(light / points, photon_count / 4., 0.03 * photon_count / 4) << time_sample;
   }

@@ -80,15 +80,15 @@ TEST(RotationalMotion, SlidesAsVelocitiesSay) {
   keyed.shot.camera.fov_deg = 2 * std::atan(picture_size * pixel / 20) * 180 / pi64;
   keyed.shot.light = {sky(1)};
   keyed.shot.material.back().reflectance = V3f(0.5f);
-  const V3d way(0.3, -0.2, 1);  // m a frame
-  keyed.shot.obstacle[0].position.keys = {{991, way * -10}, {1011, way * 10}};
+  const V3d velocity(0.3, -0.2, 1);  // m a frame
+  keyed.shot.obstacle[0].position.keys = {{991, velocity * -10}, {1011, velocity * 10}};
   keyed.look();
 
   Turning given = keyed;
   given.shot.obstacle[0].position.keys = {{1001, {0, 0, 0}}};
   given.look();
   TriangleMesh& mesh = given.geometry.obstacle[0].mesh;
-  mesh.velocity.assign(mesh.position.size(), V3f(way * given.shot.timeline.fps));
+  mesh.velocity.assign(mesh.position.size(), V3f(velocity * given.shot.timeline.fps));
   const Film a = render_frame(keyed.shot, 1001, keyed.geometry),
              b = render_frame(given.shot, 1001, given.geometry);
   double most = 0, moved = 0;

@@ -11,7 +11,7 @@
 namespace drench::render::test {
 namespace {
 
-/// Share of the light that has come by a time, for shares of opening and closing.
+/// Fraction of the light that has come by a time, for fractions of opening and closing.
 double come_by(double time, double opening, double closing) {
   constexpr int steps = 4000;
   double by = 0, all = 0;
