@@ -6,7 +6,7 @@
 
 #include "render/packed.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The slab test of a ray against boxes, grown by its own rounding: x, y, z and z again as a pack.
 class BoxTest {
@@ -41,4 +41,4 @@ class BoxTest {
   __m128 origin_, inverse_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,23 +6,24 @@
 // channels lets bright saturated colours whiten as film does, and greys stay grey. Then AP1 to Rec.
 // 709, whatever leaves that gamut clipped, and the sRGB curve: 18 % grey shows as code 0.46.
 
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 
 #include "pipeline/contract/error.h"
 #include "render/color/color.h"
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr float kGrey = 0.18f, kRange = 1 - kGrey, kPower = 1.5f;
+constexpr float middle_grey = 0.18f, shoulder_range = 1 - middle_grey, shoulder_power = 1.5f;
 
 float shoulder(float x) {
-  if (!(x > kGrey)) return std::max(x, 0.f);  // also catches NaN
+  if (!(x > middle_grey)) return std::max(x, 0.f);  // also catches NaN
   if (x > 1e6f) return 1;
-  const float u = (x - kGrey) / kRange;
-  return kGrey + kRange * u / std::pow(1 + std::pow(u, kPower), 1 / kPower);
+  const float u = (x - middle_grey) / shoulder_range;
+  return middle_grey +
+         shoulder_range * u / std::pow(1 + std::pow(u, shoulder_power), 1 / shoulder_power);
 }
 
 /// NaN is black.
@@ -64,4 +65,4 @@ std::vector<uint8_t> ViewTransform::operator()(const Film& film) const {
 
 std::string ViewTransform::key() const { return ocio_ ? ocio_->key() : std::string(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -1,4 +1,4 @@
-#include "render/film/frame_checkpoint.h"
+#include "render/frame_checkpoint.h"
 
 #include <fmt/format.h>
 
@@ -6,15 +6,15 @@
 #include "pipeline/contract/files/files.h"
 #include "render/film/checkpoint_archive.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Changes with the layout of what is archived.
-constexpr uint64_t kFormat = 0x6472656e63680004;  // "drench", 4
+constexpr uint64_t format_version = 0x6472656e63680004;  // "drench", 4
 
 struct Head {
-  uint64_t format = kFormat;
+  uint64_t format = format_version;
   Digest inputs;
   uint64_t pixels = 0;
 };
@@ -30,16 +30,16 @@ void archive(CheckpointArchive& file, Sums& sums) {
 
 }  // namespace
 
-CheckpointArchive::CheckpointArchive(const std::filesystem::path& file, Way way)
-    : way_(way),
+CheckpointArchive::CheckpointArchive(const std::filesystem::path& file, Mode mode)
+    : mode_(mode),
       file_(file),
       stream_(file, std::ios::binary |
-                        (way == Way::write ? std::ios::out | std::ios::trunc : std::ios::in)) {
+                        (mode == Mode::write ? std::ios::out | std::ios::trunc : std::ios::in)) {
   if (!stream_) throw Error(fmt::format("{}: cannot be opened", file.string()));
 }
 
 void CheckpointArchive::bytes(void* data, size_t size) {
-  if (way_ == Way::write)
+  if (mode_ == Mode::write)
     stream_.write(static_cast<const char*>(data), std::streamsize(size));
   else
     stream_.read(static_cast<char*>(data), std::streamsize(size));
@@ -51,7 +51,7 @@ bool CheckpointArchive::finish() {
   const Digest digest = hasher_.finish();
   Digest other = digest;
   value(other);
-  if (way_ == Way::read) return stream_.good() && other == digest;
+  if (mode_ == Mode::read) return stream_.good() && other == digest;
   stream_.close();  // flushes: a full disk may show only here
   std::error_code code;
   return stream_.good() && std::filesystem::file_size(file_, code) == size_ && !code;
@@ -59,8 +59,8 @@ bool CheckpointArchive::finish() {
 
 void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   write_file_whole(checkpoint.file, [&](const std::filesystem::path& temporary) {
-    CheckpointArchive file(temporary, CheckpointArchive::Way::write);
-    Head head{kFormat, checkpoint.inputs, sums.pixel.size()};
+    CheckpointArchive file(temporary, CheckpointArchive::Mode::write);
+    Head head{format_version, checkpoint.inputs, sums.pixel.size()};
     file.value(head);
     archive(file, sums);
     if (!file.finish())
@@ -71,10 +71,10 @@ void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
 
 bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   if (checkpoint.file.empty() || !std::filesystem::is_regular_file(checkpoint.file)) return false;
-  CheckpointArchive file(checkpoint.file, CheckpointArchive::Way::read);
+  CheckpointArchive file(checkpoint.file, CheckpointArchive::Mode::read);
   Head head;
   file.value(head);
-  if (head.format != kFormat || head.inputs != checkpoint.inputs ||
+  if (head.format != format_version || head.inputs != checkpoint.inputs ||
       head.pixels != sums.pixel.size())
     return false;
   Sums read = sums;
@@ -84,4 +84,4 @@ bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums) {
   return true;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/shot/shot.h"
 
-namespace drench {
+namespace drench::render {
 
 class OcioView {
  public:
@@ -21,4 +21,4 @@ class OcioView {
 /// @throws Error as ViewTransform.
 std::shared_ptr<const OcioView> make_ocio_view(const ViewSettings& settings);
 
-}  // namespace drench
+}  // namespace drench::render

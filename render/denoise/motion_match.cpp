@@ -1,28 +1,28 @@
-#include "render/scene/motion_match.h"
+#include "render/denoise/motion_match.h"
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-/// Pixels by which the way there and back may miss: half of one is lost to rounding each way, and
-/// what speeds up, or turns, comes back elsewhere by a part of its motion.
-constexpr float kMostMissed = 1.5f, kMissedShare = 0.25f;
+/// Pixels by which the motion there and back may miss: half of one is lost to rounding each time,
+/// and what speeds up, or turns, comes back elsewhere by a part of its motion.
+constexpr float max_missed = 1.5f, missed_fraction = 0.25f;
 /// Squared difference of guides, about 1 in size, that one surface may have between frames, and
 /// beyond it in units of their variance.
-constexpr float kMostUnlike = 0.25f, kNoiseUnlike = 9;
+constexpr float max_difference = 0.25f, noise_factor = 9;
 
-struct Place {
+struct PixelPosition {
   int x = 0, y = 0;
   bool inside = false;
 };
 
 /// The pixel that a motion from a pixel ends in, the nearest of the picture if it is none.
-Place arrival(const NoisyPicture& picture, int x, int y, Side side) {
+PixelPosition arrival(const NoisyPicture& picture, int x, int y, Side side) {
   const size_t p = size_t(y) * size_t(picture.width) + size_t(x);
   const float u = float(x) + picture.motion[int(side)][0][p];
   const float v = float(y) + picture.motion[int(side)][1][p];
@@ -44,7 +44,7 @@ bool leads_back(const NoisyPicture& from, const NoisyPicture& to, size_t p, size
     missed += m * m;
     length += from.motion[there][c][p] * from.motion[there][c][p];
   }
-  return std::sqrt(missed) <= kMostMissed + kMissedShare * std::sqrt(length);
+  return std::sqrt(missed) <= max_missed + missed_fraction * std::sqrt(length);
 }
 
 bool looks_alike(const NoisyPicture& from, const NoisyPicture& to, size_t p, size_t q) {
@@ -55,7 +55,7 @@ bool looks_alike(const NoisyPicture& from, const NoisyPicture& to, size_t p, siz
     unlike += d * d;
     noise += from.feature_variance[f][p] + scale * scale * to.feature_variance[f][q];
   }
-  return unlike <= kMostUnlike + kNoiseUnlike * noise;
+  return unlike <= max_difference + noise_factor * noise;
 }
 
 }  // namespace
@@ -66,12 +66,11 @@ PixelMatch match_pixels(const NoisyPicture& from, const NoisyPicture& to, Side s
   tbb::parallel_for(0, from.height, [&](int y) {
     for (int x = 0; x < from.width; ++x) {
       const size_t p = size_t(y) * size_t(from.width) + size_t(x);
-      const Place place = arrival(from, x, y, side);
-      const size_t q = size_t(place.y) * size_t(to.width) + size_t(place.x);
+      const PixelPosition end = arrival(from, x, y, side);
+      const size_t q = size_t(end.y) * size_t(to.width) + size_t(end.x);
       match.pixel[p] = int32_t(q);
       match.same[p] =
-          place.inside && leads_back(from, to, p, q, side) && looks_alike(from, to, p, q) ? 1.f
-                                                                                          : 0.f;
+          end.inside && leads_back(from, to, p, q, side) && looks_alike(from, to, p, q) ? 1.f : 0.f;
     }
   });
   return match;
@@ -87,4 +86,4 @@ PixelMatch chained(const PixelMatch& first, const PixelMatch& next) {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -1,4 +1,4 @@
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
 #include <OpenColorIO/OpenColorIO.h>
 #include <fmt/format.h>
@@ -10,7 +10,7 @@
 #include "pipeline/contract/hash.h"
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -108,4 +108,4 @@ std::shared_ptr<const OcioView> make_ocio_view(const ViewSettings& settings) {
   return std::make_shared<const ConfigView>(settings);
 }
 
-}  // namespace drench
+}  // namespace drench::render

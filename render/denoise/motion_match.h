@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/denoise/denoise.h"
+#include "render/film/noisy_picture.h"
 
-namespace drench {
+namespace drench::render {
 
 /// By pixel of one frame.
 struct PixelMatch {
@@ -23,4 +23,4 @@ PixelMatch match_pixels(const NoisyPicture& from, const NoisyPicture& to, Side s
 /// To a frame farther away, by one in between. @param first  to that one, @param next  from it
 PixelMatch chained(const PixelMatch& first, const PixelMatch& next);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -1,6 +1,6 @@
 // What the scene knows of cloth at a point of it: its fuzz, its yarns, its gaps, how wet it is.
 
-#include "render/bsdf/fabric.h"
+#include "render/scene/fabric.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 
 #include "pipeline/contract/error.h"
 
-namespace drench {
+namespace drench::render {
 
 FabricPoint fabric_at(const Scene& scene, const Surface& surface, const Hit& hit, float time,
                       float wetness, Bodies in) {
@@ -70,7 +70,7 @@ std::pair<V3f, V3f> Scene::yarns_along(const Hit& hit, float time) const {
   const V3f e = (at.position[1] - at.position[0]).unpacked(),
             f = (at.position[2] - at.position[0]).unpacked();
   const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
-  return {e * q.y - f * p.y, f * p.x - e * q.x};  // either may run the other way
+  return {e * q.y - f * p.y, f * p.x - e * q.x};  // either may run in the opposite direction
 }
 
 void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what) {
@@ -96,21 +96,21 @@ void Scene::add_wetness(SceneObject& object, const TriangleMesh& mesh, const std
 float Scene::transmitted(const Ray& ray, const Target& target, World world) const {
   if (!has_gaps_) return occluded(ray, target, world) ? 0.f : 1.f;
   if (occluded(ray, target, world, Gaps::open)) return 0;
-  float share = 1;
+  float transmittance = 1;
   for (uint32_t k = 0; k < objects_.size(); ++k) {
     const float gap = materials_[objects_[k].material].gap;
     if (!(gap > 0) || (world == World::plate && objects_[k].matte == Matte::none)) continue;
     // Layer by layer, as paths go through them.
     Ray rest = ray;
     float reach = target.distance * (1 - 1e-4f);
-    for (Hit hit = meet(k, rest, reach); hit.kind != Hit::Kind::nothing && share > 0;
+    for (Hit hit = meet(k, rest, reach); hit.kind != Hit::Kind::nothing && transmittance > 0;
          hit = meet(k, rest, reach)) {
-      share *= gap;
+      transmittance *= gap;
       reach -= hit.distance;
       rest.origin = surface(rest, hit).leave(ray.direction);
     }
   }
-  return share;
+  return transmittance;
 }
 
 bool Scene::fluid_beyond(const Ray& ray) const {
@@ -132,4 +132,4 @@ float Scene::wetness(const Hit& hit) const {
   return std::clamp(w, 0.f, 1.f);  // rounding
 }
 
-}  // namespace drench
+}  // namespace drench::render

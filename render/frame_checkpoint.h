@@ -9,7 +9,7 @@
 #include "render/integrator/sample_plan.h"
 #include "render/options.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What the samples of a picture have added up to.
 struct Sums {
@@ -28,7 +28,7 @@ struct Sums {
   /// Decides on the next pass. @return whether there is one
   bool begin_pass(double photon_error) {
     if (!plan.next(beauty(), photon_error)) return false;
-    rounds.begin_pass(plan.share());
+    rounds.begin_pass(plan.fraction());
     return true;
   }
   /// Samples that a pixel shall have after a round of this pass.
@@ -50,4 +50,4 @@ void write_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums);
 /// these inputs, and they are as they were.
 bool read_checkpoint(const FrameCheckpoint& checkpoint, Sums& sums);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,7 +7,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 inline uint32_t reverse_bits(uint32_t x) {
   x = __builtin_bswap32(x);
@@ -47,7 +47,7 @@ inline uint32_t sobol_second_reversed(uint32_t x) {
   return x;
 }
 
-/// By way of a signed number, which packs convert in one instruction.
+/// Through a signed number, which packs convert in one instruction.
 inline float unit_float(uint32_t bits) { return float(int32_t(bits >> 8)) * 0x1p-24f; }
 
 /// Interleaves the low 16 bits of x and y: pixels near each other get indices near each other.
@@ -96,14 +96,14 @@ class Sampler {
   /// One number in [0, 1) for a dimension: the first of `two`.
   float one(uint32_t dimension) const {
     const uint32_t key = key_of(dimension);
-    return unit_float(coordinate(shuffled_index(key), key, kFirst));
+    return unit_float(coordinate(shuffled_index(key), key, first_seed));
   }
 
   /// A point in [0, 1)^2 for a dimension: an Owen-scrambled (0, 2)-sequence.
   V2f two(uint32_t dimension) const {
     const uint32_t key = key_of(dimension), index = shuffled_index(key);
-    return {unit_float(coordinate(index, key, kFirst)),
-            unit_float(coordinate(sobol_second_reversed(index), key, kSecond))};
+    return {unit_float(coordinate(index, key, first_seed)),
+            unit_float(coordinate(sobol_second_reversed(index), key, second_seed))};
   }
 
   /// `two` of four dimensions from `first` on, at little more than the cost of one: eight numbers
@@ -112,8 +112,8 @@ class Sampler {
     std::array<uint32_t, 8> bits;
     for (uint32_t k = 0; k < 8; ++k) {
       const uint32_t key = key_of(first + k / 2), index = shuffled_index(key);
-      bits[k] =
-          coordinate(k % 2 ? sobol_second_reversed(index) : index, key, k % 2 ? kSecond : kFirst);
+      bits[k] = coordinate(k % 2 ? sobol_second_reversed(index) : index, key,
+                           k % 2 ? second_seed : first_seed);
     }
     std::array<V2f, 4> out;
     for (uint32_t k = 0; k < 8; ++k) out[k / 2][int(k % 2)] = unit_float(bits[k]);
@@ -126,8 +126,8 @@ class Sampler {
     const uint32_t key = key_of(dimension);
     for (uint32_t k = 0; k < 8; ++k) {
       const uint32_t index = at(first + k).shuffled_index(key);
-      x[k] = coordinate(index, key, kFirst);
-      y[k] = coordinate(sobol_second_reversed(index), key, kSecond);
+      x[k] = coordinate(index, key, first_seed);
+      y[k] = coordinate(sobol_second_reversed(index), key, second_seed);
     }
     std::array<V2f, 8> out;
     for (uint32_t k = 0; k < 8; ++k) out[k] = {unit_float(x[k]), unit_float(y[k])};
@@ -135,7 +135,8 @@ class Sampler {
   }
 
  private:
-  static constexpr uint32_t kFirst = 0x68bc21eb, kSecond = 0x02e5be93;  // seeds, any odd numbers
+  static constexpr uint32_t first_seed = 0x68bc21eb,
+                            second_seed = 0x02e5be93;  // seeds, any odd numbers
 
   uint32_t key_of(uint32_t dimension) const { return hash_bits(seed_ + dimension * 0x9e3779b9u); }
   uint32_t shuffled_index(uint32_t key) const {
@@ -149,4 +150,4 @@ class Sampler {
   uint32_t reversed_index_ = 0, seed_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

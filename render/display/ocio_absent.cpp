@@ -1,7 +1,7 @@
 #include "pipeline/contract/error.h"
-#include "render/color/ocio_view.h"
+#include "render/display/ocio_view.h"
 
-namespace drench {
+namespace drench::render {
 
 std::shared_ptr<const OcioView> make_ocio_view(const ViewSettings&) {
   throw Error(
@@ -9,4 +9,4 @@ std::shared_ptr<const OcioView> make_ocio_view(const ViewSettings&) {
       "DRENCH_OCIO on), or leave the section out for the built-in view transform");
 }
 
-}  // namespace drench
+}  // namespace drench::render

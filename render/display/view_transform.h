@@ -4,11 +4,12 @@
 #include <memory>
 #include <string>
 
-#include "render/renderer.h"
+#include "pipeline/contract/shot/shot.h"
+#include "render/film/film.h"
 
-namespace drench {
+namespace drench::render {
 
-/// OpenColorIO's way from linear ACEScg to a display.
+/// OpenColorIO's transform from linear ACEScg to a display.
 class OcioView;
 
 /// The built-in view of linear ACEScg on an sRGB display, or one of an OpenColorIO config.
@@ -29,4 +30,4 @@ class ViewTransform {
   std::shared_ptr<const OcioView> ocio_;
 };
 
-}  // namespace drench
+}  // namespace drench::render
