@@ -17,7 +17,8 @@ Ended bash(const std::string& text) {
 }
 
 TEST(Scripts, AreValidBashAndExecutable) {
-  for (const char* name : {"run", "test", "bench", ".ci/run", "tests/blender/run"}) {
+  for (const char* name :
+       {"run", "test", "bench", ".ci/run", "tests/blender/run", "tests/tidy/run"}) {
     EXPECT_EQ(bash("bash -n \"$root/" + std::string(name) + "\"").code, 0) << name;
     EXPECT_EQ(bash("test -x \"$root/" + std::string(name) + "\"").code, 0) << name;
   }
@@ -108,7 +109,7 @@ std::string configured(const std::string& before, const std::string& wish) {
 
 // The CUDA simulator is left out by `./run` where no device is, and brought back by what needs it.
 TEST(Scripts, BuildTheCudaSimulatorWhereItIsOfUse) {
-  const std::string run = "drench_cuda=OFF;", test = "", forced = "DRENCH_CUDA=ON;";
+  const std::string run = "drench_cuda=OFF;", test, forced = "DRENCH_CUDA=ON;";
   EXPECT_EQ(configured("", run), "-DDRENCH_CUDA=OFF\n");
   EXPECT_EQ(configured("", test), "-DDRENCH_CUDA=AUTO\n");
   EXPECT_EQ(configured("OFF", run), "");

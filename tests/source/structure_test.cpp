@@ -120,7 +120,7 @@ std::vector<Include> includes() {
     const std::vector<std::string> lines = lines_of(root / file);
     for (size_t k = 0; k < lines.size(); ++k) {
       std::smatch match;
-      if (lines[k].find("#") == std::string::npos || !std::regex_match(lines[k], match, form))
+      if (lines[k].find('#') == std::string::npos || !std::regex_match(lines[k], match, form))
         continue;
       found.push_back(
           {.file = file, .named = match[2], .line = int(k + 1), .own = match[1] == "\""});
