@@ -3,8 +3,9 @@
 # quick or full. Full are those of the GoogleTest filters (* and ? are wild) SLOW, more than 2 CPU
 # seconds, and LONG, more than 20.
 #
-# A limit is four times or more what such a test takes while other work has half of the cores. It ends
-# what hangs, and a quick test that has become slow fails by it.
+# Where four others share two cores a test takes up to eight times its CPU seconds: quick ones have 60 s,
+# slow ones 240, long ones 900. A limit ends what hangs, and a quick test that has become slow fails by
+# it.
 set(DRENCH_TEST_PATIENCE 1 CACHE STRING "Factor on the time limits of tests, for slow machines")
 function(drench_add_tests area)
   cmake_parse_arguments(arg "" "" "LIBRARIES;SOURCES;SLOW;LONG" ${ARGN})
@@ -15,12 +16,12 @@ function(drench_add_tests area)
   set_property(DIRECTORY APPEND PROPERTY LABELS ${area})
   list(JOIN arg_SLOW ":" slow)
   list(JOIN arg_LONG ":" long)
-  drench_discover(${area} "*-${slow}:${long}" quick 30)
+  drench_discover(${area} "*-${slow}:${long}" quick 60)
   if(slow)
-    drench_discover(${area} "${slow}" full 120)
+    drench_discover(${area} "${slow}" full 240)
   endif()
   if(long)
-    drench_discover(${area} "${long}" full 600)
+    drench_discover(${area} "${long}" full 900)
   endif()
   # A filter that a renamed test has left behind would keep nothing out of the quick tests.
   if(slow OR long)
