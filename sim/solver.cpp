@@ -12,6 +12,7 @@
 #include "sim/passes/viscosity/viscosity_solve.h"
 #include "sim/state_memory.h"
 #include "sim/step_plan.h"
+#include "sim/passes/motion/limits.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 

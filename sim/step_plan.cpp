@@ -16,80 +16,11 @@
 #include "sim/passes/tension/wetting.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_solve.h"
-#include "sim/passes/wcsph/density.h"
-#include "sim/passes/wcsph/pressure_viscosity.h"
+#include "sim/passes/wcsph/wcsph.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
-
-Walls walls_of(const Parameters& p) {
-  Walls walls{};
-  walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
-  return walls;
-}
-
-GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
-
-template <class Kernel>
-DensitySum<Kernel> density_pass(const State& state) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  return {f.position.view(),
-          f.cloth_share.size() ? f.cloth_share.data() : nullptr,
-          f.density.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          p.support_radius,
-          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
-          p.rest_density,
-          p.sound_speed * p.sound_speed,
-          walls_of(p)};
-}
-
-void sum_density(State& state) {
-  if (state.cloth.triangles == 0) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state));
-  } else if (state.parameters.paper) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
-  } else {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state, state.fluid.position.view(), Shaded::near));
-  }
-}
-
-void pressure_viscosity(State& state) {
-  const Parameters& p = state.parameters;
-  FluidState& f = state.fluid;
-  const PressureViscosity pass{f.position.view(),
-                               f.velocity.view(),
-                               f.pressure_term.data(),
-                               f.inverse_density.data(),
-                               f.acceleration.view(),
-                               p.support_radius,
-                               p.particle_mass * spiky_gradient_factor(p.support_radius),
-                               p.dynamic_viscosity,
-                               p.wall_viscosity,
-                               p.rest_density,
-                               {p.gravity[0], p.gravity[1], p.gravity[2]},
-                               walls_of(p)};
-  if (state.cloth.triangles > 0 && !p.paper) {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
-                  sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
-  } else {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
-  }
-}
-
-void integrate_velocity(State& state) {
-  FluidState& f = state.fluid;
-  const VecView v = f.velocity.view(), a = f.acceleration.view();
-  const float dt = float(state.dt);
-  parallel_for(
-      "integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
-}
 
 void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
 /// Particles stand where sheets do: at the start of the step.
@@ -230,20 +161,6 @@ const Pass all_passes[] = {
     {"paper_move", paper, moving | column_cloth, moving | column_cloth, paper_move},
 };
 
-struct JoinLimits {
-  DRENCH_HD Limits operator()(const Limits& a, const Limits& b) const {
-    Limits joined = a;
-    joined.max_speed = a.max_speed > b.max_speed ? a.max_speed : b.max_speed;
-    joined.max_acceleration =
-        a.max_acceleration > b.max_acceleration ? a.max_acceleration : b.max_acceleration;
-    joined.bad_particle = first(a.bad_particle, b.bad_particle);
-    joined.bad_vertex = first(a.bad_vertex, b.bad_vertex);
-    return joined;
-  }
-  /// The smaller index, whatever the order of the reduction; -1 is none.
-  DRENCH_HD static int first(int a, int b) { return a < 0 || (b >= 0 && b < a) ? b : a; }
-};
-
 }  // namespace
 
 std::span<const Pass> every_pass() { return all_passes; }
@@ -260,48 +177,6 @@ void step_cloth_alone(State& state) {
   state.cloth.force.clear();
   if (state.parameters.turns) turn_frame(state);
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
-}
-
-Limits measure_limits(State& state) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  // Twenty times the speed of sound is no flow but a blow-up; NaN fails the comparison as well.
-  const float absurd = p.fluid ? 20.f * p.sound_speed : 1e4f;
-  const VecView v = f.velocity.view(), a = f.acceleration.view(), cv = state.cloth.velocity.view();
-  const bool accelerated = f.acceleration.x.size() > 0;  // the incompressible solver keeps none
-  Limits limits;
-  if (f.count > 0) {
-    limits = parallel_reduce(
-        "limits: fluid", f.count, Limits{},
-        DRENCH_LAMBDA(int i) {
-          const float speed = length(v[i]), push = accelerated ? length(a[i]) : 0.f;
-          Limits one;
-          if (!(speed < absurd) || !(push < 1e30f)) {
-            one.bad_particle = i;
-          } else {
-            one.max_speed = speed, one.max_acceleration = push;
-          }
-          return one;
-        },
-        JoinLimits{});
-  }
-  if (state.cloth.vertices > 0) {
-    const Limits cloth = parallel_reduce(
-        "limits: cloth", state.cloth.vertices, Limits{},
-        DRENCH_LAMBDA(int i) {
-          const float speed = length(cv[i]);
-          Limits one;
-          if (speed < absurd) {
-            one.max_speed = speed;
-          } else {
-            one.bad_vertex = i;
-          }
-          return one;
-        },
-        JoinLimits{});
-    limits = JoinLimits{}(limits, cloth);
-  }
-  return limits;
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -23,7 +23,4 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth);
 /// A step of cloth that no fluid touches.
 void step_cloth_alone(State& state);
 
-/// Limits of the current state.
-Limits measure_limits(State& state);
-
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -147,97 +147,12 @@ inline BlockInverse free_block_inverse(const State& state) {
 }
 
 /// The matrix at the positions and the right side without loads; w = 0.
-inline void linearise_cloth(State& state) {
-  ClothState& c = state.cloth;
-  ClothSystem& s = state.cloth_system;
-  const Parameters& p = state.parameters;
-  const float dt = float(state.dt);
-  const VecView x = c.position.view(), v = c.velocity.view(), axis = s.axis.view(),
-                base = s.base.view(), free = s.free.view(), change = s.change.view(),
-                owed = c.force.view();
-  const SpringEnds ends = spring_ends_of(c);
-  const float *rest = c.rest_length.data(), *stiffness = c.stiffness.data(),
-              *damping = c.spring_damping.data(), *mass = c.mass.data(),
-              *rate = c.damping_rate.data(), *inverse_mass = c.inverse_mass.data();
-  float *tension = s.tension.data(), *inertia = s.inertia.data();
-  const BlockInverse block = block_inverse(state);
-  const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
-  const AirDrag air = air_drag_of(state);
-  const VecView air_push = c.air_push.view();
-  ClothControl* control = s.control.data();
-  parallel_for(
-      "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
-  for_each_lane(
-      "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
-        using T = decltype(load(mass, i));
-        const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
-        const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
-        Vec3<T> push =
-            Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
-        T b[6] = {heavy, T(0.f), T(0.f), heavy, T(0.f), heavy};
-        Vec3<T> held = none;
-        for (int k = 0; k < ends.slots; ++k) {
-          const auto at = i + k * ends.stride;
-          const Vec3<T> d = ends.way(x, here, i, k);
-          const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
-          const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
-          const T t = stiff * max0(excess * inverse);
-          const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
-          const Vec3<T> away = speed - ends.at_end(v, i, k);
-          push = push + n * (load(stiffness, at) * excess);
-          held = held + away * t + e * dot(e, away);
-          store(tension, at, t), axis.put(at, e);
-          b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
-          b[3] = b[3] + t + e.y * e.y, b[4] = b[4] + e.y * e.z, b[5] = b[5] + t + e.z * e.z;
-        }
-        if (air.on) {
-          const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);
-          push = push + air_push.at(i);
-          b[0] = b[0] + d.x, b[1] = b[1] + m.x, b[2] = b[2] + m.z;
-          b[3] = b[3] + d.y, b[4] = b[4] + m.y, b[5] = b[5] + d.z;
-        }
-        store(inertia, i, heavy);
-        block.put(i, b, maximum(heavy, T(1e-20f)));
-        const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
-        free.put(i, Vec3<T>{moves, moves, moves});
-        base.put(i, push * T(dt * dt) - held * T(dt));
-        change.put(i, none);
-      });
-}
+void linearise_cloth(State& state);
 
 /// Vertices that forces would take through a wall end at it, and what pushes them stands on it: a
 /// sheet on the floor bears its water. Their blocks are those of what is left free: see
 /// free_block_inverse (a wrinkled sheet on a floor was thrown along it at 26 m/s).
-inline void hold_at_walls(State& state) {
-  const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
-  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
-                right = s.right.view(), free = s.free.view(), change = s.change.view();
-  const float dt = float(state.dt);
-  const BlockInverse block = block_inverse(state);
-  const ClothWalls walls = cloth_walls_of(state.parameters);
-  const float reach = state.parameters.spacing;  // a step is not to end farther off
-  const float* inertia = s.inertia.data();
-  parallel_for(
-      "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
-        const Vec3<float> straight = x[i] + v[i] * dt,
-                          to = straight + block.times(i, base[i] + right[i]);
-        Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, may = free[i], w = change[i];
-        walls.stop(stop, unused);
-        const auto hold = [reach](float stop, float to, float from, float straight, float& may,
-                                  float& w) {
-          if (stop == to || may == 0.f || fabsf(stop - from) > reach) return;
-          may = 0.f, w = stop - straight;
-        };
-        hold(stop.x, to.x, x.x[i], straight.x, may.x, w.x);
-        hold(stop.y, to.y, x.y[i], straight.y, may.y, w.y);
-        hold(stop.z, to.z, x.z[i], straight.z, may.z, w.z);
-        const Vec3<float> before = free[i];
-        if (may.x == before.x && may.y == before.y && may.z == before.z) return;
-        free.set(i, may), change.set(i, w);
-        block.put_free(i, block, may, {0.f, 0.f, 0.f}, inertia[i]);
-      });
-}
+void hold_at_walls(State& state);
 
 DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
   return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
@@ -303,15 +218,7 @@ struct ClothSweep {
 
 /// Has the solve of the sheets ended? On the GPU the host asks now and then only; launches after
 /// the end do nothing.
-inline bool cloth_ended(const State& state, int sweep) {
-#if defined(__CUDACC__)
-  constexpr int patience = 16;
-  return sweep % patience == patience - 1 && value_at(state.cloth_system.control, 0).done;
-#else
-  (void)sweep;
-  return state.cloth_system.control.data()->done;
-#endif
-}
+bool cloth_ended(const State& state, int sweep);
 
 /// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
 /// tolerance^2 of ClothControl::reference.
@@ -354,10 +261,7 @@ void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const Ve
         "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
   }
 }
-inline void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps,
-                        float tolerance) {
-  sweep_matrix(state, scaled_cloth_matrix(state), w, right, sweeps, tolerance);
-}
+void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps, float tolerance);
 
 /// What a sheet's way leaves of what it is given, kg m, its mass, and how many of its axes
 /// something holds.
@@ -371,31 +275,6 @@ struct SheetLack {
 /// What sweeps that end early leave of A w = right the fluid has given and the sheet not received.
 /// Springs push no sheet as a whole: where nothing holds it a shift by the sum over its mass, on
 /// which they do not act, closes its momentum.
-inline void balance_loose_sheets(State& state, const VecView& w, const VecView& right) {
-  const FreeWays free = free_ways(state);
-  const ClothMatrix matrix = cloth_matrix(state);
-  ClothControl* control = state.cloth_system.control.data();
-  for (const VertexRange& sheet : state.cloth.loose) {
-    const int first = sheet.first;
-    reduce_then(
-        "cloth: lack", sheet.count, SheetLack{},
-        DRENCH_LAMBDA(int k) {
-          const int i = first + k;
-          const Vec3<float> left = right[i] - matrix.times(w, i), may = free.axis[i];
-          const double gripped = free.obstacles && length2(free.normal[i]) > 0.f ? 1. : 0.;
-          return SheetLack{left.x, left.y, left.z, matrix.inertia[i],
-                           3. - may.x - may.y - may.z + gripped};
-        },
-        SheetLack{},
-        DRENCH_LAMBDA(const SheetLack& lack) {
-          const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
-          control->shift = {float(lack.x * inverse), float(lack.y * inverse),
-                            float(lack.z * inverse)};
-        });
-    parallel_for(
-        "cloth: balance", sheet.count,
-        DRENCH_LAMBDA(int k) { w.set(first + k, w[first + k] + control->shift); });
-  }
-}
+void balance_loose_sheets(State& state, const VecView& w, const VecView& right);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -63,32 +63,9 @@ inline float contact_distance_of(const Parameters& p) { return 0.5f * p.spacing;
 /// Sorts the particles in reach of a sheet by triangle: the near list, all that coupling works on.
 /// With `reach`, those farther than that from the contact distance stand behind the others, by
 /// triangle as well.
-inline void sort_contacts(State& state, float reach) {
-  const int triangles = state.cloth.triangles;
-  const int* triangle = state.fluid.triangle.data();
-  const float *distance = state.fluid.sheet_distance.data(),
-              *half_thickness = state.cloth.half_thickness.data();
-  const float contact_distance = contact_distance_of(state.parameters);
-  int* key = state.contact.key.data();
-  parallel_for(
-      "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const int t = triangle[i];
-        if (t < 0) {
-          key[i] = 2 * triangles;
-          return;
-        }
-        key[i] = distance[i] - half_thickness[t] - contact_distance > reach ? triangles + t : t;
-      });
-  stable_sort_keys(state.contact.key, state.fluid.count, 2 * triangles, state.contact.order,
-                   state.contact.start, state.scratch);
-  state.contact.near = value_at(state.contact.start, 2 * triangles);
-  state.contact.close = value_at(state.contact.start, triangles);
-}
+void sort_contacts(State& state, float reach);
 
-inline void sort_exact_contacts(State& state) {
-  // Faster than a quarter of the speed of sound nothing should come near.
-  sort_contacts(state, 0.25f * state.parameters.sound_speed * float(state.dt));
-}
+void sort_exact_contacts(State& state);
 
 /// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the
 /// near list.
@@ -219,133 +196,15 @@ DRENCH_HD void update_contact(const ContactView& c, Index row, const VecView& pr
 constexpr int contact_iterations = 6;
 constexpr float over_relaxation = 1.8f;
 
-inline ContactSetup contact_setup(State& state) {
-  FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
-  const Parameters& p = state.parameters;
-  const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {near_list(state),
-          f.velocity.view(),
-          f.normal.view(),
-          f.sheet_distance.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          c.half_thickness.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          beta,
-          float(state.dt),
-          p.particle_mass,
-          p.rest_density,
-          p.sound_speed,
-          p.support_radius,
-          contact_distance_of(p),
-          p.dynamic_viscosity,
-          0.01f * p.sound_speed,
-          p.wall_scale};
-}
-
 enum class Rows { close, all };
 
 /// Adds up what the contacts of each triangle give to its corners, in their order.
 /// @param again  the same rows were the last to be added: where there are none zeros stand already
-inline void sum_by_triangle(State& state, Rows which, bool again = false) {
-  const ContactView c = contact_rows(state);
-  const int triangles = state.cloth.triangles, *start = state.contact.start.data();
-  const VecView impulse = state.contact.impulse.view();
-  const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
-  parallel_for(
-      "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
-        if (again && start[t] == start[t + 1] && last == 0) return;
-        Vec3<float> sum[3] = {};
-        for (int soft = 0; soft <= last; ++soft) {
-          const int k = t + soft * triangles;
-          for (int row = start[k] + soft * gap; row < start[k + 1] + soft * gap; ++row) {
-            const Vec3<float> change = c.change[row];
-            for (int e = 0; e < 3; ++e) sum[e] = sum[e] + change * c.weight[e][row];
-          }
-        }
-        for (int e = 0; e < 3; ++e) impulse.set(3 * t + e, sum[e]);
-      });
-}
+void sum_by_triangle(State& state, Rows which, bool again = false);
 
 /// Rows of the near list; the vertices receive what the path test took from particles.
-inline void start_contacts(State& state) {
-  ClothState& cloth = state.cloth;
-  const ContactView c = contact_rows(state);
-  const NearView near = near_list(state);
-  const VecView owed = state.fluid.owed.view(), force = cloth.force.view();
-  const bool owes = state.owes;
-  parallel_for(
-      "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
-        const int place = c.place_in_list(row), i = place < 0 ? -1 : near.order[place];
-        c.particle[row] = i;
-        for (int k = 0; k < 3; ++k) {
-          c.vertex[k][row] = i < 0 ? 0 : near.corner[3 * near.triangle[i] + k];
-          c.weight[k][row] = i < 0 ? 0.f : near.weight(i, k);
-        }
-        if (owes) c.change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : owed[i]);
-      });
-  const VecView impulse = state.contact.impulse.view();
-  if (owes) {
-    sum_by_triangle(state, Rows::all);
-    state.fluid.owed.clear();
-    state.owes = false;
-  }
-  float* share = cloth.share.data();
-  const float inverse_dt = 1.f / float(state.dt);
-  const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
-  parallel_for(
-      "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
-        float weights = 0.f;
-        near.for_each_corner(v, [&](int t, int e) {
-          for (int row = near.start[t]; row < near.start[t + 1]; ++row) weights += c.weight[e][row];
-          const int k = t + triangles;
-          for (int row = near.start[k] + gap; row < near.start[k + 1] + gap; ++row)
-            weights += c.weight[e][row];
-        });
-        force.set(v,
-                  owes ? near.sum_on_vertex(impulse, v) * -inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
-        share[v] = weights;
-      });
-}
+void start_contacts(State& state);
 
-inline void solve_contacts(State& state) {
-  if (state.contact.near == 0) return;
-  ClothState& cloth = state.cloth;
-  const ContactSetup setup = contact_setup(state);
-  const ContactView c = contact_rows(state);
-  const NearView near = setup.near;
-  const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
-                velocity = state.fluid.velocity.view(), impulse = state.contact.impulse.view();
-  const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
-  const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
-  for_each_lane(
-      "contact: prepare", c.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
-  for_each_lane(
-      "contact: soft", c.rows - c.soft_begin, DRENCH_LAMBDA(auto row) {
-        update_contact(c, row + c.soft_begin, predicted, inverse_particle_mass, 1.f);
-      });
-  for (int iteration = 0; iteration < contact_iterations; ++iteration) {
-    const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
-    for_each_lane(
-        "contact: particles", c.close, DRENCH_LAMBDA(auto row) {
-          update_contact(c, row, predicted, inverse_particle_mass, relaxation);
-        });
-    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
-    // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
-    parallel_for(
-        "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
-          if (share[v] == 0.f) return;
-          const Vec3<float> sum = near.sum_on_vertex(impulse, v);
-          predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
-          force.set(v, force[v] - sum * inverse_dt);
-        });
-  }
-  parallel_for(
-      "contact: velocities", c.rows, DRENCH_LAMBDA(int row) {
-        if (c.particle[row] >= 0) velocity.set(c.particle[row], c.velocity[row]);
-      });
-}
+void solve_contacts(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -53,10 +53,7 @@ DRENCH_HD void put_triangle(PreparedTriangle<float>* out, Lanes k,
 #endif
 
 /// Bounds of points 0..n-1.
-inline Bounds bounds_of_points(const char* name, VecView points, int n) {
-  return parallel_reduce(
-      name, n, Bounds{}, DRENCH_LAMBDA(int i) { return bounds_of(points[i]); }, JoinBounds{});
-}
+Bounds bounds_of_points(const char* name, VecView points, int n);
 
 /// Corners of triangles, each triangle in one piece.
 struct Corners {
@@ -122,87 +119,9 @@ inline TriangleImages triangle_images_of(const State& state) {
   return images;
 }
 
-/// Sorts the images of all triangles that the grid holds. Returns how many.
-inline int sort_images(State& state, const TriangleImages& images) {
-  ClothState& c = state.cloth;
-  const int items = images.items(), triangles = c.triangles;
-  const GridShape grid = c.grid;
-  const VecView centroid = c.centroid.view();
-  c.cell.resize(items);
-  int* cell = c.cell.data();
-  parallel_for(
-      "cloth: cells of images", items, DRENCH_LAMBDA(int k) {
-        const Vec3<float> m = centroid[k % triangles], at = m + images.shift(k, m);
-        cell[k] = images.holds(at) ? grid.cell(at) : grid.cells();
-      });
-  stable_sort_keys(c.cell, items, grid.cells(), c.order, c.cell_start, state.scratch);
-  const int held = value_at(c.cell_start, grid.cells());
-  for (VecColumn* v : {&c.sorted_low, &c.sorted_high, &c.sorted_shift}) v->resize(held + 8);
-  c.sorted_triangle.resize(held + 8);
-  int* order = c.order.data();
-  const VecView shift = c.sorted_shift.view();
-  parallel_for(
-      "cloth: images", items, DRENCH_LAMBDA(int k) {
-        const int item = order[k];
-        order[k] = item % triangles;
-        if (k < held) shift.set(k, images.shift(item, centroid[item % triangles]));
-      });
-  return held;
-}
-
 /// Centroids, boxes and the sorted grid, its cells at least as wide as the largest
 /// centroid-to-corner distance plus `room`.
-inline void build_polygon_grid(State& state, float room) {
-  ClothState& c = state.cloth;
-  const VecView x = c.position.view(), centroid = c.centroid.view();
-  const Corners corner = corners_of(c);
-  const float largest = parallel_reduce(
-      "cloth: centroids", c.triangles, 0.f,
-      DRENCH_LAMBDA(int t) {
-        const Vec3<float> a = corner.at(x, 3 * t), b = corner.at(x, 3 * t + 1),
-                          d = corner.at(x, 3 * t + 2);
-        const Vec3<float> m = (a + b + d) * (1.f / 3.f);
-        centroid.set(t, m);
-        return maximum(length2(a - m), maximum(length2(b - m), length2(d - m)));
-      },
-      Larger{});
-  c.largest_radius = std::sqrt(largest);
-  const Bounds bounds = bounds_of_points("cloth: bounds", x, c.vertices);
-  c.low = bounds.low, c.high = bounds.high;
-  const bool periodic = any_periodic(state.parameters);
-  const TriangleImages images = triangle_images_of(state);
-  c.grid = make_grid_shape(images.low, images.high, room + c.largest_radius);
-  int sorted_count = c.triangles;
-  if (periodic) {
-    sorted_count = sort_images(state, images);
-  } else {
-    const GridShape grid = c.grid;
-    int* cell = c.cell.data();
-    parallel_for(
-        "cloth: cells", c.triangles, DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
-    stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
-  }
-  const int* order = c.order.data();
-  const VecView shift = c.sorted_shift.view();
-  const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
-  PreparedTriangle<float>* sorted = c.sorted_triangle.data();
-  for_each_lane(
-      "cloth: sorted triangles", sorted_count, DRENCH_LAMBDA(auto k) {
-        const auto t = load(order, k);
-        const auto at = [&](int e) {
-          auto p = corner.at(x, t + t + t + e);
-          if (periodic) p = p + shift.at(k);
-          return p;
-        };
-        const auto a = at(0), b = at(1), d = at(2);
-        using Vec = decltype(at(0));
-        low.put(k, Vec{minimum(a.x, minimum(b.x, d.x)), minimum(a.y, minimum(b.y, d.y)),
-                       minimum(a.z, minimum(b.z, d.z))});
-        high.put(k, Vec{maximum(a.x, maximum(b.x, d.x)), maximum(a.y, maximum(b.y, d.y)),
-                        maximum(a.z, maximum(b.z, d.z))});
-        put_triangle(sorted, k, prepare_triangle(a, b, d));
-      });
-}
+void build_polygon_grid(State& state, float room);
 
 /// Read-only view for passes that look triangles up.
 struct PolygonView {

@@ -60,11 +60,6 @@ inline Mover path_mover_of(const Parameters& p, float dt) {
   for (bool& axis : mover.periodic) axis = false;
   return mover;
 }
-inline void wrap_positions(State& state) {
-  const Mover mover = mover_of(state.parameters, 0.f);
-  const VecView x = state.fluid.position.view();
-  parallel_for(
-      "wrap", state.fluid.count, DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
-}
+void wrap_positions(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -29,17 +29,6 @@ inline TurningFrame turning_frame_of(const State& state) {
           float(state.dt)};
 }
 
-inline void turn_frame(State& state) {
-  const TurningFrame turn = turning_frame_of(state);
-  const VecView x = state.fluid.position.view(), v = state.fluid.velocity.view(),
-                cloth = state.cloth.position.view(), speed = state.cloth.velocity.view();
-  const float* inverse_mass = state.cloth.inverse_mass.data();
-  parallel_for(
-      "turning frame", state.fluid.count, DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });
-  parallel_for(
-      "turning frame: cloth", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (inverse_mass[i] > 0.f) speed.set(i, turn(cloth[i], speed[i]));
-      });
-}
+void turn_frame(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

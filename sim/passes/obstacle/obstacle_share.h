@@ -69,7 +69,7 @@ struct ObstacleShare {
   }
 
   /// Share of density that one obstacle, where it ends the step, replaces at x.
-  DRENCH_HD WallShare of(const ObstacleView& o, Vec3<float> x) const {
+  DRENCH_HD_CALL WallShare of(const ObstacleView& o, Vec3<float> x) const {
     if (!o.near_path(x, x, reach())) return {0.f, {0.f, 0.f, 0.f}};
     const Vec3<float> own = o.to_own(1, x);
     WallShare share{};
@@ -114,24 +114,6 @@ inline ObstacleShare obstacle_share_of(const Parameters& p) {
 }
 
 /// Adds obstacles to what find_neighbours has of the walls.
-inline void add_obstacle_shares(State& state) {
-  const Parameters& p = state.parameters;
-  const VecView x = state.fluid.position.view();
-  const ObstacleShare law = obstacle_share_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const float rest = p.rest_density;
-  Float4* wall = state.pressure.wall.data();
-  parallel_for(
-      "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
-        for (int k = 0; k < obstacles.count; ++k) {
-          const WallShare share = law.of(obstacles.obstacle[k], x[i]);
-          if (share.value == 0.f) continue;
-          const Float4 w = wall[i];
-          const WallShare all = law.both({w.w / rest, {w.x / rest, w.y / rest, w.z / rest}}, share);
-          wall[i] = {rest * all.gradient.x, rest * all.gradient.y, rest * all.gradient.z,
-                     rest * all.value};
-        }
-      });
-}
+void add_obstacle_shares(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

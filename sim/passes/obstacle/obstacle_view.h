@@ -89,7 +89,7 @@ struct ObstacleView : ObstaclePlacement {
   }
 
   /// m, negative inside. @param mix  0 the first level set .. 1 the second.
-  DRENCH_HD float distance(Vec3<float> own, float mix) const {
+  DRENCH_HD_CALL float distance(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return own.y;
     if (shape == ObstacleShape::sphere) return length(own) - half[0];
     if (shape == ObstacleShape::box) return BoxDistance(own, half).distance;
@@ -115,7 +115,7 @@ struct ObstacleView : ObstaclePlacement {
   }
 
   /// Unit, away from the solid; zero deep inside a level set, where nothing is known.
-  DRENCH_HD Vec3<float> normal(Vec3<float> own, float mix) const {
+  DRENCH_HD_CALL Vec3<float> normal(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return {0.f, 1.f, 0.f};
     if (shape == ObstacleShape::box) return BoxDistance(own, half).normal;
     if (shape == ObstacleShape::field) {

@@ -109,33 +109,7 @@ struct GradientCorrection {
   }
 };
 
-/// L of each M by itself, where nothing boils: the domain is full (closed_domain.h).
-inline void correct_alone(State& state) {
-  PressureState& s = state.pressure;
-  const Float4 *moment = s.vector.data(), *cross = s.push.data();
-  Float4 *own = s.correction.data(), *own_cross = s.correction_cross.data();
-  parallel_for(
-      "neighbours: own correction", state.fluid.count,
-      DRENCH_LAMBDA(int i) { invert_moments(moment[i], cross[i], own[i], own_cross[i]); });
-}
-
 /// L of every particle, from positions, walls and densities. Uses PressureState::vector and push.
-inline void correct_gradients(State& state) {
-  PressureState& s = state.pressure;
-  const Parameters& p = state.parameters;
-  const float h = p.support_radius;
-  const float scale = p.particle_mass / p.rest_density / p.lattice_sum / (h * h * h * h * h);
-  with_separation(p, [&](auto separation) {
-    for_each_neighbour("neighbours: moments", s.lists, state.fluid.count,
-                       GradientMoments<decltype(separation)>{s.place.data(), s.wall.data(),
-                                                             state.fluid.density.data(),
-                                                             s.vector.data(), s.push.data(), scale,
-                                                             0.95f * p.rest_density, separation});
-  });
-  if (p.full) return correct_alone(state);
-  for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
-                     GradientCorrection{s.vector.data(), s.push.data(), s.wall.data(),
-                                        s.correction.data(), s.correction_cross.data()});
-}
+void correct_gradients(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

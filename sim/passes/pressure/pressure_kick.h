@@ -94,30 +94,4 @@ struct EarlierAcceleration {
   }
 };
 
-/// -D^T q with neighbours a time `lag` (s) back, into PressureState::push: a displacement, as what
-/// the solve leaves in PressureState::vector. Walls, obstacles and sheets push as there.
-inline void find_kick(State& state, float lag) {
-  FluidState& f = state.fluid;
-  PressureState& s = state.pressure;
-  const Parameters& p = state.parameters;
-  const VecView v = f.velocity.view();
-  const Float4* displacement = s.vector.data();
-  Float4* velocity = s.push.data();
-  const float inverse_dt = float(1 / state.dt), h = p.support_radius;
-  parallel_for(
-      "kick: velocities", f.count, DRENCH_LAMBDA(int i) {
-        const Vec3<float> u = v[i];
-        const Float4 d = displacement[i];
-        velocity[i] = {u.x + inverse_dt * d.x, u.y + inverse_dt * d.y, u.z + inverse_dt * d.z, 1.f};
-      });
-  for_each_neighbour("kick: mean way", s.lists, f.count, MeanWay{s.push.data(), s.way.data(), lag});
-  with_separation(p, [&](auto separation) {
-    for_each_neighbour("kick", s.lists, f.count,
-                       EarlierAcceleration<decltype(separation)>{
-                           s.place.data(), s.way.data(), s.correction.data(),
-                           s.correction_cross.data(), s.wall.data(), s.push.data(),
-                           gradient_scale(p) * WendlandC2::slope(1.f), 1.f / (h * h), separation});
-  });
-}
-
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -191,44 +191,9 @@ inline float gradient_scale(const Parameters& p) {
 }
 
 /// vector = -D^T q with the q beside the positions.
-inline void accelerate_by_pressure(State& state) {
-  PressureState& s = state.pressure;
-  with_separation(state.parameters, [&](auto separation) {
-    for_each_neighbour("pressure: acceleration", s.lists, state.fluid.count,
-                       PressureAcceleration<decltype(separation)>{
-                           s.place.data(), s.correction.data(), s.correction_cross.data(),
-                           s.push.data(), s.vector.data(), &s.control.data()->done,
-                           gradient_scale(state.parameters), separation});
-  });
-}
+void accelerate_by_pressure(State& state);
 
 /// product = D vector.
-inline void density_rate(State& state) {
-  PressureState& s = state.pressure;
-  with_separation(state.parameters, [&](auto separation) {
-    for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
-                       DensityRate<decltype(separation)>{
-                           s.place.data(), s.vector.data(), s.correction.data(),
-                           s.correction_cross.data(), s.wall.data(), s.product.data(),
-                           &s.control.data()->done, gradient_scale(state.parameters), separation});
-  });
-}
-
-/// Of D D^T, and PressureState::push; where there may be levels EvenInverseDiagonal::even as well,
-/// in PressureState::next until an iteration.
-inline void invert_diagonal(State& state) {
-  PressureState& s = state.pressure;
-  with_separation(state.parameters, [&](auto separation) {
-    using Separation = decltype(separation);
-    const InverseDiagonal<Separation> pass{
-        s.place.data(), s.correction.data(),       s.correction_cross.data(),        s.wall.data(),
-        s.push.data(),  s.inverse_diagonal.data(), gradient_scale(state.parameters), separation};
-    if (state.contact.near > 0)
-      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count, pass);
-    else
-      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
-                         EvenInverseDiagonal<Separation>{pass, s.next.data()});
-  });
-}
+void density_rate(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

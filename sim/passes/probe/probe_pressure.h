@@ -80,34 +80,6 @@ struct StepPressure {
   }
 };
 
-inline StepPressure step_pressure_of(const State& state) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  const bool projected = p.incompressible;
-  const float h = p.support_radius, h4 = h * h * h * h;
-  StepPressure s{f.position.view(),
-                 f.velocity.view(),
-                 f.acceleration.view(),
-                 f.pressure_term.data(),
-                 projected ? nullptr : f.inverse_density.data(),
-                 projected ? state.pressure.place.data() : nullptr,
-                 projected ? state.pressure.correction.data() : nullptr,
-                 projected ? state.pressure.correction_cross.data() : nullptr,
-                 float(state.dt),
-                 h,
-                 p.particle_mass,
-                 p.rest_density,
-                 p.wall_viscosity,
-                 // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
-                 p.particle_mass / p.rest_density *
-                     (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
-                 {}};
-  s.walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    s.walls.low[k] = p.low[k], s.walls.high[k] = p.high[k], s.walls.on[k] = p.wall[k];
-  return s;
-}
-
 /// What a particle sees of the sheet that it is beside, where it was pushed.
 struct Beside {
   Vec3<float> x, normal;  // m; unit, or zero: none
@@ -204,15 +176,6 @@ struct BodyParts {
   }
 };
 
-inline BodyParts body_parts_of(const State& state) {
-  return {step_pressure_of(state),
-          image_walls_of(state.parameters),
-          obstacle_share_of(state.parameters),
-          state.obstacles.views(),
-          sheet_rows(state),
-          state.fluid.normal.view()};
-}
-
 template <int N, class F>
 struct AwayFromSheets {
   F f;
@@ -230,19 +193,6 @@ struct BesideSheets {
     return i < 0 ? Totals<N>{} : f(i, row);
   }
 };
-/// Sum of f(particle, row) over all particles, each once.
-template <int N, class F>
-Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
-  const bool near = state.parameters.incompressible && state.contact.near > 0;
-  const AddTotals<N> add;
-  const Totals<N> away =
-      parallel_reduce(name, state.fluid.count, Totals<N>{},
-                      AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
-  if (!near) return away;
-  const SheetRows rows = sheet_rows(state);
-  return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
-                                   BesideSheets<N, F>{f, rows.particle}, add));
-}
 
 struct Wall {
   int axis, side;  // 0 the low one, 1 the high one

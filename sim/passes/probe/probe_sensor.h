@@ -45,14 +45,6 @@ struct SoftDisc {
   }
 };
 
-inline SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
-  return {{q.place[0], q.place[1], q.place[2]},
-          {q.normal[0], q.normal[1], q.normal[2]},
-          q.radius,
-          q.rim,
-          periods_of(p)};
-}
-
 /// Points of a disc, or of layers of it, at the middles of equal cells.
 struct DiscPoints {
   SoftDisc disc;
@@ -77,14 +69,6 @@ struct DiscPoints {
            disc.normal * (t * disc.rim);
   }
 };
-
-inline DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) {
-  const Vec3<float> n = disc.normal,
-                    other =
-                        fabsf(n.x) < 0.6f ? Vec3<float>{1.f, 0.f, 0.f} : Vec3<float>{0.f, 1.f, 0.f},
-                    across = cross(n, other), u = across * (1.f / length(across));
-  return {disc, u, cross(n, u), layers, rings, spokes};
-}
 
 /// What a disc lies on.
 struct SensorBody {
@@ -135,46 +119,6 @@ struct SheetAt {
     return body;
   }
 };
-
-/// The nearest sheet; none in a shot without any.
-inline SensorBody sheet_at(const State& state, Vec3<float> place) {
-  const ClothState& c = state.cloth;
-  if (!state.parameters.incompressible) return {};
-  return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
-                         SheetAt{corners_of(c), c.position.view(), c.half_thickness.data(),
-                                 c.sheet.data(), place, periods_of(state.parameters)},
-                         SensorBody{});
-}
-
-/// What a disc lies on: within half a spacing and 25 degrees of its surface. On obstacles either
-/// sign of its normal is right, on sheets it points to the side that is measured.
-inline SensorBody sensor_body(const State& state, const ProbeQuery& q) {
-  SensorBody body;
-  if (q.kind == ProbeKind::wall_pressure) {
-    body.kind = SensorBody::wall, body.axis = q.axis, body.side = q.side;
-    body.facing = along_axis(q.axis, q.side == 0 ? 1.f : -1.f);
-    return body;
-  }
-  const Vec3<float> place{q.place[0], q.place[1], q.place[2]},
-      n{q.normal[0], q.normal[1], q.normal[2]};
-  const float reach = 0.5f * state.parameters.spacing * 1.001f;
-  const auto lies_on = [&](const SensorBody& b) {
-    return fabsf(b.distance) <= reach && fabsf(dot(b.facing, n)) > 0.9f;
-  };
-  const ObstacleViews obstacles = state.obstacles.views();
-  body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
-                         ObstacleAt{obstacles, place, q.on}, SensorBody{});
-  if (lies_on(body)) {
-    body.facing = dot(body.facing, n) < 0.f ? -n : n;
-    return body;
-  }
-  body = sheet_at(state, place);
-  if (lies_on(body)) {
-    body.facing = n;
-    return body;
-  }
-  return {};
-}
 
 /// What the fluid pushes onto a body through a disc on it, N.
 struct SurfaceSensor {
@@ -304,44 +248,6 @@ struct SheetExtent {
   }
 };
 
-inline double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& disc,
-                             const SensorBody& body, float reach) {
-  const Parameters& p = state.parameters;
-  const ClothState& c = state.cloth;
-  if (body.kind == SensorBody::sheet) {
-    return parallel_reduce(
-               "probe: sheet's area", c.triangles, Totals<1>{},
-               SheetExtent{corners_of(c), c.position.view(), c.sheet.data(), disc, body.of, reach},
-               AddTotals<1>{})
-        .value[0];
-  }
-  const ObstacleViews obstacles = state.obstacles.views();
-  if (obstacles.count == 0) return q.extent;
-  const DiscPoints points = disc_points(disc, 1, 48, 96);
-  const Vec3<float> none{0.f, 0.f, 0.f};
-  return parallel_reduce("probe: area", points.count(), Totals<1>{},
-                         SurfaceExtent{points,
-                                       {image_walls_of(p), obstacles, none, none, points.cell()},
-                                       body,
-                                       p.spacing,
-                                       reach},
-                         AddTotals<1>{})
-      .value[0];
-}
-
-/// Force of the fluid through a disc on a body, over its area, Pa; 0 where nothing is left of it.
-inline double surface_pressure(const State& state, const ProbeQuery& q, const SensorBody& body) {
-  const SoftDisc disc = soft_disc_of(q, state.parameters);
-  const float reach = disc.radius + disc.rim;
-  const double extent = surface_extent(state, q, disc, body, reach);
-  if (!(extent > 1e-3 * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>(
-      "probe: pressure on a surface", state,
-      SurfaceSensor{body_parts_of(state), disc, body, state.fluid.triangle.data(),
-                    state.cloth.sheet.data(), reach});
-  return sum.value[0] / extent;
-}
-
 /// The stress along the disc's normal n times volumes, N m: of particle i, by virtual work,
 /// p_i (m / rho_0) sum_j m / rho_0 (-W'/r) (x_ij . L n) (x_ij . n) b_ij, b the mean weight along
 /// the pair, and what bodies have of it.
@@ -407,46 +313,5 @@ struct InnerExtent {
     return {{double(weight) * space.share(x, -1, -1)}};
   }
 };
-
-/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
-inline double inner_pressure(const State& state, const ProbeQuery& q) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  const SoftDisc disc = soft_disc_of(q, p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  // Fluid on the disc's side of the nearest sheet alone, if that is in reach.
-  const SensorBody sheet = sheet_at(state, disc.centre);
-  Vec3<float> normal{0.f, 0.f, 0.f};
-  if (sheet.distance < disc.rim) {
-    const Vec3<float> up = disc.from_centre(sheet.foot) * -1.f;
-    normal = dot(up, sheet.facing) < 0.f ? -sheet.facing : sheet.facing;
-  }
-  double extent = q.extent;
-  if (obstacles.count > 0 || length2(normal) > 0.f) {
-    const DiscPoints points = disc_points(disc, 32, 16, 32);
-    extent =
-        parallel_reduce(
-            "probe: volume of a disc", points.count(), Totals<1>{},
-            InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
-            AddTotals<1>{})
-            .value[0];
-  }
-  if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>("probe: pressure", state,
-                                           InnerSensor{body_parts_of(state),
-                                                       disc,
-                                                       {f.grid, f.cell_start.data()},
-                                                       view_of(state.pressure.lists),
-                                                       normal,
-                                                       sheet.foot});
-  return sum.value[0] / extent;
-}
-
-/// Pressure of a disc, Pa, of a surface that it lies on or of the fluid around it.
-inline double disc_pressure(const State& state, const ProbeQuery& q) {
-  const SensorBody body = sensor_body(state, q);
-  return body.kind == SensorBody::none ? inner_pressure(state, q)
-                                       : surface_pressure(state, q, body);
-}
 
 }  // namespace drench::sim::DRENCH_BACKEND

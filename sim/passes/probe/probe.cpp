@@ -1,0 +1,398 @@
+#include "sim/passes/probe/probe.h"
+
+#include "sim/passes/probe/probe_height.h"
+#include "sim/passes/probe/probe_pressure.h"
+#include "sim/passes/probe/probe_sensor.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+HalfDensity half_density(const Parameters& p, const ProbeQuery& query) {
+  const float h = p.support_radius;
+  float half = 0.5f * p.rest_density;
+  for (const int k : {0, 2}) {
+    const float below = (query.place[k] - p.low[k]) / h, above = (p.high[k] - query.place[k]) / h;
+    if (p.wall[k]) {
+      half *= 1.f - WendlandC2::halfspace(minimum(max0(below), 1.f)) -
+              WendlandC2::halfspace(minimum(max0(above), 1.f));
+    }
+  }
+  return {half, p.low[1], p.high[1], h, p.wall[1]};
+}
+
+/// m local; NaN where no fluid reaches half of rest density over the line. From the top down in
+/// steps of a quarter support, then once more in fifteenths of the step that crosses it.
+double surface_height(const State& state, const ProbeQuery& query) {
+  const Parameters& p = state.parameters;
+  const HalfDensity enough = half_density(p, query);
+  const float h = p.support_radius;
+  LineDensity line{
+      state.fluid.position.view(),   query.place[0], query.place[2], 1e30f, 0.25f * h, h,
+      p.particle_mass / (h * h * h), periods_of(p)};
+  bool fine = false;
+  while (true) {
+    const LineSamples s =
+        parallel_reduce("probe: height", state.fluid.count, LineSamples{}, line, AddLineSamples{});
+    int k = 0;
+    while (k < height_samples && s.density[k] < enough(line.from - float(k) * line.step)) ++k;
+    if (k < height_samples && fine) {
+      if (k == 0) return line.from;
+      const float y = line.from - float(k) * line.step;
+      const float above = enough(y + line.step) - s.density[k - 1], at = s.density[k] - enough(y);
+      return double(y) + double(line.step) * at / (at + above);
+    }
+    if (k < height_samples) {
+      line.from -= float(std::max(k - 1, 0)) * line.step;
+      line.step /= float(height_samples - 1);
+      fine = true;
+    } else if (!fine && s.next > -1e30f) {
+      line.from = s.next;
+    } else {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+StepPressure step_pressure_of(const State& state) {
+  const Parameters& p = state.parameters;
+  const FluidState& f = state.fluid;
+  const bool projected = p.incompressible;
+  const float h = p.support_radius, h4 = h * h * h * h;
+  StepPressure s{f.position.view(),
+                 f.velocity.view(),
+                 f.acceleration.view(),
+                 f.pressure_term.data(),
+                 projected ? nullptr : f.inverse_density.data(),
+                 projected ? state.pressure.place.data() : nullptr,
+                 projected ? state.pressure.correction.data() : nullptr,
+                 projected ? state.pressure.correction_cross.data() : nullptr,
+                 float(state.dt),
+                 h,
+                 p.particle_mass,
+                 p.rest_density,
+                 p.wall_viscosity,
+                 // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
+                 p.particle_mass / p.rest_density *
+                     (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
+                 {}};
+  s.walls.scale = p.wall_scale;
+  for (int k = 0; k < 3; ++k)
+    s.walls.low[k] = p.low[k], s.walls.high[k] = p.high[k], s.walls.on[k] = p.wall[k];
+  return s;
+}
+
+BodyParts body_parts_of(const State& state) {
+  return {step_pressure_of(state),
+          image_walls_of(state.parameters),
+          obstacle_share_of(state.parameters),
+          state.obstacles.views(),
+          sheet_rows(state),
+          state.fluid.normal.view()};
+}
+
+/// Sum of f(particle, row) over all particles, each once.
+template <int N, class F>
+Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
+  const bool near = state.parameters.incompressible && state.contact.near > 0;
+  const AddTotals<N> add;
+  const Totals<N> away =
+      parallel_reduce(name, state.fluid.count, Totals<N>{},
+                      AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
+  if (!near) return away;
+  const SheetRows rows = sheet_rows(state);
+  return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
+                                   BesideSheets<N, F>{f, rows.particle}, add));
+}
+
+SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
+  return {{q.place[0], q.place[1], q.place[2]},
+          {q.normal[0], q.normal[1], q.normal[2]},
+          q.radius,
+          q.rim,
+          periods_of(p)};
+}
+
+DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) {
+  const Vec3<float> n = disc.normal,
+                    other =
+                        fabsf(n.x) < 0.6f ? Vec3<float>{1.f, 0.f, 0.f} : Vec3<float>{0.f, 1.f, 0.f},
+                    across = cross(n, other), u = across * (1.f / length(across));
+  return {disc, u, cross(n, u), layers, rings, spokes};
+}
+
+/// The nearest sheet; none in a shot without any.
+SensorBody sheet_at(const State& state, Vec3<float> place) {
+  const ClothState& c = state.cloth;
+  if (!state.parameters.incompressible) return {};
+  return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
+                         SheetAt{corners_of(c), c.position.view(), c.half_thickness.data(),
+                                 c.sheet.data(), place, periods_of(state.parameters)},
+                         SensorBody{});
+}
+
+/// What a disc lies on: within half a spacing and 25 degrees of its surface. On obstacles either
+/// sign of its normal is right, on sheets it points to the side that is measured.
+SensorBody sensor_body(const State& state, const ProbeQuery& q) {
+  SensorBody body;
+  if (q.kind == ProbeKind::wall_pressure) {
+    body.kind = SensorBody::wall, body.axis = q.axis, body.side = q.side;
+    body.facing = along_axis(q.axis, q.side == 0 ? 1.f : -1.f);
+    return body;
+  }
+  const Vec3<float> place{q.place[0], q.place[1], q.place[2]},
+      n{q.normal[0], q.normal[1], q.normal[2]};
+  const float reach = 0.5f * state.parameters.spacing * 1.001f;
+  const auto lies_on = [&](const SensorBody& b) {
+    return fabsf(b.distance) <= reach && fabsf(dot(b.facing, n)) > 0.9f;
+  };
+  const ObstacleViews obstacles = state.obstacles.views();
+  body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
+                         ObstacleAt{obstacles, place, q.on}, SensorBody{});
+  if (lies_on(body)) {
+    body.facing = dot(body.facing, n) < 0.f ? -n : n;
+    return body;
+  }
+  body = sheet_at(state, place);
+  if (lies_on(body)) {
+    body.facing = n;
+    return body;
+  }
+  return {};
+}
+
+double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& disc,
+                      const SensorBody& body, float reach) {
+  const Parameters& p = state.parameters;
+  const ClothState& c = state.cloth;
+  if (body.kind == SensorBody::sheet) {
+    return parallel_reduce(
+               "probe: sheet's area", c.triangles, Totals<1>{},
+               SheetExtent{corners_of(c), c.position.view(), c.sheet.data(), disc, body.of, reach},
+               AddTotals<1>{})
+        .value[0];
+  }
+  const ObstacleViews obstacles = state.obstacles.views();
+  if (obstacles.count == 0) return q.extent;
+  const DiscPoints points = disc_points(disc, 1, 48, 96);
+  const Vec3<float> none{0.f, 0.f, 0.f};
+  return parallel_reduce("probe: area", points.count(), Totals<1>{},
+                         SurfaceExtent{points,
+                                       {image_walls_of(p), obstacles, none, none, points.cell()},
+                                       body,
+                                       p.spacing,
+                                       reach},
+                         AddTotals<1>{})
+      .value[0];
+}
+
+/// Force of the fluid through a disc on a body, over its area, Pa; 0 where nothing is left of it.
+double surface_pressure(const State& state, const ProbeQuery& q, const SensorBody& body) {
+  const SoftDisc disc = soft_disc_of(q, state.parameters);
+  const float reach = disc.radius + disc.rim;
+  const double extent = surface_extent(state, q, disc, body, reach);
+  if (!(extent > 1e-3 * disc.rim * disc.rim)) return 0;
+  const Totals<1> sum = sum_by_particle<1>(
+      "probe: pressure on a surface", state,
+      SurfaceSensor{body_parts_of(state), disc, body, state.fluid.triangle.data(),
+                    state.cloth.sheet.data(), reach});
+  return sum.value[0] / extent;
+}
+
+/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
+double inner_pressure(const State& state, const ProbeQuery& q) {
+  const Parameters& p = state.parameters;
+  const FluidState& f = state.fluid;
+  const SoftDisc disc = soft_disc_of(q, p);
+  const ObstacleViews obstacles = state.obstacles.views();
+  // Fluid on the disc's side of the nearest sheet alone, if that is in reach.
+  const SensorBody sheet = sheet_at(state, disc.centre);
+  Vec3<float> normal{0.f, 0.f, 0.f};
+  if (sheet.distance < disc.rim) {
+    const Vec3<float> up = disc.from_centre(sheet.foot) * -1.f;
+    normal = dot(up, sheet.facing) < 0.f ? -sheet.facing : sheet.facing;
+  }
+  double extent = q.extent;
+  if (obstacles.count > 0 || length2(normal) > 0.f) {
+    const DiscPoints points = disc_points(disc, 32, 16, 32);
+    extent =
+        parallel_reduce(
+            "probe: volume of a disc", points.count(), Totals<1>{},
+            InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
+            AddTotals<1>{})
+            .value[0];
+  }
+  if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
+  const Totals<1> sum = sum_by_particle<1>("probe: pressure", state,
+                                           InnerSensor{body_parts_of(state),
+                                                       disc,
+                                                       {f.grid, f.cell_start.data()},
+                                                       view_of(state.pressure.lists),
+                                                       normal,
+                                                       sheet.foot});
+  return sum.value[0] / extent;
+}
+
+/// Pressure of a disc, Pa, of a surface that it lies on or of the fluid around it.
+double disc_pressure(const State& state, const ProbeQuery& q) {
+  const SensorBody body = sensor_body(state, q);
+  return body.kind == SensorBody::none ? inner_pressure(state, q)
+                                       : surface_pressure(state, q, body);
+}
+
+/// Pressure of what gravity the walls of a full box hold up, Pa; none in its middle.
+double held_pressure(const Parameters& p, const float (&place)[3]) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k)
+    sum += double(p.rest_density) * p.held[k] * (place[k] - 0.5 * (p.low[k] + p.high[k]));
+  return sum;
+}
+
+/// Force of the fluid on a domain wall, N: what the step took from the fluid's momentum through the
+/// wall's pressure and viscosity, over dt. A particle that the pressure fails to stop and the last
+/// tenth of a spacing does (move.h) is not in it.
+std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
+  const Parameters& p = state.parameters;
+  Totals<3> sum = sum_by_particle<3>("probe: wall force", state,
+                                     WallForce{body_parts_of(state), {query.axis, query.side}});
+  float centre[3];
+  double area = query.side == 0 ? -1 : 1;  // along the axis
+  for (int k = 0; k < 3; ++k) {
+    centre[k] = 0.5f * (p.low[k] + p.high[k]);
+    if (k != query.axis) area *= double(p.high[k]) - p.low[k];
+  }
+  centre[query.axis] = query.side == 0 ? p.low[query.axis] : p.high[query.axis];
+  if (p.held[query.axis] != 0.f) sum.value[query.axis] += area * held_pressure(p, centre);
+  return to_vector(sum);
+}
+
+double pressure(State& state, const ProbeQuery& query) {
+  // What evens out a full box has had rows of its own since.
+  if (state.parameters.full && query.kind == ProbeKind::inner_pressure) correct_gradients(state);
+  return disc_pressure(state, query) + held_pressure(state.parameters, query.place);
+}
+
+/// Force of the fluid on a range of vertices, N: the impulses they were given in the step, over dt.
+std::vector<double> cloth_force(const State& state, const ProbeQuery& query) {
+  return to_vector(parallel_reduce("probe: cloth force", query.end - query.begin, Totals<3>{},
+                                   VertexForce{state.cloth.force.view(), query.begin},
+                                   AddTotals<3>{}));
+}
+
+std::vector<double> energy(const State& state, const ProbeQuery& query) {
+  const Parameters& p = state.parameters;
+  const FluidState& f = state.fluid;
+  const ClothState& c = state.cloth;
+  const Vec3<float> gravity{p.gravity[0] + p.held[0], p.gravity[1] + p.held[1],
+                            p.gravity[2] + p.held[2]};
+  const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
+  const AddTotals<3> add;
+  const Totals<3> fluid = parallel_reduce(
+      "probe: fluid energy", f.count, Totals<3>{},
+      PointEnergy{f.position.view(), f.velocity.view(), nullptr, p.particle_mass, gravity, zero},
+      add);
+  const float behind =
+      sheets_are_implicit(p) ? 0.f : float(0.5 * state.dt / std::max(1, state.substeps));
+  const Totals<3> cloth = parallel_reduce(
+      "probe: cloth energy", c.vertices, Totals<3>{},
+      VertexEnergy{{c.position.view(), c.velocity.view(), c.mass.data(), 0.f, gravity, zero},
+                   {c.position.view(), c.velocity.view(), spring_ends_of(c), c.rest_length.data(),
+                    c.stiffness.data(), c.spring_damping.data()},
+                   c.force.view(),
+                   c.inverse_mass.data(),
+                   behind},
+      add);
+  const Totals<3> springs = parallel_reduce(
+      "probe: spring energy", c.vertices, Totals<3>{},
+      SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},
+      add);
+  return to_vector(add(add(fluid, cloth), springs));
+}
+
+/// Measures the incompressible fluid's density anew; that of the weakly compressible one is of the
+/// step's start.
+std::vector<double> volume(State& state) {
+  const int n = state.fluid.count;
+  if (n > 0 && state.parameters.incompressible) measure_density(state);
+  const Totals<4> sum =
+      parallel_reduce("probe: volume", n, Totals<4>{},
+                      PlaceAndDensity{state.fluid.position.view(), state.fluid.density.data(),
+                                      1.f / state.parameters.rest_density},
+                      AddTotals<4>{});
+  std::vector<double> all{double(n)};
+  for (const double value : sum.value)
+    all.push_back(n > 0 ? value / n : std::numeric_limits<double>::quiet_NaN());
+  return all;
+}
+
+/// Mean of the particles whose centres are in a ball, m/s.
+std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
+  const Totals<4> sum = parallel_reduce("probe: velocity", state.fluid.count, Totals<4>{},
+                                        VelocityInBall{state.fluid.position.view(),
+                                                       state.fluid.velocity.view(),
+                                                       {q.place[0], q.place[1], q.place[2]},
+                                                       periods_of(state.parameters),
+                                                       q.radius * q.radius},
+                                        AddTotals<4>{});
+  if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
+  return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
+}
+
+/// Half a spacing beyond the farthest particle, m local.
+double front(const State& state, const ProbeQuery& q) {
+  if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
+  return 0.5 * state.parameters.spacing +
+         parallel_reduce(
+             "probe: front", state.fluid.count, Farthest{},
+             PlaceAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
+             Farthest{})
+             .value;
+}
+
+std::vector<double> vertex(const State& state, int v) {
+  const VecColumn& x = state.cloth.position;
+  return {value_at(x.x, v), value_at(x.y, v), value_at(x.z, v)};
+}
+
+std::vector<double> probe_state(State& state, const ProbeQuery& query) {
+  switch (query.kind) {
+    case ProbeKind::height:
+      return {surface_height(state, query)};
+    case ProbeKind::wall_pressure:
+    case ProbeKind::inner_pressure:
+      return {pressure(state, query)};
+    case ProbeKind::wall_force:
+      return wall_force(state, query);
+    case ProbeKind::cloth_force:
+      return cloth_force(state, query);
+    case ProbeKind::obstacle_force:
+      return {};  // the solver adds what its obstacles received
+    case ProbeKind::vertex:
+      return vertex(state, query.begin);
+    case ProbeKind::energy:
+      return energy(state, query);
+    case ProbeKind::velocity:
+      return mean_velocity(state, query);
+    case ProbeKind::front:
+      return {front(state, query)};
+    case ProbeKind::volume:
+      return volume(state);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> probe_states(State& state,
+                                              const std::vector<ProbeQuery>& queries) {
+  std::vector<std::vector<double>> answers(queries.size());
+  for (const bool last : {false, true}) {
+    for (size_t k = 0; k < queries.size(); ++k) {
+      if ((queries[k].kind == ProbeKind::volume) == last)
+        answers[k] = probe_state(state, queries[k]);
+    }
+  }
+  return answers;
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

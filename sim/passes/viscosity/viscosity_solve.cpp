@@ -1,0 +1,384 @@
+#include "sim/passes/viscosity/viscosity_solve.h"
+
+#include "sim/passes/viscosity/body_drag.h"
+#include "sim/passes/viscosity/viscosity_cloth.h"
+#include "sim/passes/viscosity/viscosity_rows.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+/// @param cloth_velocity  of the start of the step, m/s
+SheetGaps sheet_gaps(const State& state, const VecView& cloth_velocity) {
+  const FluidState& f = state.fluid;
+  return {sheet_rows(state),
+          f.start.view(),
+          f.normal.view(),
+          cloth_velocity,
+          f.sheet_distance.data(),
+          f.edge.data(),
+          state.cloth.half_thickness.data(),
+          f.triangle.data(),
+          float(state.dt)};
+}
+
+SheetRates sheet_rates(const State& state) {
+  const ContactView c = contact_rows(state);
+  return {c.inverse_row, c.pressure_target};
+}
+
+/// Beside sheets: all that brakes, and the sheets' rates.
+void set_drag_near_sheets(State& state, const BodyDrag& law) {
+  const SheetGaps gaps = sheet_gaps(state, state.cloth.velocity.view());
+  const SheetRates rates = sheet_rates(state);
+  const VecView velocity = state.cloth.velocity.view(), change = state.cloth_system.change.view();
+  const float* held = state.parameters.no_slip_sheets ? state.cloth.no_slip.data() : nullptr;
+  const Float4* place = state.pressure.place.data();
+  ViscosityState& s = state.viscosity;
+  Float4 *rate = s.body_rate.data(), *cross = s.body_cross.data(), *source = s.body_source.data();
+  parallel_for(
+      "drag: near sheets", gaps.rows.rows, DRENCH_LAMBDA(int row) {
+        const int i = gaps.rows.particle[row];
+        rates.along[row] = rates.across[row] = 0.f;
+        if (i < 0) return;
+        const Vec3<float> x{place[i].x, place[i].y, place[i].z};
+        const BesideSheet sheet = gaps.of(row, x);
+        WallDrag drag = law.of(x, sheet);
+        if (held && held[gaps.triangle[i]] > 0.f && gaps.edge[i] > 0.f) {
+          const float along = gaps.edge[i] * law.along(sheet.gap),
+                      across = gaps.edge[i] * law.across(sheet.gap);
+          rates.along[row] = along, rates.across[row] = across;
+          add_surface(
+              drag, along, across, sheet.normal,
+              gaps.rows.at_foot(row, velocity) + gaps.rows.at_foot(row, change) * law.inverse_dt);
+        }
+        rate[i] = {drag.rate.x, drag.rate.y, drag.rate.z, 0.f};
+        cross[i] = {drag.cross.x, drag.cross.y, drag.cross.z, 0.f};
+        source[i] = {drag.source.x, drag.source.y, drag.source.z, 0.f};
+      });
+}
+
+}  // namespace
+
+void find_body_drag(State& state) {
+  const BodyDrag law = body_drag_of(state);
+  const Float4* place = state.pressure.place.data();
+  const bool sheets = state.contact.near > 0;
+  const int* triangle = sheets ? state.fluid.triangle.data() : nullptr;
+  ViscosityState& s = state.viscosity;
+  Float4 *rate = s.body_rate.data(), *cross = s.body_cross.data(), *source = s.body_source.data();
+  parallel_for(
+      "drag: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
+        if (triangle && triangle[i] >= 0) return;
+        const WallDrag drag = law.of({place[i].x, place[i].y, place[i].z}, BesideSheet{});
+        rate[i] = {drag.rate.x, drag.rate.y, drag.rate.z, 0.f};
+        cross[i] = {drag.cross.x, drag.cross.y, drag.cross.z, 0.f};
+        source[i] = {drag.source.x, drag.source.y, drag.source.z, 0.f};
+      });
+  if (sheets) set_drag_near_sheets(state, law);
+}
+
+Impulse drag_impulse(const State& state, int which) {
+  const BodyDrag law = body_drag_of(state);
+  const bool solved = viscosity_is_implicit(state.parameters, state.dt);
+  const DraggedVelocity velocity{solved ? state.viscosity.solution.data()
+                                        : state.pressure.vector.data()};
+  const Float4* place = state.pressure.place.data();
+  const double mass = state.parameters.particle_mass;
+  const bool sheets = state.contact.near > 0;
+  const int* triangle = sheets ? state.fluid.triangle.data() : nullptr;
+  const ObstacleViews obstacles = state.obstacles.views();
+  const Impulse far = parallel_reduce(
+      "drag: impulse", state.fluid.count, Impulse{},
+      DRENCH_LAMBDA(int i) {
+        if (triangle && triangle[i] >= 0) return Impulse{};
+        WallDrag drag{};
+        const Vec3<float> x{place[i].x, place[i].y, place[i].z};
+        for (int k = 0; k < obstacles.count; ++k)
+          if (obstacles.obstacle[k].of == which)
+            law.add_obstacle(obstacles.obstacle[k], x, BesideSheet{}, drag);
+        return velocity.on(drag, i, mass);
+      },
+      Impulse{});
+  if (!sheets) return far;
+  const SheetGaps gaps = sheet_gaps(state, state.cloth.next_velocity.view());  // swapped by now
+  const Impulse near = parallel_reduce(
+      "drag: impulse near sheets", gaps.rows.rows, Impulse{},
+      DRENCH_LAMBDA(int row) {
+        const int i = gaps.rows.particle[row];
+        if (i < 0) return Impulse{};
+        const Vec3<float> x{place[i].x, place[i].y, place[i].z};
+        WallDrag drag{};
+        for (int k = 0; k < obstacles.count; ++k)
+          if (obstacles.obstacle[k].of == which)
+            law.add_obstacle(obstacles.obstacle[k], x, gaps.of(row, x), drag);
+        return velocity.on(drag, i, mass);
+      },
+      Impulse{});
+  return far(far, near);
+}
+
+namespace {
+
+bool drags_sheets(const State& state) {
+  return state.parameters.no_slip_sheets && state.contact.near > 0;
+}
+
+SheetDragRows sheet_drag_rows(const State& state) {
+  return {sheet_rows(state), sheet_rates(state), state.fluid.normal.view()};
+}
+
+BlockInverse drag_block_inverse(const State& state) {
+  return {state.cloth_system.drag_factor.data(), state.cloth.padded};
+}
+
+VertexLoads sum_drag_loads(State& state) {
+  sum_by_triangle(state, Rows::all);
+  return {near_list(state), state.contact.impulse.view(), state.cloth.share.data()};
+}
+
+/// Inverse blocks of A with the rows' drag added to their diagonals, on free ways.
+void invert_drag_blocks(State& state) {
+  const SheetDragRows drag = sheet_drag_rows(state);
+  parallel_for(
+      "sheet drag: shares", drag.rows.rows, DRENCH_LAMBDA(int row) {
+        drag.rows.load.set(row, {drag.rates.along[row], drag.rates.across[row], 0.f});
+      });
+  const VertexLoads loads = sum_drag_loads(state);
+  const BlockInverse whole = block_inverse(state), block = drag_block_inverse(state);
+  const FreeWays free = free_ways(state);
+  const float mass = state.parameters.particle_mass, *inertia = state.cloth_system.inertia.data();
+  parallel_for(
+      "sheet drag: blocks", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+        const float d0 = 1.f / whole.field(0)[v], d1 = 1.f / whole.field(1)[v],
+                    d2 = 1.f / whole.field(2)[v], l10 = whole.field(3)[v], l20 = whole.field(4)[v],
+                    l21 = whole.field(5)[v], more = mass * loads.on(v).x;
+        const float b[6] = {d0 + more,
+                            d0 * l10,
+                            d0 * l20,
+                            d0 * l10 * l10 + d1 + more,
+                            d0 * l10 * l20 + d1 * l21,
+                            d0 * l20 * l20 + d1 * l21 * l21 + d2 + more};
+        const float least = maximum(inertia[v], 1e-20f);
+        block.put(v, b, least);
+        if (free.obstacles && length2(free.normal[v]) > 0.f)
+          block.put_free(v, block, free.axis[v], free.normal[v], least);
+      });
+}
+
+SheetDragIteration sheet_drag_iteration(State& state) {
+  ClothSystem& s = state.cloth_system;
+  const float mass = state.parameters.particle_mass;
+  return {drag_block_inverse(state),
+          cloth_matrix(state),
+          free_ways(state),
+          s.answer.view(),
+          s.residual.view(),
+          s.direction.view(),
+          s.image.view(),
+          state.viscosity.control.data(),
+          mass,
+          1.f / mass};
+}
+
+/// Loads of the rows at the fluid's velocities `u` and the vertices' so far.
+void load_by_drag(State& state) {
+  const SheetDragRows drag = sheet_drag_rows(state);
+  const Float4* u = state.viscosity.solution.data();
+  const VecView velocity = state.cloth.velocity.view(), change = state.cloth_system.change.view(),
+                more = state.cloth_system.answer.view();
+  const float inverse_dt = float(1 / state.dt);
+  parallel_for(
+      "sheet drag: loads", drag.rows.rows, DRENCH_LAMBDA(int row) {
+        const int i = drag.rows.particle[row];
+        if (i < 0) return drag.rows.load.set(row, {0.f, 0.f, 0.f});
+        const Vec3<float> sheet = drag.rows.at_foot(row, velocity) +
+                                  drag.rows.at_foot(row, change) * inverse_dt +
+                                  drag.rows.at_foot(row, more);
+        drag.rows.load.set(row, drag.times(row, Vec3<float>{u[i].x, u[i].y, u[i].z} - sheet));
+      });
+}
+
+/// Before the fluid's own start, at whose velocities the solve begins.
+void start_sheet_drag(State& state) {
+  invert_drag_blocks(state);
+  state.cloth_system.answer.clear();
+  load_by_drag(state);
+  const VertexLoads loads = sum_drag_loads(state);
+  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  reduce_then(
+      "sheet drag: start", state.cloth.vertices, Two<double>{0, 0},
+      DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, AddPairs{},
+      DRENCH_LAMBDA(const Two<double>& sums) { iteration.keep(sums); });
+}
+
+/// The sheets' part of the product with the direction; before its curvature is summed.
+void multiply_sheet_drag(State& state) {
+  const SheetDragRows drag = sheet_drag_rows(state);
+  const Float4* direction = state.viscosity.direction.data();
+  Float4* product = state.viscosity.product.data();
+  const VecView of_vertex = state.cloth_system.direction.view();
+  const ViscousControl* control = state.viscosity.control.data();
+  parallel_for(
+      "sheet drag: rows", drag.rows.rows, DRENCH_LAMBDA(int row) {
+        const int i = drag.rows.particle[row];
+        if (i < 0 || control->done) return;
+        const Vec3<float> d{direction[i].x, direction[i].y, direction[i].z},
+            sheet = drag.times(row, drag.rows.at_foot(row, of_vertex));
+        const Float4 k = product[i];
+        product[i] = {k.x - sheet.x, k.y - sheet.y, k.z - sheet.z, 0.f};
+        drag.rows.load.set(row, drag.times(row, d) - sheet);
+      });
+  const VertexLoads loads = sum_drag_loads(state);
+  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  reduce_then(
+      "sheet drag: curvature", state.cloth.vertices, 0.,
+      DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, AddDoubles{},
+      DRENCH_LAMBDA(double sum) { iteration.control->sheet_curvature = sum; });
+}
+
+void step_sheet_drag(State& state) {
+  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  reduce_then(
+      "sheet drag: step", state.cloth.vertices, Two<double>{0, 0},
+      DRENCH_LAMBDA(int v) { return iteration.step(v); }, AddPairs{},
+      DRENCH_LAMBDA(const Two<double>& sums) {
+        if (!iteration.control->done) iteration.keep(sums);
+      });
+}
+
+void turn_sheet_drag(State& state) {
+  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  parallel_for(
+      "sheet drag: turn", state.cloth.vertices, DRENCH_LAMBDA(int v) { iteration.turn(v); });
+}
+
+/// What the fluid lost to the sheets is a load of their step like those of the pressures. What the
+/// solve leaves of their answer, and no shift closes of sheets that are held, sweeps take up.
+void give_back_sheet_drag(State& state) {
+  load_by_drag(state);
+  const VertexLoads loads = sum_drag_loads(state);
+  ClothSystem& s = state.cloth_system;
+  const VecView right = s.right.view(), change = s.change.view(), more = s.answer.view();
+  const float dt = float(state.dt), mass = state.parameters.particle_mass;
+  const int* grip = state.parameters.obstacles > 0 ? s.grip.data() : nullptr;
+  const VecView rub = s.rub.view();
+  parallel_for(
+      "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+        right.set(v, right[v] + loads.on(v) * (mass * dt));
+        change.set(v, change[v] + more[v] * dt);
+        const bool rubs = grip && grip[v] >= 0;  // friction as settle_at_obstacles has found it
+        more.set(v, rubs ? right[v] + rub[v] : right[v]);
+      });
+  sweep_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);
+  balance_loose_sheets(state, change, right);
+}
+
+bool viscous_solve_ended(const ViscosityState& s, int iteration) {
+#if defined(__CUDACC__)
+  constexpr int patience = 8;
+  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
+#else
+  (void)iteration;
+  return s.control.data()->done;
+#endif
+}
+
+ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
+  const Parameters& p = state.parameters;
+  ViscosityState& s = state.viscosity;
+  const float dt = float(state.dt);
+  const double unseen = 1e-6 * p.spacing / state.dt;  // m/s
+  return {state.fluid.velocity.view(),
+          state.pressure.place.data(),
+          state.pressure.vector.data(),
+          s.product.data(),
+          s.diagonal.data(),
+          s.cross.data(),
+          s.solution.data(),
+          s.residual.data(),
+          s.direction.data(),
+          s.control.data(),
+          walls,
+          {dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]},
+          turning_frame_of(state),
+          p.turns,
+          float(1 / state.dt),
+          p.viscous_tolerance,
+          unseen * unseen * state.fluid.count,
+          p.most_viscous_iterations};
+}
+
+template <class Separation>
+void solve_viscosity(State& state, const Separation& separation) {
+  ViscosityState& s = state.viscosity;
+  const int n = state.fluid.count;
+  for (Column<Float4>* c :
+       {&s.solution, &s.residual, &s.direction, &s.product, &s.diagonal, &s.cross})
+    c->resize(size_t(n));
+  s.control.resize(1);
+  const ViscousPairs<Separation> pairs = viscous_pairs_of(state, separation);
+  const ViscousIteration iteration = viscous_iteration_of(state, pairs.walls);
+  const ViscousProduct<Separation> product{pairs, s.direction.data(), s.product.data(),
+                                           &s.control.data()->done};
+  const NeighbourLists& lists = state.pressure.lists;
+  for_each_neighbour("viscosity: blocks", lists, n,
+                     ViscousBlocks<Separation>{pairs, s.diagonal.data(), s.cross.data()});
+  ViscousControl* control = s.control.data();
+  parallel_for(
+      "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+  parallel_for(
+      "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
+  const bool sheets = drags_sheets(state);
+  for_each_neighbour("viscosity: product", lists, n, product);
+  if (sheets) start_sheet_drag(state);
+  reduce_then(
+      "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
+      ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
+  for (int k = 0; k < state.parameters.most_viscous_iterations && !viscous_solve_ended(s, k - 1);
+       ++k) {
+    for_each_neighbour("viscosity: product", lists, n, product);
+    if (sheets) multiply_sheet_drag(state);
+    reduce_then(
+        "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
+        AddDoubles{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
+    if (sheets) step_sheet_drag(state);
+    reduce_then(
+        "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
+        ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
+    parallel_for(
+        "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
+    if (sheets) turn_sheet_drag(state);
+  }
+  parallel_for(
+      "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
+  if (sheets) give_back_sheet_drag(state);
+}
+
+template <class Separation>
+void step_viscosity(State& state, const Separation& separation) {
+  const VecView v = state.fluid.velocity.view();
+  Float4* vector = state.pressure.vector.data();
+  parallel_for(
+      "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
+        vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
+      });
+  const ViscousProduct<Separation> product{viscous_pairs_of(state, separation), vector, nullptr,
+                                           nullptr};
+  for_each_neighbour("viscosity", state.pressure.lists, state.fluid.count,
+                     ExplicitViscosity<Separation>{product, v});
+}
+
+}  // namespace
+
+void apply_viscosity(State& state) {
+  if (state.fluid.count == 0 || smoothing_takes_viscosity(state.parameters, state.dt)) return;
+  with_separation(state.parameters, [&](const auto& separation) {
+    if (viscosity_is_implicit(state.parameters, state.dt))
+      solve_viscosity(state, separation);
+    else
+      step_viscosity(state, separation);
+  });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
