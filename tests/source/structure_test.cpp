@@ -217,6 +217,19 @@ TEST(Structure, GuidesNameFilesThatExist) {
   }
 }
 
+// Data that no test compares with say nothing.
+TEST(Structure, EveryFileOfValidationDataIsRead) {
+  std::string tests;
+  for (const std::string& file : sources()) {
+    if (!is_within(file, "tests")) continue;
+    for (const std::string& line : lines_of(root / file)) tests += line;
+  }
+  for (const auto& entry : fs::directory_iterator(root / "tests/validation/data")) {
+    const std::string name = '"' + entry.path().filename().string() + '"';
+    EXPECT_NE(tests.find(name), std::string::npos) << name;
+  }
+}
+
 TEST(Structure, NoFileHasMoreThanSixHundredLines) {
   for (const std::string& file : sources())
     EXPECT_LE(lines_of(root / file).size(), 600u) << file << ": split it by what it is about";
