@@ -309,7 +309,7 @@ struct Simulator::Implementation {
     return now;
   }
 
-  /// @throws Error if anything is not finite or absurdly fast after a step of dt: what, where,
+  /// @throws BlowUp if anything is not finite or absurdly fast after a step of dt: what, where,
   /// when, why, and what is safe.
   void check_state(double dt) {
     if (limits.bad_particle < 0 && limits.bad_vertex < 0) return;
@@ -320,7 +320,7 @@ struct Simulator::Implementation {
                        &v = particle ? state.velocity : state.cloth_velocity;
     const double speed =
         std::sqrt(double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
-    throw Error(fmt::format(
+    const std::string text = fmt::format(
         "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m "
         "has speed "
         "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. {}",
@@ -330,7 +330,8 @@ struct Simulator::Implementation {
         scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
         sim::cause_of_blow_up(shot, scene, state, solver->density(), crowded(), {particle, i}, time,
-                              dt)));
+                              dt));
+    throw BlowUp(text, last_checkpoint);
   }
 
   /// What emitters added, sinks took and open sides let go since the last report.

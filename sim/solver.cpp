@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "sim/passes/motion/limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
 #include "sim/passes/probe/probe.h"
@@ -12,7 +13,6 @@
 #include "sim/passes/viscosity/viscosity_solve.h"
 #include "sim/state_memory.h"
 #include "sim/step_plan.h"
-#include "sim/passes/motion/limits.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -259,7 +259,7 @@ class BackendSolver : public Solver {
     }
     if (allocated_ & column_projection) {
       state_.pressure.resize(n);
-      if (state_.parameters.full) state_.pressure.way.resize(n);
+      if (state_.parameters.full) state_.pressure.mean_displacement.resize(n);
     }
     if (allocated_ & column_tension) state_.tension.normal.resize(n);
     if (state_.parameters.wets) state_.tension.wetting.resize(n);
@@ -276,20 +276,35 @@ class BackendSolver : public Solver {
       f.normal.resize(n);
     }
     if (allocated_ & column_contact) {
-      for (VecColumn* c : {&f.impulse, &f.start}) c->resize(n);
-      if (allocated_ & column_cloth_system) f.drift.resize(n);
-      state_.contact.stride = int(n + 23) / 8 * 8;
-      state_.contact.index.resize(size_t(4) * state_.contact.stride);
-      state_.contact.field.resize(size_t(23) * state_.contact.stride);
-      f.held.resize(n);
-      f.moved.resize(n);
-      f.stopped.resize(n);
-      state_.contact.key.resize(n);
+      resize_contacts(n);
     }
     if (allocated_ & column_memory) {
       f.memory_triangle.resize(n);
       f.memory_side.resize(n);
       f.owed.resize(n);
+    }
+  }
+
+  void resize_contacts(size_t n) {
+    FluidState& f = state_.fluid;
+    ContactState& c = state_.contact;
+    c.key.resize(n);
+    if (state_.parameters.paper) return f.impulse.resize(n);
+    for (VecColumn* v : {&f.start, &f.end}) v->resize(n);
+    for (Column<int>* v : {&f.held, &f.moved, &f.stopped}) v->resize(n);
+    const size_t rows = (n + 23) / 8 * 8;
+    c.stride = int(rows);
+    c.particle.resize(rows), c.vertex.resize(3 * rows), c.weight.resize(3 * rows);
+    c.change.resize(rows);
+    if (allocated_ & column_cloth_system) {
+      f.drift.resize(n), c.gradient.resize(rows);
+      for (Column<float>* v : {&c.recovery, &c.compliance, &c.gap, &c.open}) v->resize(rows);
+      if (state_.parameters.no_slip_sheets) c.rate_along.resize(rows), c.rate_across.resize(rows);
+    } else {
+      for (VecColumn* v : {&c.normal, &c.velocity, &c.drag}) v->resize(rows);
+      for (Column<float>* v : {&c.inverse_row, &c.pressure_target, &c.pressure_rate,
+                               &c.pressure_scale, &c.least, &c.drag_rate, &c.drag_scale, &c.lambda})
+        v->resize(rows);
     }
   }
 

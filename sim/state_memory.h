@@ -29,8 +29,8 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
                           state.scratch.bytes));
   all.push_back(
       memory_of("neighbour lists", p.lists.block, p.lists.base, p.lists.begin, p.lists.blocks));
-  all.push_back(memory_of("rows of the pressure solve", p.place, p.vector, p.wall, p.correction,
-                          p.correction_cross, p.push, p.way));
+  all.push_back(memory_of("rows of the pressure solve", p.place, p.scratch_a, p.wall, p.correction,
+                          p.correction_cross, p.scratch_b, p.mean_displacement));
   all.push_back(memory_of("unknowns of the pressure solve", p.inverse_diagonal, p.source, p.before,
                           p.next, p.product, p.control));
   all.push_back(memory_of("coarse levels of the pressure solve", p.hierarchy.partial,
@@ -44,15 +44,18 @@ inline void add_fluid_memory(const State& state, std::vector<ColumnMemory>& all)
   all.push_back(memory_of("remembered sides", f.memory_triangle, f.memory_side, f.owed));
   all.push_back(memory_of("nearest triangles", f.triangle, f.far_by, f.weight_b, f.weight_c,
                           f.normal, f.sheet_distance, f.plane, f.edge, f.shaded, f.cloth_share));
-  all.push_back(memory_of("paths", f.impulse, f.start, f.drift, f.moved, f.held, f.stopped));
+  all.push_back(memory_of("paths", f.impulse, f.end, f.start, f.drift, f.moved, f.held, f.stopped));
 }
 
 inline void add_cloth_memory(const State& state, std::vector<ColumnMemory>& all) {
   const ClothState& c = state.cloth;
   const ClothSystem& s = state.cloth_system;
   const ContactState& t = state.contact;
-  all.push_back(memory_of("rows of sheets", t.key, t.order, t.start, t.index, t.field, t.impulse,
-                          t.guarded, t.guard_start));
+  all.push_back(memory_of("rows of sheets", t.key, t.order, t.start, t.particle, t.vertex, t.weight,
+                          t.change, t.normal, t.velocity, t.drag, t.inverse_row, t.pressure_target,
+                          t.pressure_rate, t.pressure_scale, t.least, t.drag_rate, t.drag_scale,
+                          t.lambda, t.gradient, t.recovery, t.compliance, t.gap, t.open,
+                          t.rate_along, t.rate_across, t.impulse, t.guarded, t.guard_start));
   all.push_back(memory_of("sheets", c.position, c.velocity, c.mass, c.inverse_mass, c.damping_rate,
                           c.spring_end, c.slot_offset, c.rest_length, c.stiffness, c.spring_damping,
                           c.corner, c.neighbour, c.sheet, c.half_thickness, c.rest_centroid,

@@ -24,7 +24,7 @@ namespace {
 
 void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
 /// Particles stand where sheets do: at the start of the step.
-VecView beside_sheets(const State& state) {
+ConstVecView beside_sheets(const State& state) {
   return state.parameters.incompressible ? state.fluid.start.view() : state.fluid.position.view();
 }
 void exact_nearest(State& state) {

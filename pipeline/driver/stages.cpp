@@ -289,6 +289,13 @@ class ShotStages final : public Stages {
 
 }  // namespace
 
+std::vector<std::string> NoisyFiles::all() const {
+  std::vector<std::string> files{frame};
+  files.insert(files.end(), before.begin(), before.end());
+  files.insert(files.end(), after.begin(), after.end());
+  return files;
+}
+
 std::unique_ptr<Stages> shot_stages(const Shot& shot, const fs::path& folder,
                                     const StageOptions& options) {
   return std::make_unique<ShotStages>(shot, folder, options);

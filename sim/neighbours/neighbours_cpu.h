@@ -168,7 +168,7 @@ inline void order_visits(const GridView& grid, std::vector<NeighbourLists::Range
 
 /// Lists of all particles. density(i, sum) gets the sum of Kernel::value over the neighbours.
 template <class Kernel, class Density, class Filter = NoFilter>
-void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
+void build_neighbour_lists(const GridView& grid, int n, const ConstVecView& position, float h,
                            NeighbourLists& lists, SortScratch&, const Density& density,
                            const Filter& filter = {}) {
   lists.begin.resize(n), lists.blocks.resize(n);

@@ -32,7 +32,7 @@ void sort_by_cell(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   const int n = f.count;
-  const VecView x = f.position.view();
+  const ConstVecView x = f.position.view();
   // Past an open side of the domain by more than a support a particle is lost: it sorts behind all,
   // and the grid ends there, however far it flies.
   float low[3], high[3];

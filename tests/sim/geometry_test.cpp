@@ -183,7 +183,7 @@ TEST(PathTest, FindsATriangleThatSpringsBackWithinTheStep) {
   c.centroid.resize(1), c.cell.resize(1);
   c.sorted_low.resize(9), c.sorted_high.resize(9), c.sorted_triangle.resize(9);
   sim::cpu::from_host(c.corner, std::vector<int>{0, 1, 2});
-  const auto put = [](const sim::cpu::VecColumn& column, float z) {
+  const auto put = [](sim::cpu::VecColumn& column, float z) {
     column.view().set(0, {0.f, 0.f, z});
     column.view().set(1, {0.02f, 0.f, z});
     column.view().set(2, {0.f, 0.02f, z});

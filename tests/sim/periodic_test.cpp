@@ -184,7 +184,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   const auto place = [&](int i) { return at(scene.start.position, size_t(f.id.data()[i])); };
   Random random(3);
   for (int i = 0; i < n; ++i)
-    s.vector.data()[i] = {float(random() - 0.5), float(random() - 0.5), float(random() - 0.5), 0.f};
+    s.scratch_a.data()[i] = {float(random() - 0.5), float(random() - 0.5), float(random() - 0.5), 0.f};
   sim::cpu::density_rate(state);
   for (int i = 0; i < n; ++i) {
     std::vector<int> found, expected;
@@ -192,7 +192,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
       if (list.closeness(k) > 0) found.push_back(list.index(k));
     double sum = 0, rate = 0;
     const auto vector = [&](int j) {
-      const sim::cpu::Float4 v = s.vector.data()[j];
+      const sim::cpu::Float4 v = s.scratch_a.data()[j];
       return V3d(v.x, v.y, v.z);
     };
     for (int j = 0; j < n; ++j) {

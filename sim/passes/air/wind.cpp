@@ -3,7 +3,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-void blow_at_cloth(State& state, const VecView& position, const VecView& velocity) {
+void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecView& velocity) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const VecView diagonal = c.air_diagonal.view(), cross_terms = c.air_cross.view(),
@@ -48,7 +48,8 @@ void wind_on_cloth(State& state) {
 void wind_on_fluid(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
-  const VecView x = f.position.view(), v = f.velocity.view();
+  const ConstVecView x = f.position.view();
+  const VecView v = f.velocity.view();
   const float* density = f.density.data();
   const Float4* wall = state.pressure.wall.data();
   const NeighbourView list = view_of(state.pressure.lists);

@@ -27,7 +27,7 @@ DRENCH_HD Vec3<float> wind_at(const WindNow& wind, Vec3<float> x) {
 
 /// B of a vertex, kg/s, and what it makes of a vector.
 struct AirDrag {
-  VecView diagonal, cross;  // xx yy zz, xy yz zx
+  ConstVecView diagonal, cross;  // xx yy zz, xy yz zx
   bool on;
 
   template <class Index, class T>
@@ -56,7 +56,7 @@ inline AirDrag air_drag_of(const State& state) {
 }
 
 /// B of every vertex and what the air pushes it with at its velocity, N.
-void blow_at_cloth(State& state, const VecView& position, const VecView& velocity);
+void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecView& velocity);
 
 void wind_on_cloth(State& state);
 

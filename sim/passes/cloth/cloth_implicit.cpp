@@ -6,16 +6,16 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
-  ClothState& c = state.cloth;
+  const ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const ClothSprings springs{b.position,           b.velocity,         spring_ends_of(c),
                              c.rest_length.data(), c.stiffness.data(), c.spring_damping.data()};
-  const VecView fluid_force = c.force.view();
+  const ConstVecView fluid_force = c.force.view();
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const ClothWalls walls = cloth_walls_of(p);
   const AirDrag air = air_drag_of(state);
-  const VecView air_push = c.air_push.view();
+  const ConstVecView air_push = c.air_push.view();
   if (air.on) blow_at_cloth(state, b.position, b.velocity);
   for_each_lane(
       "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
@@ -50,7 +50,8 @@ void cloth_predict(State& state) {
     cloth_verlet(state, b, dt);
     b.position = b.next, b.velocity = b.next_velocity;
   }
-  const VecView from = c.position.view(), to = b.position, predicted = c.predicted.view();
+  const ConstVecView from = c.position.view(), to = b.position;
+  const VecView predicted = c.predicted.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
       "cloth: mean velocity", c.vertices,
@@ -58,13 +59,14 @@ void cloth_predict(State& state) {
 }
 
 void linearise_cloth(State& state) {
-  ClothState& c = state.cloth;
+  const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
   const float dt = float(state.dt);
-  const VecView x = c.position.view(), v = c.velocity.view(), axis = s.axis.view(),
-                base = s.base.view(), free = s.free.view(), change = s.change.view(),
-                owed = c.force.view();
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const VecView axis = s.axis.view(), base = s.base.view(), free = s.free.view(),
+                change = s.change.view();
+  const ConstVecView owed = c.force.view();
   const SpringEnds ends = spring_ends_of(c);
   const float *rest = c.rest_length.data(), *stiffness = c.stiffness.data(),
               *damping = c.spring_damping.data(), *mass = c.mass.data(),
@@ -73,7 +75,7 @@ void linearise_cloth(State& state) {
   const BlockInverse block = block_inverse(state);
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const AirDrag air = air_drag_of(state);
-  const VecView air_push = c.air_push.view();
+  const ConstVecView air_push = c.air_push.view();
   ClothControl* control = s.control.data();
   parallel_for(
       "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
@@ -117,9 +119,10 @@ void linearise_cloth(State& state) {
 
 void hold_at_walls(State& state) {
   const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
-  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
-                right = s.right.view(), free = s.free.view(), change = s.change.view();
+  ClothSystem& s = state.cloth_system;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView base = s.base.view(), right = s.right.view();
+  const VecView free = s.free.view(), change = s.change.view();
   const float dt = float(state.dt);
   const BlockInverse block = block_inverse(state);
   const ClothWalls walls = cloth_walls_of(state.parameters);
@@ -156,12 +159,12 @@ bool cloth_ended(const State& state, int sweep) {
 #endif
 }
 
-void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps,
+void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int sweeps,
                  float tolerance) {
   sweep_matrix(state, scaled_cloth_matrix(state), w, right, sweeps, tolerance);
 }
 
-void balance_loose_sheets(State& state, const VecView& w, const VecView& right) {
+void balance_loose_sheets(State& state, const VecView& w, const ConstVecView& right) {
   const FreeWays free = free_ways(state);
   const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
@@ -190,9 +193,10 @@ void balance_loose_sheets(State& state, const VecView& w, const VecView& right) 
 
 void hold_at_obstacles(State& state) {
   const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
-  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
-                right = s.right.view(), change = s.change.view();
+  ClothSystem& s = state.cloth_system;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView base = s.base.view(), right = s.right.view();
+  const VecView change = s.change.view();
   const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
   float* slides = s.slides.data();
   const BlockInverse block = block_inverse(state);
@@ -216,11 +220,12 @@ namespace {
 /// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
 /// sticks and who slides; whether anything changed. What was let go is not held again in the step:
 /// the guard stops it.
-bool revise_holds(State& state, const VecView& given, int round) {
-  const ClothState& c = state.cloth;
+bool revise_holds(State& state, const ConstVecView& given, int round) {
+  ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
   const ClothMatrix matrix = cloth_matrix(state);
-  const VecView change = s.change.view(), reaction = s.residual.view();
+  const VecView change = s.change.view();
+  const VecView reaction = s.residual.view();
   // The springs of a vertex reach others, whose ways must not change meanwhile.
   parallel_for(
       "cloth: reactions", c.vertices,
@@ -245,21 +250,23 @@ bool revise_holds(State& state, const VecView& given, int round) {
 
 }  // namespace
 
-void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance) {
+void settle_at_obstacles(State& state, const ConstVecView& given, int sweeps, float tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
-  const VecView change = s.change.view(), right = s.answer.view();
+  const VecView change = s.change.view();
+  const VecView right = s.answer.view();
   parallel_for(
       "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
   for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
     sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
 }
 
-void finish_at_obstacles(State& state, const VecView& given) {
-  const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
-                velocity = c.next_velocity.view(), predicted = c.predicted.view(),
-                change = state.cloth_system.change.view();
+void finish_at_obstacles(State& state, const ConstVecView& given) {
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const VecView next = c.next.view(), velocity = c.next_velocity.view(),
+                predicted = c.predicted.view();
+  const ConstVecView change = state.cloth_system.change.view();
   const float inverse_dt = 1.f / float(state.dt), *mass = c.mass.data(),
               *inverse_mass = c.inverse_mass.data();
   const ClothMatrix matrix = cloth_matrix(state);
@@ -285,8 +292,9 @@ void finish_at_obstacles(State& state, const VecView& given) {
 }
 
 void carry_held_vertices(State& state) {
-  const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view();
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view();
+  const VecView next = c.next.view(), velocity = c.next_velocity.view();
   const float *mass = c.mass.data(), *inverse_mass = c.inverse_mass.data();
   const int* held = c.held.data();
   const ClothHold hold = cloth_hold_of(state);

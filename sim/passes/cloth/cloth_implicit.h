@@ -23,7 +23,7 @@ DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
 /// The ways that a vertex may go: its free axes, and of these not along the normal of an obstacle,
 /// nor across it where friction holds it.
 struct FreeWays {
-  VecView axis, normal;
+  ConstVecView axis, normal;
   const float* slides;
   bool obstacles;
 
@@ -45,18 +45,18 @@ inline FreeWays free_ways(const State& state) {
 struct ClothMatrix {
   SpringEnds ends;
   const float *tension, *inertia;
-  VecView axis;
+  ConstVecView axis;
   FreeWays free;
   AirDrag air;
   float dt;  // s
 
   template <class Index>
-  DRENCH_HD auto times(const VecView& view, Index i) const {
+  DRENCH_HD auto times(const ConstVecView& view, Index i) const {
     return free.of(i, whole(view, i));
   }
   /// On all axes: less the right side it is what holds a vertex.
   template <class Index>
-  DRENCH_HD auto whole(const VecView& view, Index i) const {
+  DRENCH_HD auto whole(const ConstVecView& view, Index i) const {
     using T = decltype(load(inertia, i));
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
@@ -136,12 +136,12 @@ struct BlockInverse {
   }
 };
 
-inline BlockInverse block_inverse(const State& state) {
+inline BlockInverse block_inverse(State& state) {
   return {state.cloth_system.factor.data(), state.cloth.padded};
 }
 /// Of the blocks on free ways. With the whole blocks, soft across a sheet and stiff along it, a
 /// surface askew to the sheet makes conjugate gradients diverge.
-inline BlockInverse free_block_inverse(const State& state) {
+inline BlockInverse free_block_inverse(State& state) {
   if (state.parameters.obstacles == 0) return block_inverse(state);
   return {state.cloth_system.free_factor.data(), state.cloth.padded};
 }
@@ -168,7 +168,7 @@ struct ScaledClothMatrix {
     return matrix.free.of(i, v);
   }
   template <class Index>
-  DRENCH_HD auto times(const VecView& view, Index i) const {
+  DRENCH_HD auto times(const ConstVecView& view, Index i) const {
     return matrix.times(view, i);
   }
   template <class Index, class T>
@@ -176,7 +176,7 @@ struct ScaledClothMatrix {
     return moving(i, block.times(i, r));
   }
 };
-inline ScaledClothMatrix scaled_cloth_matrix(const State& state) {
+inline ScaledClothMatrix scaled_cloth_matrix(State& state) {
   return {cloth_matrix(state), free_block_inverse(state)};
 }
 
@@ -185,7 +185,9 @@ inline ScaledClothMatrix scaled_cloth_matrix(const State& state) {
 template <class Matrix>
 struct ClothSweep {
   Matrix matrix;
-  VecView w, residual, scaled, image, direction, direction_image;
+  VecView w, residual, scaled;
+  ConstVecView image;
+  VecView direction, direction_image;
   ClothControl* control;
   float tolerance;  // of r . z, over the reference
 
@@ -223,7 +225,7 @@ bool cloth_ended(const State& state, int sweep);
 /// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
 /// tolerance^2 of ClothControl::reference.
 template <class Matrix>
-void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const VecView& right,
+void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const ConstVecView& right,
                   int sweeps, float tolerance) {
   const int n = state.cloth.vertices;
   ClothSystem& s = state.cloth_system;
@@ -261,7 +263,8 @@ void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const Ve
         "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
   }
 }
-void sweep_cloth(State& state, const VecView& w, const VecView& right, int sweeps, float tolerance);
+void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int sweeps,
+                 float tolerance);
 
 /// What a sheet's way leaves of what it is given, kg m, its mass, and how many of its axes
 /// something holds.
@@ -275,6 +278,6 @@ struct SheetLack {
 /// What sweeps that end early leave of A w = right the fluid has given and the sheet not received.
 /// Springs push no sheet as a whole: where nothing holds it a shift by the sum over its mass, on
 /// which they do not act, closes its momentum.
-void balance_loose_sheets(State& state, const VecView& w, const VecView& right);
+void balance_loose_sheets(State& state, const VecView& w, const ConstVecView& right);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -112,9 +112,9 @@ struct ClothHold {
   }
 };
 
-inline ClothHold cloth_hold_of(const State& state) {
+inline ClothHold cloth_hold_of(State& state) {
   const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
+  ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
   return {state.obstacles.views(),
           cloth_walls_of(p),
@@ -141,7 +141,10 @@ void hold_at_obstacles(State& state);
 /// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
 struct HoldRevision {
   ClothHold hold;
-  VecView position, velocity, change, given, right, reaction, rub;
+  ConstVecView position;
+  VecView velocity, change;
+  ConstVecView given;
+  VecView right, reaction, rub;
   float* slides;
   const float *mass, *inverse_mass;
   float dt;
@@ -210,11 +213,11 @@ struct HoldRevision {
 /// The solve of the sheets was made: on with friction and with other vertices held, until these are
 /// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
 /// momentum of a sheet that is held.
-void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance);
+void settle_at_obstacles(State& state, const ConstVecView& given, int sweeps, float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.
-void finish_at_obstacles(State& state, const VecView& given);
+void finish_at_obstacles(State& state, const ConstVecView& given);
 
 /// The path test has stopped vertices where they were: obstacles carry them on.
 void carry_held_vertices(State& state);

@@ -9,25 +9,25 @@ namespace drench::sim::DRENCH_BACKEND {
 struct SpringEnds {
   const int *end, *slot_offset;
   int slots, stride;
-  VecView shift;  // m, of the other ends; only where a sheet is joined to itself across a seam
+  ConstVecView shift;  // m, of the other ends; only where a sheet is joined to itself across a seam
   bool joined;
 
   /// From vertex i, which is at x, to the place of the other end of slot s.
   template <class Index, class T>
-  DRENCH_HD Vec3<T> way(const VecView& position, Vec3<T> x, Index i, int s) const {
+  DRENCH_HD Vec3<T> way(const ConstVecView& position, Vec3<T> x, Index i, int s) const {
     Vec3<T> d = at_end(position, i, s) - x;
     if (joined) d = d + shift.at(i + s * stride);
     return d;
   }
 
   /// A vector at the other ends of slot s.
-  DRENCH_HD Vec3<float> at_end(const VecView& view, int i, int s) const {
+  DRENCH_HD Vec3<float> at_end(const ConstVecView& view, int i, int s) const {
     return view[end[s * stride + i]];
   }
 #if !defined(__CUDACC__)
   /// Grids have the same offset all over a slot: then the ends are eight consecutive vertices as
   /// well.
-  DRENCH_HD Vec3<Pack> at_end(const VecView& view, Lanes i, int s) const {
+  DRENCH_HD Vec3<Pack> at_end(const ConstVecView& view, Lanes i, int s) const {
     const int other = i.base + slot_offset[s];
     if (slot_offset[s] != 0 && other >= 0 && other + 8 <= stride) return view.at(Lanes{other});
     return view.at(load(end, i + s * stride));
@@ -42,7 +42,8 @@ inline SpringEnds spring_ends_of(const ClothState& c) {
 }
 
 struct ClothSprings {
-  VecView position, velocity;
+  ConstVecView position;
+  ConstVecView velocity;
   SpringEnds ends;
   const float *rest_length, *stiffness, *damping;
 
@@ -65,7 +66,8 @@ struct ClothSprings {
 
 /// Where a cloth step reads from and writes to.
 struct ClothBuffers {
-  VecView position, velocity, next, next_velocity;
+  ConstVecView position;
+  VecView velocity, next, next_velocity;
 };
 
 /// Domain walls stop cloth and hold half of its sliding back.

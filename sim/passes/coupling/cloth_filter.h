@@ -15,7 +15,8 @@ namespace drench::sim::DRENCH_BACKEND {
 struct SheetFilter {
   static constexpr int columns = 4;
   int* shaded;  // by particle: 1 where neighbours may be hidden
-  VecView position, normal;
+  ConstVecView position;
+  ConstVecView normal;
   const float* plane;
   PolygonView polygons;
   float support_radius;
@@ -130,8 +131,8 @@ struct SheetFilter {
 enum class Shaded { near, hidden };
 
 /// @param position  m, those that the planes of the sheets were taken from
-inline SheetFilter sheet_filter(const State& state, const VecView& position, Shaded known) {
-  const FluidState& f = state.fluid;
+inline SheetFilter sheet_filter(State& state, const ConstVecView& position, Shaded known) {
+  FluidState& f = state.fluid;
   return {f.shaded.data(),      position,           f.normal.view(),
           f.plane.data(),       polygons_of(state), state.parameters.support_radius,
           known == Shaded::near};

@@ -5,9 +5,12 @@ namespace drench::sim::DRENCH_BACKEND {
 void add_sheets_to_walls(State& state) {
   const FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
-  const SheetRows c = sheet_rows(state);
-  const VecView x = f.position.view(), start = f.start.view(), normal = f.normal.view(),
-                cloth_velocity = state.cloth.velocity.view();
+  const ContactRows c = contact_rows(state);
+  const VecView gradient = state.contact.gradient.view();
+  float *allowed = state.contact.recovery.data(), *compliance = state.contact.compliance.data(),
+        *gaps = state.contact.gap.data(), *left_open = state.contact.open.data();
+  const ConstVecView x = f.position.view(), start = f.start.view(), normal = f.normal.view(),
+                     cloth_velocity = state.cloth.velocity.view();
   const float *distance = f.sheet_distance.data(), *edge = f.edge.data(),
               *half_thickness = state.cloth.half_thickness.data();
   const int* triangle = f.triangle.data();
@@ -21,9 +24,9 @@ void add_sheets_to_walls(State& state) {
   parallel_for(
       "sheets: rows", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
-        c.gradient.set(row, {0.f, 0.f, 0.f});
-        c.compliance[row] = 0.f;
-        c.gap[row] = 1e30f, c.open[row] = 1.f;
+        gradient.set(row, {0.f, 0.f, 0.f});
+        compliance[row] = 0.f;
+        gaps[row] = 1e30f, left_open[row] = 1.f;
         if (i < 0 || edge[i] <= 0.f) return;
         const Vec3<float> n = normal[i], foot = c.at_foot(row, cloth_velocity) * dt;
         const float nearer = -dot(n, x[i] - start[i] - foot),
@@ -31,27 +34,27 @@ void add_sheets_to_walls(State& state) {
         SheetShare share = blank;
         share.at(gap, edge[i]);
         WallShare w = walls.share(x[i], n, gap);
-        c.gap[row] = gap, c.open[row] = max0(1.f - share.value);
+        gaps[row] = gap, left_open[row] = max0(1.f - share.value);
         for (int k = 0; k < obstacles.count; ++k)
           w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));
         const float open = 1.f - w.value, left = max0(1.f - share.value);
         const Vec3<float> g = n * (rest * open * share.slope), all = w.gradient * (rest * left) + g;
-        c.gradient.set(row, g);
-        c.way[row] = maximum(nearer + recovery, 0.1f * recovery);
-        c.compliance[row] = squeeze * max0(-rest * left * dot(g, w.gradient));
+        gradient.set(row, g);
+        allowed[row] = maximum(nearer + recovery, 0.1f * recovery);
+        compliance[row] = squeeze * max0(-rest * left * dot(g, w.gradient));
         wall[i] = {all.x, all.y, all.z, rest * (1.f - open * (1.f - share.value))};
       });
 }
 
 void limit_recovery(State& state) {
-  const SheetRows c = sheet_rows(state);
+  const ClothRows c = cloth_rows(state);
   float* source = state.pressure.source.data();
   const float* inverse_diagonal = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: recovery", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || length2(c.gradient[row]) == 0.f || inverse_diagonal[i] == 0.f) return;
-        source[i] = minimum(source[i], c.way[row] / sqrtf(inverse_diagonal[i]));
+        source[i] = minimum(source[i], c.recovery[row] / sqrtf(inverse_diagonal[i]));
       });
 }
 
@@ -60,8 +63,9 @@ namespace {
 void sum_loads(State& state, Base base) {
   sum_by_triangle(state, Rows::all);
   const NearView near = near_list(state);
-  const VecView impulse = state.contact.impulse.view(), right = state.cloth_system.right.view(),
-                own = state.cloth_system.base.view();
+  const ConstVecView impulse = state.contact.impulse.view();
+  const VecView right = state.cloth_system.right.view();
+  const ConstVecView own = state.cloth_system.base.view();
   const float* share = state.cloth.share.data();
   const bool add = base == Base::own;
   parallel_for(
@@ -74,7 +78,7 @@ void sum_loads(State& state, Base base) {
 
 /// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts.
 template <class Matrix>
-void add_to_reference(State& state, const Matrix& matrix, const VecView& of, float keep) {
+void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of, float keep) {
   ClothControl* control = state.cloth_system.control.data();
   reduce_then(
       "cloth: reference", state.cloth.vertices, 0.,
@@ -88,20 +92,21 @@ void add_to_reference(State& state, const Matrix& matrix, const VecView& of, flo
 
 /// What the rows take from the particles at the pressures beside the positions.
 void load_by_pressures(State& state) {
-  const SheetRows c = sheet_rows(state);
+  const ClothRows c = cloth_rows(state);
+  const VecView change = state.contact.change.view();
   const Float4* place = state.pressure.place.data();
   const float mass = state.parameters.particle_mass;
   parallel_for(
       "sheets: pressures", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
-        c.load.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : c.gradient[row] * (mass * place[i].w));
+        change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : c.gradient[row] * (mass * place[i].w));
       });
 }
 
 /// Sums the sizes of all rows, times a particle's mass, by vertices: kg^2/m^4, into x of `to`.
 void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
   const NearView near = near_list(state);
-  const ContactView c = contact_rows(state);
+  const ContactRows c = contact_rows(state);
   const VecView impulse = state.contact.impulse.view();
   const int triangles = state.cloth.triangles, *start = near.start, gap = c.soft_begin - c.close;
   const float mass = state.parameters.particle_mass, *share = state.cloth.share.data();
@@ -131,11 +136,12 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
 /// flanks cancel, and pressures there rose without end (4e11 Pa in the folds over a small ball).
 void add_sheets_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
-  const SheetRows c = sheet_rows(state);
+  const ClothRows c = cloth_rows(state);
   const RowSize size{c, free_ways(state)};
   const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
                              state.cloth.inverse_mass.data()};
-  const VecView answer = s.answer.view(), right = s.right.view();
+  const VecView answer = s.answer.view();
+  const VecView right = s.right.view();
   sum_row_sizes(state, size, right);
   s.answer.clear();
   add_to_reference(state, matrix, right, 0.f);
@@ -175,7 +181,7 @@ void respond_sheets(State& state, int sweeps, float tolerance) {
 
 void settle_sheets(State& state) {
   ClothSystem& s = state.cloth_system;
-  const VecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
+  const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
   if (state.contact.near > 0) {
     respond_sheets(state, last_sweeps, last_tolerance);
   } else {
@@ -191,8 +197,8 @@ void settle_sheets(State& state) {
 }
 
 void subtract_sheet_rate(State& state) {
-  const SheetRows c = sheet_rows(state);
-  const VecView change = state.cloth_system.change.view();
+  const ClothRows c = cloth_rows(state);
+  const ConstVecView change = state.cloth_system.change.view();
   const Float4* place = state.pressure.place.data();
   float* product = state.pressure.product.data();
   const int* done = &state.pressure.control.data()->done;
@@ -205,7 +211,7 @@ void subtract_sheet_rate(State& state) {
 }
 
 void take_sheets_off_walls(State& state) {
-  const SheetRows c = sheet_rows(state);
+  const ClothRows c = cloth_rows(state);
   Float4* wall = state.pressure.wall.data();
   parallel_for(
       "sheets: walls", c.rows, DRENCH_LAMBDA(int row) {
@@ -218,11 +224,14 @@ void take_sheets_off_walls(State& state) {
 
 void finish_sheets(State& state) {
   ClothState& c = state.cloth;
-  const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
-                next_velocity = c.next_velocity.view(), predicted = c.predicted.view(),
-                change = state.cloth_system.change.view(), force = c.force.view(),
-                right = state.cloth_system.right.view(), base = state.cloth_system.base.view(),
-                free_axes = state.cloth_system.free.view();
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const VecView next = c.next.view(), next_velocity = c.next_velocity.view(),
+                predicted = c.predicted.view();
+  const ConstVecView change = state.cloth_system.change.view();
+  const VecView force = c.force.view();
+  const ConstVecView right = state.cloth_system.right.view();
+  const ConstVecView base = state.cloth_system.base.view(),
+                     free_axes = state.cloth_system.free.view();
   const bool near = state.contact.near > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);

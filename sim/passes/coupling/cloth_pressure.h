@@ -22,38 +22,18 @@ namespace drench::sim::DRENCH_BACKEND {
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
-/// Rows of the near list, in the place of those of contact_exact.h.
-struct SheetRows {
-  const int* particle;  // -1: empty
-  const int* vertex[3];
-  const float* weight[3];
-  VecView gradient;   // kg/m^4, G
-  VecView load;       // kg m, what the row gives to its vertices
-  float* way;         // m, that the row may ask for in this step
-  float* compliance;  // kg^2/m^8
-  float *gap, *open;  // m; share of the density that the sheet leaves
-  int rows;
-
-  /// The weighted mean of the vertices.
-  DRENCH_HD Vec3<float> at_foot(int row, const VecView& of_vertex) const {
-    Vec3<float> sum{0.f, 0.f, 0.f};
-    for (int k = 0; k < 3; ++k) sum = sum + of_vertex[vertex[k][row]] * weight[k][row];
-    return sum;
-  }
+/// Rows of the near list as the pressure solve has them.
+struct ClothRows : ContactRows {
+  ConstVecView gradient;    // kg/m^4, G
+  const float* recovery;    // m, that the row may ask for in this step
+  const float* compliance;  // kg^2/m^8
+  const float *gap, *open;  // m; fraction of the density that the cloth leaves
 };
 
-inline SheetRows sheet_rows(const State& state) {
-  const ContactView c = contact_rows(state);
-  return {c.particle,
-          {c.vertex[0], c.vertex[1], c.vertex[2]},
-          {c.weight[0], c.weight[1], c.weight[2]},
-          c.normal,
-          c.change,
-          c.least,
-          c.drag_rate,
-          c.lambda,
-          c.drag_scale,
-          c.rows};
+inline ClothRows cloth_rows(const State& state) {
+  const ContactState& c = state.contact;
+  return {contact_rows(state), c.gradient.view(), c.recovery.data(),
+          c.compliance.data(), c.gap.data(),      c.open.data()};
 }
 
 /// Between a sheet that a wall holds and that wall there may be no room for a particle, and no
@@ -99,7 +79,7 @@ struct TensionMatrix {
     return select(load(inverse_mass, i) > T(0.f), v, Vec3<T>{T(0.f), T(0.f), T(0.f)});
   }
   template <class Index>
-  DRENCH_HD auto times(const VecView& view, Index i) const {
+  DRENCH_HD auto times(const ConstVecView& view, Index i) const {
     using T = decltype(load(inertia, i));
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
@@ -117,7 +97,7 @@ struct TensionMatrix {
 
 /// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex on the ways that it may go.
 struct RowSize {
-  SheetRows rows;
+  ClothRows rows;
   FreeWays free;
   DRENCH_HD float at(int row, int k) const {
     return rows.weight[k][row] * length(free.of(rows.vertex[k][row], rows.gradient[row]));

@@ -10,7 +10,7 @@ namespace drench::sim::DRENCH_BACKEND {
 struct SheetTopology {
   PolygonView polygons;
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
-  VecView rest_centroid;
+  ConstVecView rest_centroid;
   const float* half_thickness;
   Vec3<float> low, high;           // m, half a spacing inside the domain's walls
   const Vec3<float>* rest_period;  // m, by sheet; where one is joined to itself
@@ -145,6 +145,6 @@ DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb
 // from the geometry when a particle comes within reach and remembered while its nearest triangle
 // stays on the same patch (rest centroids within two supports); memory ends beyond the support and
 // at free edges.
-void find_sheet_sides(State& state, const VecView& position);
+void find_sheet_sides(State& state, const ConstVecView& position);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -62,7 +62,8 @@ ContactSetup contact_setup(State& state) {
 }  // namespace
 
 void sum_by_triangle(State& state, Rows which, bool again) {
-  const ContactView c = contact_rows(state);
+  const ContactRows c = contact_rows(state);
+  const ConstVecView given = state.contact.change.view();
   const int triangles = state.cloth.triangles, *start = state.contact.start.data();
   const VecView impulse = state.contact.impulse.view();
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
@@ -73,7 +74,7 @@ void sum_by_triangle(State& state, Rows which, bool again) {
         for (int soft = 0; soft <= last; ++soft) {
           const int k = t + soft * triangles;
           for (int row = start[k] + soft * gap; row < start[k + 1] + soft * gap; ++row) {
-            const Vec3<float> change = c.change[row];
+            const Vec3<float> change = given[row];
             for (int e = 0; e < 3; ++e) sum[e] = sum[e] + change * c.weight[e][row];
           }
         }
@@ -83,21 +84,27 @@ void sum_by_triangle(State& state, Rows which, bool again) {
 
 void start_contacts(State& state) {
   ClothState& cloth = state.cloth;
-  const ContactView c = contact_rows(state);
+  ContactState& contact = state.contact;
+  const ContactRows c = contact_rows(state);
   const NearView near = near_list(state);
-  const VecView owed = state.fluid.owed.view(), force = cloth.force.view();
+  int *particle = contact.particle.data(), *vertex = contact.vertex.data();
+  float* weight = contact.weight.data();
+  const VecView change = contact.change.view();
+  const int stride = contact.stride;
+  const ConstVecView owed = state.fluid.owed.view();
+  const VecView force = cloth.force.view();
   const bool owes = state.owes;
   parallel_for(
       "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
-        const int place = c.place_in_list(row), i = place < 0 ? -1 : near.order[place];
-        c.particle[row] = i;
+        const int index = c.index_in_list(row), i = index < 0 ? -1 : near.order[index];
+        particle[row] = i;
         for (int k = 0; k < 3; ++k) {
-          c.vertex[k][row] = i < 0 ? 0 : near.corner[3 * near.triangle[i] + k];
-          c.weight[k][row] = i < 0 ? 0.f : near.weight(i, k);
+          vertex[k * stride + row] = i < 0 ? 0 : near.corner[3 * near.triangle[i] + k];
+          weight[k * stride + row] = i < 0 ? 0.f : near.weight(i, k);
         }
-        if (owes) c.change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : owed[i]);
+        if (owes) change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : owed[i]);
       });
-  const VecView impulse = state.contact.impulse.view();
+  const ConstVecView impulse = state.contact.impulse.view();
   if (owes) {
     sum_by_triangle(state, Rows::all);
     state.fluid.owed.clear();
@@ -125,10 +132,11 @@ void solve_contacts(State& state) {
   if (state.contact.near == 0) return;
   ClothState& cloth = state.cloth;
   const ContactSetup setup = contact_setup(state);
-  const ContactView c = contact_rows(state);
+  const ExactContacts c = exact_contacts(state);
   const NearView near = setup.near;
   const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
-                velocity = state.fluid.velocity.view(), impulse = state.contact.impulse.view();
+                velocity = state.fluid.velocity.view();
+  const ConstVecView impulse = state.contact.impulse.view();
   const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
@@ -162,7 +170,8 @@ void solve_contacts(State& state) {
 void find_nearest_centroids(State& state) {
   FluidState& f = state.fluid;
   const PolygonView polygons = polygons_of(state);
-  const VecView position = f.position.view(), normal = f.normal.view();
+  const ConstVecView position = f.position.view();
+  const VecView normal = f.normal.view();
   int* triangle = f.triangle.data();
   float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data(),
         *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
@@ -214,9 +223,9 @@ void add_paper_forces(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   const int *triangle = f.triangle.data(), *corner = state.cloth.corner.data();
-  const VecView velocity = f.velocity.view(), normal = f.normal.view(),
-                acceleration = f.acceleration.view(), impulse = f.impulse.view(),
-                cloth_velocity = state.cloth.velocity.view();
+  const ConstVecView velocity = f.velocity.view(), normal = f.normal.view();
+  const VecView acceleration = f.acceleration.view(), impulse = f.impulse.view();
+  const ConstVecView cloth_velocity = state.cloth.velocity.view();
   const float *distance = f.sheet_distance.data(), *inverse_density = f.inverse_density.data();
   const WallTable table{state.wall_table};
   const float h = p.support_radius, spacing = p.spacing, dt = float(state.dt),
@@ -247,7 +256,8 @@ void add_paper_forces(State& state) {
 void gather_paper_reaction(State& state) {
   ClothState& c = state.cloth;
   const NearView near = near_list(state);
-  const VecView impulse = state.fluid.impulse.view(), force = c.force.view();
+  const ConstVecView impulse = state.fluid.impulse.view();
+  const VecView force = c.force.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
       "paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {

@@ -35,7 +35,7 @@ struct NearView {
     return k == 1 ? weight_b[i] : k == 2 ? weight_c[i] : 1.f - weight_b[i] - weight_c[i];
   }
   /// Sum over the corners that meet in a vertex, in a fixed order.
-  DRENCH_HD Vec3<float> sum_on_vertex(const VecView& of_corner, int vertex) const {
+  DRENCH_HD Vec3<float> sum_on_vertex(const ConstVecView& of_corner, int vertex) const {
     Vec3<float> sum{0.f, 0.f, 0.f};
     for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s)
       sum = sum + of_corner[fan_entry[s]];
@@ -69,43 +69,50 @@ void sort_exact_contacts(State& state);
 
 /// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the
 /// near list.
-struct ContactView {
-  int *particle, *vertex[3];
-  float* weight[3];
-  VecView normal, velocity, drag, change;
-  float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
-      *drag_scale, *lambda;
+struct ContactRows {
+  const int *particle, *vertex[3];  // -1: empty
+  const float* weight[3];
   int close, soft_begin, rows;  // rows 0..close-1 and soft_begin..rows-1 are contacts
 
-  DRENCH_HD int place_in_list(int row) const {  // -1: empty
+  DRENCH_HD int index_in_list(int row) const {  // -1: empty
     return row < close ? row : row < soft_begin || row >= rows ? -1 : row - soft_begin + close;
+  }
+  /// The weighted mean of the vertices.
+  DRENCH_HD Vec3<float> at_foot(int row, const ConstVecView& of_vertex) const {
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    for (int k = 0; k < 3; ++k) sum = sum + of_vertex[vertex[k][row]] * weight[k][row];
+    return sum;
   }
 };
 
-inline ContactView contact_rows(const State& state) {
+inline ContactRows contact_rows(const State& state) {
   const ContactState& c = state.contact;
-  const auto ints = [&](int k) { return c.index.data() + k * c.stride; };
-  const auto floats = [&](int k) { return c.field.data() + size_t(k) * c.stride; };
-  const auto vectors = [&](int k) { return VecView{floats(k), floats(k + 1), floats(k + 2)}; };
-  const int soft_begin = (c.close + 7) / 8 * 8;
-  return {ints(0),
-          {ints(1), ints(2), ints(3)},
-          {floats(0), floats(1), floats(2)},
-          vectors(3),
-          vectors(6),
-          vectors(9),
-          vectors(12),
-          floats(15),
-          floats(16),
-          floats(17),
-          floats(18),
-          floats(19),
-          floats(20),
-          floats(21),
-          floats(22),
-          c.close,
-          soft_begin,
-          soft_begin + c.near - c.close};
+  const int *vertex = c.vertex.data(), soft_begin = (c.close + 7) / 8 * 8;
+  const float* weight = c.weight.data();
+  return {.particle = c.particle.data(),
+          .vertex = {vertex, vertex + c.stride, vertex + 2 * c.stride},
+          .weight = {weight, weight + c.stride, weight + 2 * c.stride},
+          .close = c.close,
+          .soft_begin = soft_begin,
+          .rows = soft_begin + c.near - c.close};
+}
+
+/// What the solve of the exact coupling keeps of every row.
+struct ExactContacts : ContactRows {
+  VecView normal, velocity, drag, change;
+  float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
+      *drag_scale, *lambda;
+};
+
+inline ExactContacts exact_contacts(State& state) {
+  ContactState& c = state.contact;
+  return {contact_rows(state),      c.normal.view(),
+          c.velocity.view(),        c.drag.view(),
+          c.change.view(),          c.inverse_row.data(),
+          c.pressure_target.data(), c.pressure_rate.data(),
+          c.pressure_scale.data(),  c.least.data(),
+          c.drag_rate.data(),       c.drag_scale.data(),
+          c.lambda.data()};
 }
 
 /// What the solve reads of the particles and the sheet to set contacts up.
@@ -118,7 +125,7 @@ struct ContactSetup {
       push_speed, wall_scale;
 
   template <class Index>
-  DRENCH_HD void prepare(const ContactView& c, Index row) const {
+  DRENCH_HD void prepare(const ExactContacts& c, Index row) const {
     const auto member = load(c.particle, row);
     const auto valid = is_index(member);
     const auto i = select(valid, member, same_index(0, member));
@@ -164,7 +171,7 @@ struct ContactSetup {
 
 /// One Jacobi update of a contact against the predicted vertices; they take theirs afterwards.
 template <class Index>
-DRENCH_HD void update_contact(const ContactView& c, Index row, const VecView& predicted,
+DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecView& predicted,
                               float inverse_mass, float relaxation) {
   using T = decltype(load(c.lambda, row));
   const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);

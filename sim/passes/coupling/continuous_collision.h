@@ -96,9 +96,12 @@ struct ClothGround {
 constexpr float path_clearance = 1e-3f;  // spacings off the triangle where a path that met it ends
 
 struct PathTest {
-  PolygonView polygons;       // cells from the start of the step
-  VecView cloth, cloth_next;  // this substep
-  VecView cloth_velocity, velocity, normal, start, position, owed;
+  PolygonView polygons;            // cells from the start of the step
+  ConstVecView cloth, cloth_next;  // this substep
+  ConstVecView cloth_velocity;
+  VecView velocity, normal, start;
+  ConstVecView position;
+  VecView owed;
   const int* hold;      // by vertex: 1 once stopped
   long long* stop_sum;  // by vertex, 4: how many particles stop it in this round, sum of their
                         // velocities in units of velocity_unit

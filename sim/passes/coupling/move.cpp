@@ -29,7 +29,7 @@ void move_cloth(State& state) {
 
 namespace {
 
-void copy_vectors(const char* name, VecView to, VecView from, int n) {
+void copy_vectors(const char* name, VecView to, ConstVecView from, int n) {
   parallel_for(
       name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
 }
@@ -43,7 +43,7 @@ Drift drift_of(const State& state) {
 PathTest path_test_of(State& state, float moved) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
-  const VecView next = c.next.view(), start = c.start.view();
+  const ConstVecView next = c.next.view(), start = c.start.view();
   const float moved2 = parallel_reduce(
       "path test: cloth motion", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
@@ -82,12 +82,13 @@ Tested tested_of(const State& state, float cloth_moved) {
           all ? state.fluid.count : state.contact.guard_count, all};
 }
 
-/// One round: where each particle ends, into f.impulse. In the first of an incompressible step it
+/// One round: where each particle ends, into f.end. In the first of an incompressible step it
 /// is there, as the pressure solve found it.
 GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt,
                       int round) {
   FluidState& f = state.fluid;
-  const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
+  const ConstVecView x = f.position.view();
+  const VecView v = f.velocity.view(), end = f.end.view();
   const Drift drift = drift_of(state);
   const bool found = drift.any && round == 0;
   const Mover mover = path_mover_of(state.parameters, dt);
@@ -134,8 +135,9 @@ GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, 
 void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
-  const VecView next = c.next.view(), next_v = c.next_velocity.view(), x = c.position.view(),
-                velocity = f.velocity.view();
+  const VecView next = c.next.view(), next_v = c.next_velocity.view();
+  const ConstVecView x = c.position.view();
+  const VecView velocity = f.velocity.view();
   const int* corner = c.corner.data();
   int* hold = c.held.data();
   const float* mass = c.mass.data();
@@ -172,9 +174,9 @@ void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool e
 /// all paths are tested. They count as a support away, not as far_by says: no checkpoint has that.
 void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
+  const ClothState& c = state.cloth;
   const float dt = float(state.dt), spacing = state.parameters.spacing;
-  const VecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
+  const ConstVecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
   const bool solved = state.contact.near > 0;  // else nothing was predicted
   const float speed2 = parallel_reduce(
       "guard: cloth speed", c.vertices, 0.f,
@@ -185,8 +187,9 @@ void move_unguarded_particles(State& state) {
   const float reach = 2.f * dt * std::sqrt(speed2) + 0.05f * spacing;
   // Others than the near ones are only known to be a support away, and may have come nearer since.
   state.contact.cloth_reach = std::min(reach, 0.4f * state.parameters.support_radius);
-  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
-                normal = f.normal.view(), end = f.impulse.view();
+  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view();
+  const ConstVecView normal = f.normal.view();
+  const ConstVecView end = f.end.view();
   const float* distance = f.sheet_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
@@ -223,7 +226,8 @@ void move_unguarded_particles(State& state) {
 
 /// Others have made their step already; should cloth come as far as them they stand still for it.
 void accept_paths(State& state, const Tested& tested) {
-  const VecView x = state.fluid.position.view(), end = state.fluid.impulse.view();
+  const VecView x = state.fluid.position.view();
+  const ConstVecView end = state.fluid.end.view();
   parallel_for(
       "path test: accept", tested.count,
       DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
@@ -264,13 +268,14 @@ float guard_substep(State& state, float dt, float moved) {
 /// Far particles come nearer to the sheets by what they moved beside them: no more than beside any
 /// motion in the box that holds those of all vertices, and so of all triangles.
 void bring_far_particles_nearer(State& state) {
-  const FluidState& f = state.fluid;
+  FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
-  const VecView to = c.position.view(), from = c.start.view();
+  const ConstVecView to = c.position.view();
+  const ConstVecView from = c.start.view();
   const Bounds of_cloth = parallel_reduce(
       "cloth: motions", c.vertices, Bounds{},
       DRENCH_LAMBDA(int v) { return bounds_of(to[v] - from[v]); }, JoinBounds{});
-  const VecView x = f.position.view(), start = f.start.view();
+  const ConstVecView x = f.position.view(), start = f.start.view();
   float* far_by = f.far_by.data();
   for_each_lane(
       "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {

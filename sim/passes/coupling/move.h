@@ -14,7 +14,7 @@ void move_cloth(State& state);
 
 /// What a particle's path has beside dt times its velocity.
 struct Drift {
-  VecView drift;
+  ConstVecView drift;
   bool any;
   template <class Index>
   DRENCH_HD auto at(Index i) const {

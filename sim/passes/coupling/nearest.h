@@ -66,7 +66,7 @@ struct NearestOfPack {
 /// Up to eight particles that lie close together. Those of a row of cells are handed in one by one.
 class PackOfNeighbours {
  public:
-  PackOfNeighbours(const PolygonView& polygons, const VecView& position, const int* before,
+  PackOfNeighbours(const PolygonView& polygons, const ConstVecView& position, const int* before,
                    const NearestOutput& out)
       : polygons_(polygons), position_(position), before_(before), out_(out) {}
   ~PackOfNeighbours() { flush(); }
@@ -116,7 +116,7 @@ class PackOfNeighbours {
   }
 
   const PolygonView& polygons_;
-  const VecView position_;
+  const ConstVecView position_;
   const int* before_;
   const NearestOutput& out_;
   int member_[8], count_ = 0;
@@ -126,6 +126,6 @@ class PackOfNeighbours {
 
 /// Into FluidState::triangle, the weights of its foot and far_by.
 /// @param position  m, of the particles. @param reach  m.
-void find_nearest_triangles(State& state, const VecView& position, float reach);
+void find_nearest_triangles(State& state, const ConstVecView& position, float reach);
 
 }  // namespace drench::sim::DRENCH_BACKEND

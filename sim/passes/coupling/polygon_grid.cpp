@@ -5,7 +5,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-Bounds bounds_of_points(const char* name, VecView points, int n) {
+Bounds bounds_of_points(const char* name, ConstVecView points, int n) {
   return parallel_reduce(
       name, n, Bounds{}, DRENCH_LAMBDA(int i) { return bounds_of(points[i]); }, JoinBounds{});
 }
@@ -17,7 +17,7 @@ int sort_images(State& state, const TriangleImages& images) {
   ClothState& c = state.cloth;
   const int items = images.items(), triangles = c.triangles;
   const GridShape grid = c.grid;
-  const VecView centroid = c.centroid.view();
+  const ConstVecView centroid = c.centroid.view();
   c.cell.resize(items);
   int* cell = c.cell.data();
   parallel_for(
@@ -44,7 +44,8 @@ int sort_images(State& state, const TriangleImages& images) {
 
 void build_polygon_grid(State& state, float room) {
   ClothState& c = state.cloth;
-  const VecView x = c.position.view(), centroid = c.centroid.view();
+  const ConstVecView x = c.position.view();
+  const VecView centroid = c.centroid.view();
   const Corners corner = corners_of(c);
   const float largest = parallel_reduce(
       "cloth: centroids", c.triangles, 0.f,
@@ -73,7 +74,7 @@ void build_polygon_grid(State& state, float room) {
     stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
   }
   const int* order = c.order.data();
-  const VecView shift = c.sorted_shift.view();
+  const ConstVecView shift = c.sorted_shift.view();
   const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
   PreparedTriangle<float>* sorted = c.sorted_triangle.data();
   for_each_lane(
@@ -106,7 +107,7 @@ NearestOutput nearest_output(State& state, float reach) {
 
 #if defined(__CUDACC__)
 
-void find_nearest_triangles(State& state, const VecView& position, float reach) {
+void find_nearest_triangles(State& state, const ConstVecView& position, float reach) {
   FluidState& f = state.fluid;
   const PolygonView polygons = polygons_of(state);
   const NearestOutput out = nearest_output(state, reach);
@@ -142,7 +143,7 @@ void find_nearest_triangles(State& state, const VecView& position, float reach) 
 
 #else
 
-void find_nearest_triangles(State& state, const VecView& position, float reach) {
+void find_nearest_triangles(State& state, const ConstVecView& position, float reach) {
   FluidState& f = state.fluid;
   const PolygonView polygons = polygons_of(state);
   const NearestOutput out = nearest_output(state, reach);
@@ -165,7 +166,7 @@ void find_nearest_triangles(State& state, const VecView& position, float reach) 
 
 #endif
 
-void find_sheet_sides(State& state, const VecView& position) {
+void find_sheet_sides(State& state, const ConstVecView& position) {
   FluidState& f = state.fluid;
   const SheetTopology sheet = topology_of(state);
   const VecView normal = f.normal.view();

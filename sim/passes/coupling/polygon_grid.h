@@ -53,17 +53,17 @@ DRENCH_HD void put_triangle(PreparedTriangle<float>* out, Lanes k,
 #endif
 
 /// Bounds of points 0..n-1.
-Bounds bounds_of_points(const char* name, VecView points, int n);
+Bounds bounds_of_points(const char* name, ConstVecView points, int n);
 
 /// Corners of triangles, each triangle in one piece.
 struct Corners {
-  const int* vertex;  // 3 a triangle
-  VecView shift;      // m
-  bool joined;        // there are shifts
+  const int* vertex;   // 3 a triangle
+  ConstVecView shift;  // m
+  bool joined;         // there are shifts
 
   /// @param k  3 triangle + corner
   template <class Index>
-  DRENCH_HD auto at(const VecView& x, Index k) const {
+  DRENCH_HD auto at(const ConstVecView& x, Index k) const {
     auto p = x.at(load(vertex, k));
     if (joined) p = p + shift.at(k);
     return p;
@@ -127,13 +127,14 @@ void build_polygon_grid(State& state, float room);
 struct PolygonView {
   GridShape grid;
   const int *cell_start, *order, *corner;
-  VecView position, centroid;
+  ConstVecView position;
+  ConstVecView centroid;
   float largest_radius;
-  VecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
+  ConstVecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
   const PreparedTriangle<float>* sorted;
-  Corners place;         // of the corners
-  VecView sorted_shift;  // m, of the images in that order; where an axis is periodic
-  Vec3<float> period;    // m
+  Corners place;              // of the corners
+  ConstVecView sorted_shift;  // m, of the images in that order; where an axis is periodic
+  Vec3<float> period;         // m
   bool periodic;
 
   DRENCH_HD void corners(int t, Vec3<float>& a, Vec3<float>& b, Vec3<float>& c) const {
@@ -141,7 +142,7 @@ struct PolygonView {
     c = place.at(position, 3 * t + 2);
   }
   /// The corner of what stands in a place of the order, with the vertices at x.
-  DRENCH_HD Vec3<float> corner_in(int k, int e, const VecView& x) const {
+  DRENCH_HD Vec3<float> corner_in(int k, int e, const ConstVecView& x) const {
     const Vec3<float> p = place.at(x, 3 * order[k] + e);
     return periodic ? p + sorted_shift[k] : p;
   }

@@ -27,7 +27,8 @@ Limits measure_limits(const State& state) {
   const FluidState& f = state.fluid;
   // Twenty times the speed of sound is no flow but a blow-up; NaN fails the comparison as well.
   const float absurd = p.fluid ? 20.f * p.sound_speed : 1e4f;
-  const VecView v = f.velocity.view(), a = f.acceleration.view(), cv = state.cloth.velocity.view();
+  const ConstVecView v = f.velocity.view(), a = f.acceleration.view(),
+                     cv = state.cloth.velocity.view();
   const bool accelerated = f.acceleration.x.size() > 0;  // the incompressible solver keeps none
   Limits limits;
   if (f.count > 0) {

@@ -13,8 +13,10 @@ void wrap_positions(State& state) {
 
 void turn_frame(State& state) {
   const TurningFrame turn = turning_frame_of(state);
-  const VecView x = state.fluid.position.view(), v = state.fluid.velocity.view(),
-                cloth = state.cloth.position.view(), speed = state.cloth.velocity.view();
+  const ConstVecView x = state.fluid.position.view();
+  const VecView v = state.fluid.velocity.view();
+  const ConstVecView cloth = state.cloth.position.view();
+  const VecView speed = state.cloth.velocity.view();
   const float* inverse_mass = state.cloth.inverse_mass.data();
   parallel_for(
       "turning frame", state.fluid.count, DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });

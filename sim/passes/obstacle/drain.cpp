@@ -6,7 +6,7 @@ namespace drench::sim::DRENCH_BACKEND {
 
 void mark_drained(State& state, int first_key) {
   const ObstacleViews sinks = state.sinks.views();
-  const VecView x = state.fluid.position.view();
+  const ConstVecView x = state.fluid.position.view();
   int* cell = state.fluid.cell.data();
   parallel_for(
       "fluid in sinks", state.fluid.count, DRENCH_LAMBDA(int i) {

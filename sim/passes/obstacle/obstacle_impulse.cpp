@@ -6,7 +6,7 @@ namespace drench::sim::DRENCH_BACKEND {
 
 void add_obstacle_shares(State& state) {
   const Parameters& p = state.parameters;
-  const VecView x = state.fluid.position.view();
+  const ConstVecView x = state.fluid.position.view();
   const ObstacleShare law = obstacle_share_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const float rest = p.rest_density;
@@ -58,8 +58,8 @@ Impulse pressure_impulse_near_sheets(const State& state, int which) {
   const ObstacleShare law = obstacle_share_of(p);
   const ImageWalls walls = image_walls_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
-  const SheetRows c = sheet_rows(state);
-  const VecView normal = state.fluid.normal.view();
+  const ClothRows c = cloth_rows(state);
+  const ConstVecView normal = state.fluid.normal.view();
   const Float4* place = state.pressure.place.data();
   const double factor = double(p.particle_mass) * p.rest_density / state.dt;
   return parallel_reduce(

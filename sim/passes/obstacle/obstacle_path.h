@@ -145,7 +145,7 @@ struct ObstacleGuard {
 };
 
 /// @param start  see PathStop.
-inline ObstacleGuard obstacle_guard_of(const State& state, int start) {
+inline ObstacleGuard obstacle_guard_of(State& state, int start) {
   const float dt = float(state.dt);
   const bool goes_on = start == 1 && state.cloth.vertices > 0;  // see project_density
   return {state.obstacles.views(),

@@ -15,7 +15,7 @@ namespace {
 /// L of each M by itself, where nothing boils: the domain is full (closed_domain.h).
 void correct_alone(State& state) {
   PressureState& s = state.pressure;
-  const Float4 *moment = s.vector.data(), *cross = s.push.data();
+  const Float4 *moment = s.scratch_a.data(), *cross = s.scratch_b.data();
   Float4 *own = s.correction.data(), *own_cross = s.correction_cross.data();
   parallel_for(
       "neighbours: own correction", state.fluid.count,
@@ -30,15 +30,15 @@ void correct_gradients(State& state) {
   const float h = p.support_radius;
   const float scale = p.particle_mass / p.rest_density / p.lattice_sum / (h * h * h * h * h);
   with_separation(p, [&](auto separation) {
-    for_each_neighbour("neighbours: moments", s.lists, state.fluid.count,
-                       GradientMoments<decltype(separation)>{s.place.data(), s.wall.data(),
-                                                             state.fluid.density.data(),
-                                                             s.vector.data(), s.push.data(), scale,
-                                                             0.95f * p.rest_density, separation});
+    for_each_neighbour(
+        "neighbours: moments", s.lists, state.fluid.count,
+        GradientMoments<decltype(separation)>{
+            s.place.data(), s.wall.data(), state.fluid.density.data(), s.scratch_a.data(),
+            s.scratch_b.data(), scale, 0.95f * p.rest_density, separation});
   });
   if (p.full) return correct_alone(state);
   for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
-                     GradientCorrection{s.vector.data(), s.push.data(), s.wall.data(),
+                     GradientCorrection{s.scratch_a.data(), s.scratch_b.data(), s.wall.data(),
                                         s.correction.data(), s.correction_cross.data()});
 }
 
@@ -48,7 +48,7 @@ void accelerate_by_pressure(State& state) {
     for_each_neighbour("pressure: acceleration", s.lists, state.fluid.count,
                        PressureAcceleration<decltype(separation)>{
                            s.place.data(), s.correction.data(), s.correction_cross.data(),
-                           s.push.data(), s.vector.data(), &s.control.data()->done,
+                           s.scratch_b.data(), s.scratch_a.data(), &s.control.data()->done,
                            gradient_scale(state.parameters), separation});
   });
 }
@@ -58,7 +58,7 @@ void density_rate(State& state) {
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
                        DensityRate<decltype(separation)>{
-                           s.place.data(), s.vector.data(), s.correction.data(),
+                           s.place.data(), s.scratch_a.data(), s.correction.data(),
                            s.correction_cross.data(), s.wall.data(), s.product.data(),
                            &s.control.data()->done, gradient_scale(state.parameters), separation});
   });
@@ -72,9 +72,14 @@ void invert_diagonal(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
     using Separation = decltype(separation);
-    const InverseDiagonal<Separation> pass{
-        s.place.data(), s.correction.data(),       s.correction_cross.data(),        s.wall.data(),
-        s.push.data(),  s.inverse_diagonal.data(), gradient_scale(state.parameters), separation};
+    const InverseDiagonal<Separation> pass{s.place.data(),
+                                           s.correction.data(),
+                                           s.correction_cross.data(),
+                                           s.wall.data(),
+                                           s.scratch_b.data(),
+                                           s.inverse_diagonal.data(),
+                                           gradient_scale(state.parameters),
+                                           separation};
     if (state.contact.near > 0)
       for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count, pass);
     else
@@ -89,9 +94,9 @@ void find_kick(State& state, float lag) {
   FluidState& f = state.fluid;
   PressureState& s = state.pressure;
   const Parameters& p = state.parameters;
-  const VecView v = f.velocity.view();
-  const Float4* displacement = s.vector.data();
-  Float4* velocity = s.push.data();
+  const ConstVecView v = f.velocity.view();
+  const Float4* displacement = s.scratch_a.data();
+  Float4* velocity = s.scratch_b.data();
   const float inverse_dt = float(1 / state.dt), h = p.support_radius;
   parallel_for(
       "kick: velocities", f.count, DRENCH_LAMBDA(int i) {
@@ -99,12 +104,13 @@ void find_kick(State& state, float lag) {
         const Float4 d = displacement[i];
         velocity[i] = {u.x + inverse_dt * d.x, u.y + inverse_dt * d.y, u.z + inverse_dt * d.z, 1.f};
       });
-  for_each_neighbour("kick: mean way", s.lists, f.count, MeanWay{s.push.data(), s.way.data(), lag});
+  for_each_neighbour("kick: mean way", s.lists, f.count,
+                     MeanWay{s.scratch_b.data(), s.mean_displacement.data(), lag});
   with_separation(p, [&](auto separation) {
     for_each_neighbour("kick", s.lists, f.count,
                        EarlierAcceleration<decltype(separation)>{
-                           s.place.data(), s.way.data(), s.correction.data(),
-                           s.correction_cross.data(), s.wall.data(), s.push.data(),
+                           s.place.data(), s.mean_displacement.data(), s.correction.data(),
+                           s.correction_cross.data(), s.wall.data(), s.scratch_b.data(),
                            gradient_scale(p) * WendlandC2::slope(1.f), 1.f / (h * h), separation});
   });
 }
@@ -115,7 +121,7 @@ void smooth_velocities(State& state) {
   const Parameters& p = state.parameters;
   PressureState& s = state.pressure;
   const VecView v = state.fluid.velocity.view();
-  Float4* vector = s.vector.data();
+  Float4* vector = s.scratch_a.data();
   parallel_for(
       "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
@@ -153,7 +159,7 @@ void project_velocities(State& state, const Mover& move) {
   PressureState& s = state.pressure;
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   const VecView x = f.position.view(), v = f.velocity.view();
-  Float4* vector = s.vector.data();
+  Float4* vector = s.scratch_a.data();
   float *source = s.source.data(), *product = s.product.data();
   parallel_for(
       "full: velocities", f.count, DRENCH_LAMBDA(int i) {
@@ -168,7 +174,7 @@ void project_velocities(State& state, const Mover& move) {
   find_pressures(state, any_pressure);
   keep_pressures(state);
   find_kick(state, 0.5f * dt);
-  const Float4* kick = s.push.data();
+  const Float4* kick = s.scratch_b.data();
   parallel_for(
       "full: project", f.count, DRENCH_LAMBDA(int i) {
         const Float4 d = vector[i], k = kick[i];
@@ -185,7 +191,7 @@ void even_out(State& state, const Mover& move) {
   const Parameters& p = state.parameters;
   const float dt = float(state.dt), inverse_dt = 1.f / dt, rest = p.rest_density;
   const VecView x = f.position.view();
-  Float4 *vector = s.vector.data(), *shift = s.push.data(), *diagonal = s.correction.data(),
+  Float4 *vector = s.scratch_a.data(), *shift = s.scratch_b.data(), *diagonal = s.correction.data(),
          *cross = s.correction_cross.data();
   float *source = s.source.data(), *product = s.product.data(), *density = f.density.data();
   with_separation(p, [&](auto separation) {
@@ -257,7 +263,7 @@ void find_neighbours(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
   PressureState& s = state.pressure;
-  const VecView x = f.position.view();
+  const ConstVecView x = f.position.view();
   const ImageWalls walls = image_walls_of(p);
   const float h = p.support_radius, mass = p.particle_mass / p.lattice_sum;
   float *density = f.density.data(), *source = s.source.data();
@@ -299,7 +305,7 @@ void project_with(State& state, const Move& move) {
   solve_pressure(state);
   if (state.cloth.vertices > 0) settle_sheets(state);
   const VecView x = f.position.view(), v = f.velocity.view();
-  const Float4* displacement = state.pressure.vector.data();
+  const Float4* displacement = state.pressure.scratch_a.data();
   const float inverse_dt = float(1 / state.dt);
   parallel_for(
       "project", f.count, DRENCH_LAMBDA(int i) {
@@ -321,8 +327,9 @@ void project_density(State& state) {
 void move_with_sheets(State& state) {
   FluidState& f = state.fluid;
   const float dt = float(state.dt);
-  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
-                drift = f.drift.view(), end = f.impulse.view();
+  const VecView x = f.position.view();
+  const ConstVecView v = f.velocity.view(), start = f.start.view();
+  const VecView drift = f.drift.view(), end = f.end.view();
   finish_sheets(state);
   if (state.contact.near > 0) take_sheets_off_walls(state);
   parallel_for(
@@ -340,8 +347,8 @@ void measure_density(State& state) {
   const Parameters& p = state.parameters;
   sort_by_cell(state);
   f.density.clear_bytes(0);  // lost particles have none
-  const VecView x = f.position.view(),
-                sorted{state.pressure.before.data(), state.pressure.next.data(),
+  const ConstVecView x = f.position.view();
+  const VecView sorted{state.pressure.before.data(), state.pressure.next.data(),
                        state.pressure.product.data()};
   const int* order = f.order.data();
   parallel_for(

@@ -10,9 +10,9 @@ namespace drench::sim::DRENCH_BACKEND {
 struct MeasuredDensity {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
-  VecView position;  // sorted by cell
-  const int* order;  // where each stands in the state
-  float* density;    // kg/m^3, in the order of the state
+  ConstVecView position;  // sorted by cell
+  const int* order;       // where each stands in the state
+  float* density;         // kg/m^3, in the order of the state
   float support_radius, scale, rest_density;
   ImageWalls walls;
   ObstacleShare law;

@@ -105,7 +105,7 @@ void keep_pressures(State& state);
 
 /// Solves for dt^2 p / rho^2 from the first guess in s.place, until the mean residual is
 /// Parameters::tolerance of the rest density. Leaves it there, and -D^T of it, a displacement, in
-/// s.vector.
+/// s.scratch_a.
 void find_pressures(State& state, float least);
 
 /// Pressures that push fluid apart to rest density.

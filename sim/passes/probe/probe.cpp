@@ -87,7 +87,7 @@ BodyParts body_parts_of(const State& state) {
           image_walls_of(state.parameters),
           obstacle_share_of(state.parameters),
           state.obstacles.views(),
-          sheet_rows(state),
+          cloth_rows(state),
           state.fluid.normal.view()};
 }
 
@@ -100,7 +100,7 @@ Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
       parallel_reduce(name, state.fluid.count, Totals<N>{},
                       AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
   if (!near) return away;
-  const SheetRows rows = sheet_rows(state);
+  const ClothRows rows = cloth_rows(state);
   return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
                                    BesideSheets<N, F>{f, rows.particle}, add));
 }

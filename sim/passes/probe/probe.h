@@ -12,7 +12,7 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 struct VertexForce {
-  VecView force;
+  ConstVecView force;
   int begin;
   DRENCH_HD Totals<3> operator()(int k) const {
     const Vec3<float> f = force[begin + k];
@@ -22,7 +22,7 @@ struct VertexForce {
 
 /// Kinetic and potential energy of points, J.
 struct PointEnergy {
-  VecView position, velocity;
+  ConstVecView position, velocity;
   const float* masses;  // kg, or null: all have `mass`
   float mass;
   Vec3<float> gravity, zero;
@@ -36,7 +36,7 @@ struct PointEnergy {
 
 /// Energy of the springs, J: each stands in the slots of both its ends.
 struct SpringEnergy {
-  VecView position;
+  ConstVecView position;
   SpringEnds ends;
   const float *rest_length, *stiffness;
   DRENCH_HD Totals<3> operator()(int i) const {
@@ -60,7 +60,7 @@ struct SpringEnergy {
 struct VertexEnergy {
   PointEnergy points;
   ClothSprings springs;
-  VecView fluid_force;
+  ConstVecView fluid_force;
   const float* inverse_mass;
   float behind;  // s
   DRENCH_HD Totals<3> operator()(int i) const {
@@ -74,7 +74,7 @@ struct VertexEnergy {
 };
 
 struct PlaceAndDensity {
-  VecView position;
+  ConstVecView position;
   const float* density;
   float inverse_rest;
   DRENCH_HD Totals<4> operator()(int i) const {
@@ -85,7 +85,7 @@ struct PlaceAndDensity {
 };
 
 struct VelocityInBall {
-  VecView position, velocity;
+  ConstVecView position, velocity;
   Vec3<float> centre, period;
   float radius2;
   DRENCH_HD Totals<4> operator()(int i) const {
@@ -102,7 +102,7 @@ struct Farthest {
   }
 };
 struct PlaceAlong {
-  VecView position;
+  ConstVecView position;
   Vec3<float> normal;
   DRENCH_HD Farthest operator()(int i) const {
     return {dot(to_double(position[i]), to_double(normal))};

@@ -30,7 +30,7 @@ struct AddLineSamples {
 };
 
 struct LineDensity {
-  VecView position;
+  ConstVecView position;
   float x, z, from, step;  // m
   float h, scale;          // m; kg/m^3, m / h^3
   Vec3<float> period;      // m; 0 where an axis is not periodic

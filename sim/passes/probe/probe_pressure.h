@@ -36,9 +36,9 @@ std::vector<double> to_vector(const Totals<N>& sum) {
 
 /// What pushed the particles in the step just made, of either solver.
 struct StepPressure {
-  VecView position, velocity, acceleration;  // the last one weakly compressible only
-  const float *term, *inverse_density;       // q; 1 / rho, weakly compressible only
-  const Float4* place;                       // of the incompressible solver's solve, else null
+  ConstVecView position, velocity, acceleration;  // the last one weakly compressible only
+  const float *term, *inverse_density;            // q; 1 / rho, weakly compressible only
+  const Float4* place;                            // of the incompressible solver's solve, else null
   const Float4 *correction, *correction_cross;
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
   Walls walls;
@@ -105,8 +105,8 @@ struct BodyParts {
   ImageWalls image;
   ObstacleShare law;
   ObstacleViews obstacles;
-  SheetRows rows;
-  VecView normal;
+  ClothRows rows;
+  ConstVecView normal;
 
   DRENCH_HD Beside beside(int i, int row) const {
     if (row < 0) return {step.at(i), {0.f, 0.f, 0.f}, 0.f, 1.f};

@@ -101,7 +101,7 @@ struct ObstacleAt {
 
 struct SheetAt {
   Corners corners;
-  VecView position;
+  ConstVecView position;
   const float* half_thickness;
   const int* sheet;
   Vec3<float> place, period;
@@ -222,7 +222,7 @@ struct SurfaceExtent {
 /// Area of a sheet over a disc, seen along its normal, m^2: triangles in 64 parts each.
 struct SheetExtent {
   Corners corners;
-  VecView position;
+  ConstVecView position;
   const int* sheet;
   SoftDisc disc;
   int of;

@@ -79,7 +79,7 @@ struct ImageSums {
 /// The sheets as mirrors of the particles near them.
 struct SheetMirrors {
   NearView near;
-  VecView normal, start, cloth_velocity;
+  ConstVecView normal, start, cloth_velocity;
   const float *distance, *edge, *half_thickness;
   float dt;  // s
 

@@ -64,7 +64,7 @@ void apply_surface_tension(State& state) {
   PressureState& s = state.pressure;
   const int n = state.fluid.count;
   const float h = p.support_radius;
-  Float4 *gradient = s.vector.data(), *normal = state.tension.normal.data(), *kick = gradient;
+  Float4 *gradient = s.scratch_a.data(), *normal = state.tension.normal.data(), *kick = gradient;
   with_separation(p, [&](auto separation) {
     using Separation = decltype(separation);
     const float scale = gradient_scale(p) / p.rest_density;
@@ -116,7 +116,7 @@ void find_faces(State& state) {
 void apply_contact_angles(State& state) {
   const Parameters& p = state.parameters;
   PressureState& s = state.pressure;
-  Float4* kick = s.vector.data();
+  Float4* kick = s.scratch_a.data();
   find_faces(state);
   with_separation(p, [&](auto separation) {
     using Separation = decltype(separation);

@@ -130,8 +130,8 @@ inline BodyDrag body_drag_of(const State& state) {
 
 /// Particles by their rows: the gap to the sheet at the predicted places, as the pressure has it.
 struct SheetGaps {
-  SheetRows rows;
-  VecView start, normal, cloth_velocity;
+  ClothRows rows;
+  ConstVecView start, normal, cloth_velocity;
   const float *distance, *edge, *half_thickness;
   const int* triangle;
   float dt;  // s

@@ -14,9 +14,10 @@ namespace drench::sim::DRENCH_BACKEND {
 
 /// Rows of the near list as the solve reads them.
 struct SheetDragRows {
-  SheetRows rows;
+  ClothRows rows;
   SheetRates rates;
-  VecView normal;
+  VecView load;  // what a row gives to its vertices
+  ConstVecView normal;
 
   /// M_s v of a row.
   DRENCH_HD Vec3<float> times(int row, Vec3<float> v) const {
@@ -28,7 +29,7 @@ struct SheetDragRows {
 /// Sum of the rows' loads on a vertex.
 struct VertexLoads {
   NearView near;
-  VecView of_corner;
+  ConstVecView of_corner;
   const float* share;
   DRENCH_HD Vec3<float> on(int vertex) const {
     if (share[vertex] == 0.f) return {0.f, 0.f, 0.f};

@@ -9,9 +9,9 @@ namespace drench::sim::DRENCH_BACKEND {
 namespace {
 
 /// @param cloth_velocity  of the start of the step, m/s
-SheetGaps sheet_gaps(const State& state, const VecView& cloth_velocity) {
+SheetGaps sheet_gaps(const State& state, const ConstVecView& cloth_velocity) {
   const FluidState& f = state.fluid;
-  return {sheet_rows(state),
+  return {cloth_rows(state),
           f.start.view(),
           f.normal.view(),
           cloth_velocity,
@@ -22,16 +22,16 @@ SheetGaps sheet_gaps(const State& state, const VecView& cloth_velocity) {
           float(state.dt)};
 }
 
-SheetRates sheet_rates(const State& state) {
-  const ContactView c = contact_rows(state);
-  return {c.inverse_row, c.pressure_target};
+SheetRates sheet_rates(State& state) {
+  return {state.contact.rate_along.data(), state.contact.rate_across.data()};
 }
 
 /// Beside sheets: all that brakes, and the sheets' rates.
 void set_drag_near_sheets(State& state, const BodyDrag& law) {
   const SheetGaps gaps = sheet_gaps(state, state.cloth.velocity.view());
   const SheetRates rates = sheet_rates(state);
-  const VecView velocity = state.cloth.velocity.view(), change = state.cloth_system.change.view();
+  const ConstVecView velocity = state.cloth.velocity.view();
+  const ConstVecView change = state.cloth_system.change.view();
   const float* held = state.parameters.no_slip_sheets ? state.cloth.no_slip.data() : nullptr;
   const Float4* place = state.pressure.place.data();
   ViscosityState& s = state.viscosity;
@@ -82,7 +82,7 @@ Impulse drag_impulse(const State& state, int which) {
   const BodyDrag law = body_drag_of(state);
   const bool solved = viscosity_is_implicit(state.parameters, state.dt);
   const DraggedVelocity velocity{solved ? state.viscosity.solution.data()
-                                        : state.pressure.vector.data()};
+                                        : state.pressure.scratch_a.data()};
   const Float4* place = state.pressure.place.data();
   const double mass = state.parameters.particle_mass;
   const bool sheets = state.contact.near > 0;
@@ -124,11 +124,12 @@ bool drags_sheets(const State& state) {
   return state.parameters.no_slip_sheets && state.contact.near > 0;
 }
 
-SheetDragRows sheet_drag_rows(const State& state) {
-  return {sheet_rows(state), sheet_rates(state), state.fluid.normal.view()};
+SheetDragRows sheet_drag_rows(State& state) {
+  return {cloth_rows(state), sheet_rates(state), state.contact.change.view(),
+          state.fluid.normal.view()};
 }
 
-BlockInverse drag_block_inverse(const State& state) {
+BlockInverse drag_block_inverse(State& state) {
   return {state.cloth_system.drag_factor.data(), state.cloth.padded};
 }
 
@@ -142,7 +143,7 @@ void invert_drag_blocks(State& state) {
   const SheetDragRows drag = sheet_drag_rows(state);
   parallel_for(
       "sheet drag: shares", drag.rows.rows, DRENCH_LAMBDA(int row) {
-        drag.rows.load.set(row, {drag.rates.along[row], drag.rates.across[row], 0.f});
+        drag.load.set(row, {drag.rates.along[row], drag.rates.across[row], 0.f});
       });
   const VertexLoads loads = sum_drag_loads(state);
   const BlockInverse whole = block_inverse(state), block = drag_block_inverse(state);
@@ -185,17 +186,18 @@ SheetDragIteration sheet_drag_iteration(State& state) {
 void load_by_drag(State& state) {
   const SheetDragRows drag = sheet_drag_rows(state);
   const Float4* u = state.viscosity.solution.data();
-  const VecView velocity = state.cloth.velocity.view(), change = state.cloth_system.change.view(),
-                more = state.cloth_system.answer.view();
+  const ConstVecView velocity = state.cloth.velocity.view();
+  const ConstVecView change = state.cloth_system.change.view(),
+                     more = state.cloth_system.answer.view();
   const float inverse_dt = float(1 / state.dt);
   parallel_for(
       "sheet drag: loads", drag.rows.rows, DRENCH_LAMBDA(int row) {
         const int i = drag.rows.particle[row];
-        if (i < 0) return drag.rows.load.set(row, {0.f, 0.f, 0.f});
+        if (i < 0) return drag.load.set(row, {0.f, 0.f, 0.f});
         const Vec3<float> sheet = drag.rows.at_foot(row, velocity) +
                                   drag.rows.at_foot(row, change) * inverse_dt +
                                   drag.rows.at_foot(row, more);
-        drag.rows.load.set(row, drag.times(row, Vec3<float>{u[i].x, u[i].y, u[i].z} - sheet));
+        drag.load.set(row, drag.times(row, Vec3<float>{u[i].x, u[i].y, u[i].z} - sheet));
       });
 }
 
@@ -217,7 +219,7 @@ void multiply_sheet_drag(State& state) {
   const SheetDragRows drag = sheet_drag_rows(state);
   const Float4* direction = state.viscosity.direction.data();
   Float4* product = state.viscosity.product.data();
-  const VecView of_vertex = state.cloth_system.direction.view();
+  const ConstVecView of_vertex = state.cloth_system.direction.view();
   const ViscousControl* control = state.viscosity.control.data();
   parallel_for(
       "sheet drag: rows", drag.rows.rows, DRENCH_LAMBDA(int row) {
@@ -227,7 +229,7 @@ void multiply_sheet_drag(State& state) {
             sheet = drag.times(row, drag.rows.at_foot(row, of_vertex));
         const Float4 k = product[i];
         product[i] = {k.x - sheet.x, k.y - sheet.y, k.z - sheet.z, 0.f};
-        drag.rows.load.set(row, drag.times(row, d) - sheet);
+        drag.load.set(row, drag.times(row, d) - sheet);
       });
   const VertexLoads loads = sum_drag_loads(state);
   const SheetDragIteration iteration = sheet_drag_iteration(state);
@@ -262,7 +264,7 @@ void give_back_sheet_drag(State& state) {
   const VecView right = s.right.view(), change = s.change.view(), more = s.answer.view();
   const float dt = float(state.dt), mass = state.parameters.particle_mass;
   const int* grip = state.parameters.obstacles > 0 ? s.grip.data() : nullptr;
-  const VecView rub = s.rub.view();
+  const ConstVecView rub = s.rub.view();
   parallel_for(
       "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         right.set(v, right[v] + loads.on(v) * (mass * dt));
@@ -291,7 +293,7 @@ ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
   const double unseen = 1e-6 * p.spacing / state.dt;  // m/s
   return {state.fluid.velocity.view(),
           state.pressure.place.data(),
-          state.pressure.vector.data(),
+          state.pressure.scratch_a.data(),
           s.product.data(),
           s.diagonal.data(),
           s.cross.data(),
@@ -358,7 +360,7 @@ void solve_viscosity(State& state, const Separation& separation) {
 template <class Separation>
 void step_viscosity(State& state, const Separation& separation) {
   const VecView v = state.fluid.velocity.view();
-  Float4* vector = state.pressure.vector.data();
+  Float4* vector = state.pressure.scratch_a.data();
   parallel_for(
       "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};

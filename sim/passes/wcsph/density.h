@@ -46,7 +46,7 @@ template <class Kernel>
 struct DensitySum {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
-  VecView position;
+  ConstVecView position;
   const float* cloth_share;                          // share of density replaced by cloth, or null
   float *density, *pressure_term, *inverse_density;  // kg/m^3, p / rho^2 in m^5/(kg s^2), m^3/kg
   float support_radius;                              // m

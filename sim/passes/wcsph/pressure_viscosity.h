@@ -14,7 +14,7 @@ namespace drench::sim::DRENCH_BACKEND {
 struct PressureViscosity {
   static constexpr int columns = 8;
   static constexpr bool costly = true;
-  VecView position, velocity;
+  ConstVecView position, velocity;
   const float *pressure_term, *inverse_density;  // p / rho^2, 1 / rho
   VecView acceleration;
   float support_radius;     // m

@@ -19,9 +19,9 @@ Walls walls_of(const Parameters& p) {
 GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
 
 template <class Kernel>
-DensitySum<Kernel> density_pass(const State& state) {
+DensitySum<Kernel> density_pass(State& state) {
   const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
+  FluidState& f = state.fluid;
   return {f.position.view(),
           f.cloth_share.size() ? f.cloth_share.data() : nullptr,
           f.density.data(),
@@ -72,7 +72,8 @@ void pressure_viscosity(State& state) {
 
 void integrate_velocity(State& state) {
   FluidState& f = state.fluid;
-  const VecView v = f.velocity.view(), a = f.acceleration.view();
+  const VecView v = f.velocity.view();
+  const ConstVecView a = f.acceleration.view();
   const float dt = float(state.dt);
   parallel_for(
       "integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });

@@ -1,4 +1,4 @@
-#include "pipeline/driver/wanted.h"
+#include "pipeline/driver/targets.h"
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
@@ -9,7 +9,6 @@
 #include "build_id.h"
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/shot_file.h"
-#include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "render/color/view_transform.h"
 #include "render/denoise/oidn.h"
@@ -17,8 +16,6 @@
 namespace drench {
 
 namespace {
-
-std::string short_hex(const Digest& digest) { return digest.hex().substr(0, 8); }
 
 /// A digest of each top-level section of the resolved shot: names what changed, decides nothing.
 KeyParts sections_of(const Shot& shot, std::initializer_list<std::string_view> names) {
@@ -190,140 +187,48 @@ StageKey dailies_key(const Shot& shot) {
 
 }  // namespace
 
-std::string_view step_name(Step step) {
-  switch (step) {
-    case Step::simulate:
-      return "simulate";
-    case Step::mesh:
-      return "mesh";
-    case Step::foam:
-      return "foam";
-    case Step::render:
-      return "render";
-    case Step::denoise:
-      return "denoise";
-    case Step::contact_sheet:
-      return "contact sheet";
-    case Step::movie:
-      return "movie";
-  }
-  return "";
-}
+std::string short_hex(const Digest& digest) { return digest.hex().substr(0, 8); }
 
-bool Wanted::may(Step step) const {
+bool Targets::includes(Step step) const {
   return std::find(steps.begin(), steps.end(), step) != steps.end();
 }
 
-bool Wanted::wants(int frame) const {
+bool Targets::includes(int frame) const {
   return std::binary_search(frames.begin(), frames.end(), frame);
 }
 
-Wanted want(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
-            const std::string& device_class) {
-  Wanted wanted;
-  wanted.shot = shot.name;
-  wanted.first = shot.timeline.first;
-  wanted.frames = std::move(frames);
-  wanted.steps = std::move(steps);
-  wanted.fluid = shot.fluid.present();
-  wanted.obj = wanted.fluid && shot.surface.obj;
-  wanted.level_set = wanted.fluid && shot.surface.level_set;
-  for (const Cloth& cloth : shot.cloth) wanted.cloth.push_back(cloth.name);
-  wanted.sequence = sequence_digests(shot);
-  for (const Probe& probe : shot.probe) wanted.probe.push_back(probe.name);
-  wanted.simulate = simulate_key(shot, device_class);
-  wanted.obstacles_move =
+Targets targets_of(const Shot& shot, std::vector<int> frames, std::vector<Step> steps,
+                   const std::string& device_class) {
+  Targets targets;
+  targets.shot = shot.name;
+  targets.first = shot.timeline.first;
+  targets.frames = std::move(frames);
+  targets.steps = std::move(steps);
+  targets.fluid = shot.fluid.present();
+  targets.obj = targets.fluid && shot.surface.obj;
+  targets.level_set = targets.fluid && shot.surface.level_set;
+  for (const Cloth& cloth : shot.cloth) targets.cloth.push_back(cloth.name);
+  targets.sequence = sequence_digests(shot);
+  for (const Probe& probe : shot.probe) targets.probe.push_back(probe.name);
+  targets.simulate = simulate_key(shot, device_class);
+  targets.obstacles_move =
       std::any_of(shot.obstacle.begin(), shot.obstacle.end(), [](const Obstacle& o) {
         return o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1 ||
                is_sequence(o.mesh_file);
       });
-  wanted.mesh = mesh_key(shot);
-  wanted.has_foam = wanted.fluid && shot.foam.present;
-  if (wanted.has_foam) wanted.foam = foam_key(shot);
-  const std::string denoiser = wanted.may(Step::render) ? denoiser_release(shot) : "";
-  wanted.denoised_later = shot.render.denoise && shot.render.denoise_frames > 0;
-  wanted.render = render_key(shot, wanted.denoised_later ? "" : denoiser);
-  if (wanted.denoised_later) wanted.denoise = denoise_key(shot, denoiser);
-  if (wanted.denoised_later && shot.render.denoiser == Denoiser::regression)
-    wanted.denoise_frames = shot.render.denoise_frames;
-  if (wanted.may(Step::contact_sheet) || wanted.may(Step::movie))
-    wanted.dailies = dailies_key(shot);  // who shows nothing needs no OpenColorIO
-  wanted.has_ffmpeg = find_ffmpeg().has_value();
-  return wanted;
-}
-
-std::vector<std::string> simulated_files(const Wanted& wanted, int frame) {
-  std::vector<std::string> files;
-  if (wanted.fluid) files.push_back(layout::particles(frame));
-  for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
-  return files;
-}
-
-std::vector<std::string> probe_files(const Wanted& wanted) {
-  std::vector<std::string> files;
-  for (const std::string& name : wanted.probe) files.push_back(layout::probe(name));
-  return files;
-}
-
-std::vector<std::string> mesh_files(const Wanted& wanted, int frame) {
-  std::vector<std::string> files;
-  if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
-  if (wanted.obj) files.push_back(layout::fluid_obj(frame));
-  if (wanted.level_set) files.push_back(layout::level_set(frame));
-  return files;
-}
-
-std::vector<std::string> foam_inputs(const Wanted& wanted, int frame) {
-  if (frame == wanted.first) return {layout::particles(frame)};
-  return {layout::particles(frame - 1), layout::particles(frame), layout::foam(frame - 1)};
-}
-
-std::vector<std::string> render_inputs(const Wanted& wanted, int frame) {
-  std::vector<std::string> files;
-  if (wanted.fluid) files.push_back(layout::fluid_mesh(frame));
-  if (wanted.has_foam) files.push_back(layout::foam(frame));
-  for (const std::string& name : wanted.cloth) files.push_back(layout::cloth(name, frame));
-  return files;
-}
-
-std::string render_file(const Wanted& wanted, int frame) {
-  return wanted.denoised_later ? layout::noisy(wanted.shot, frame)
-                               : layout::image(wanted.shot, frame);
-}
-
-InputDigests sequence_inputs(const Wanted& wanted, int first, int last) {
-  InputDigests inputs;
-  for (auto at = wanted.sequence.lower_bound(first);
-       at != wanted.sequence.end() && at->first <= last; ++at)
-    inputs.emplace_back("obstacles of frame " + std::to_string(at->first), at->second);
-  return inputs;
-}
-
-std::vector<Digest> simulation_keys(const Wanted& wanted, int last) {
-  std::vector<Digest> keys;
-  Digest before;
-  for (int frame = wanted.first; frame <= last; ++frame) {
-    Hasher hasher;
-    hasher.text("simulate").digest(wanted.simulate.digest).value(frame).digest(before);
-    // A checkpoint may stand between this frame and the next.
-    for (const auto& [name, digest] : sequence_inputs(wanted, frame, frame + 1))
-      hasher.digest(digest);
-    before = hasher.finish();
-    keys.push_back(before);
-  }
-  return keys;
-}
-
-Key step_key(const StageKey& stage, Step step, int frame, const InputDigests& inputs) {
-  Key key{{}, stage.parts};
-  Hasher hasher;
-  hasher.text(step_name(step)).digest(stage.digest).value(frame);
-  for (const auto& [name, digest] : inputs) {
-    hasher.text(name).digest(digest);
-    key.parts[name] = short_hex(digest);
-  }
-  key.digest = hasher.finish();
-  return key;
+  targets.mesh = mesh_key(shot);
+  targets.has_foam = targets.fluid && shot.foam.present;
+  if (targets.has_foam) targets.foam = foam_key(shot);
+  const std::string denoiser = targets.includes(Step::render) ? denoiser_release(shot) : "";
+  targets.denoised_later = shot.render.denoise && shot.render.denoise_frames > 0;
+  targets.render = render_key(shot, targets.denoised_later ? "" : denoiser);
+  if (targets.denoised_later) targets.denoise = denoise_key(shot, denoiser);
+  if (targets.denoised_later && shot.render.denoiser == Denoiser::regression)
+    targets.denoise_frames = shot.render.denoise_frames;
+  if (targets.includes(Step::contact_sheet) || targets.includes(Step::movie))
+    targets.dailies = dailies_key(shot);  // who shows nothing needs no OpenColorIO
+  targets.has_ffmpeg = find_ffmpeg().has_value();
+  return targets;
 }
 
 }  // namespace drench
