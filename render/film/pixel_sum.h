@@ -54,7 +54,8 @@ class PixelSum {
   float half(int which, int channel) const {
     double sum = 0;
     for (int b = which; b < whole_; b += 2) sum += batch_[b][channel];
-    return float(sum / (size_ * ((whole_ + 1 - which) / 2)));
+    const int batches = (whole_ + 1 - which) / 2;
+    return float(sum / (size_ * batches));
   }
 
  private:

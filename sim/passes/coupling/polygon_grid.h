@@ -164,6 +164,15 @@ struct PolygonView {
       }
     }
   }
+  template <class Index>
+  DRENCH_HD auto box_near(Index k, Vec3<float> low, Vec3<float> high, float extra) const {
+    using T = decltype(load(sorted_low.x, k));
+    const Vec3<T> l = sorted_low.at(k), h = sorted_high.at(k);
+    const Vec3<T> gap{max0(maximum(T(low.x) - h.x, l.x - T(high.x))),
+                      max0(maximum(T(low.y) - h.y, l.y - T(high.y))),
+                      max0(maximum(T(low.z) - h.z, l.z - T(high.z)))};
+    return length2(gap) <= T(extra * extra);
+  }
   /// Calls f(place in order) for each of those whose own box comes within `extra` of the box.
   template <class F>
   DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra,
@@ -173,15 +182,6 @@ struct PolygonView {
         if (box_near(k, low, high, extra)) f(k);
       }
     });
-  }
-  template <class Index>
-  DRENCH_HD auto box_near(Index k, Vec3<float> low, Vec3<float> high, float extra) const {
-    using T = decltype(load(sorted_low.x, k));
-    const Vec3<T> l = sorted_low.at(k), h = sorted_high.at(k);
-    const Vec3<T> gap{max0(maximum(T(low.x) - h.x, l.x - T(high.x))),
-                      max0(maximum(T(low.y) - h.y, l.y - T(high.y))),
-                      max0(maximum(T(low.z) - h.z, l.z - T(high.z)))};
-    return length2(gap) <= T(extra * extra);
   }
 };
 
