@@ -1,7 +1,6 @@
 #include "pipeline/contract/geometry/level_set.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -13,8 +12,8 @@
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files/vdb_archive.h"
 #include "pipeline/contract/frames.h"
+#include "pipeline/contract/geometry/mesh_to_volume.h"
 #include "pipeline/contract/geometry/shells.h"
 #include "pipeline/contract/geometry/triangle.h"
 
@@ -24,29 +23,6 @@ namespace {
 
 using Imath::V3d, Imath::V3f;
 using openvdb::FloatGrid;
-
-/// How OpenVDB finds what is inside: by filling from the outside, cavities and pockets included, or
-/// not at all.
-enum class Inside { filled, unknown };
-
-FloatGrid::Ptr narrow_band(const TriangleMesh& mesh, double voxel, double band, Inside inside) {
-  std::vector<openvdb::Vec3s> positions;
-  positions.reserve(mesh.position.size());
-  for (const V3f& x : mesh.position) positions.emplace_back(x.x, x.y, x.z);
-  std::vector<openvdb::Vec3I> triangles;
-  triangles.reserve(mesh.triangle.size());
-  for (const auto& t : mesh.triangle) triangles.emplace_back(t.x, t.y, t.z);
-  initialize_vdb();
-  const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-  const float width = float(band / voxel) + 1;
-  if (mesh.triangle.empty()) return FloatGrid::create(float(band) + float(voxel));
-  if (inside == Inside::unknown) {
-    return openvdb::tools::meshToUnsignedDistanceField<FloatGrid>(*transform, positions, triangles,
-                                                                  {}, width);
-  }
-  return openvdb::tools::meshToSignedDistanceField<FloatGrid>(*transform, positions, triangles, {},
-                                                              width, width);
-}
 
 struct Box {
   V3d low{1e300}, high{-1e300};

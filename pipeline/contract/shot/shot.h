@@ -1,6 +1,7 @@
 #pragma once
 // A shot as the stages see it: every value checked, every default filled in. SI units; colours are
-// linear ACEScg. Read from TOML by shot_file.h; the parameter table there is the one list of keys.
+// linear ACEScg. Read from TOML by shot_file.h; the parameter table there is the one list of keys,
+// and the enumerators here are the words that a file may say.
 
 #include <Imath/ImathVec.h>
 

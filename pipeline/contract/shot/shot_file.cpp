@@ -19,6 +19,7 @@
 namespace drench {
 
 namespace fs = std::filesystem;
+using shot_table::GridPins;
 using shot_table::Kind;
 using shot_table::Parameter;
 using shot_table::Section;
@@ -29,8 +30,8 @@ namespace {
 struct Draft {
   Shot shot;
   ShotSources sources;
-  std::map<std::string, std::vector<std::string>> grid_pins;  // by path of the cloth
-  std::set<std::string> overridden;                           // keys that an override changed
+  std::map<std::string, std::vector<GridPins>> grid_pins;  // by path of the cloth
+  std::set<std::string> overridden;                        // keys that an override changed
 };
 
 enum class Mode { write, override_values };
@@ -404,22 +405,34 @@ void apply_override(Draft& draft, const std::string& text, const fs::path& folde
   reader.read_top(table);
 }
 
+/// Whether vertex (i, j) of (0, 0) to (u, v) is one of them.
+bool is_held(GridPins pins, uint32_t i, uint32_t j, uint32_t u, uint32_t v) {
+  const bool end_u = i == 0 || i == u, end_v = j == 0 || j == v;
+  switch (pins) {
+    case GridPins::corners:
+      return end_u && end_v;
+    case GridPins::edge_u0:
+      return i == 0;
+    case GridPins::edge_u1:
+      return i == u;
+    case GridPins::edge_v0:
+      return j == 0;
+    case GridPins::edge_v1:
+      return j == v;
+    case GridPins::rim:
+      return end_u || end_v;
+  }
+  return false;
+}
+
 /// Vertex j (nu + 1) + i stands at i along u and j along v.
-std::vector<uint32_t> pinned_vertices(const std::vector<std::string>& names, const V2i& cells) {
+std::vector<uint32_t> pinned_vertices(const std::vector<GridPins>& all, const V2i& cells) {
   const auto u = uint32_t(cells.x), v = uint32_t(cells.y);
   std::set<uint32_t> held;
-  for (const std::string& name : names) {
-    for (uint32_t j = 0; j <= v; ++j) {
-      for (uint32_t i = 0; i <= u; ++i) {
-        const bool end_u = i == 0 || i == u, end_v = j == 0 || j == v;
-        if ((name == "corners" && end_u && end_v) || (name == "rim" && (end_u || end_v)) ||
-            (name == "edge_u0" && i == 0) || (name == "edge_u1" && i == u) ||
-            (name == "edge_v0" && j == 0) || (name == "edge_v1" && j == v)) {
-          held.insert(j * (u + 1) + i);
-        }
-      }
-    }
-  }
+  for (const GridPins pins : all)
+    for (uint32_t j = 0; j <= v; ++j)
+      for (uint32_t i = 0; i <= u; ++i)
+        if (is_held(pins, i, j, u, v)) held.insert(j * (u + 1) + i);
   return {held.begin(), held.end()};
 }
 
@@ -437,8 +450,8 @@ void resolve_pins(Draft& draft) {
                         draft.sources.at(cells), cells, path, k));
       }
     }
-    const auto names = draft.grid_pins.find(path);
-    if (names == draft.grid_pins.end() || names->second.empty()) continue;
+    const auto pins = draft.grid_pins.find(path);
+    if (pins == draft.grid_pins.end() || pins->second.empty()) continue;
     if (!cloth.mesh_file.empty()) {
       throw Error(
           fmt::format("{}: {}.pins names edges of a grid, but this cloth is a mesh. Use "
@@ -446,7 +459,7 @@ void resolve_pins(Draft& draft) {
                       draft.sources.at(path + ".pins"), path));
     }
     ClothPin pin;
-    pin.vertices = pinned_vertices(names->second, cloth.cells);
+    pin.vertices = pinned_vertices(pins->second, cloth.cells);
     cloth.pin.push_back(pin);
     draft.sources.where[fmt::format("{}.pin[{}]", path, cloth.pin.size() - 1)] =
         draft.sources.at(path + ".pins");

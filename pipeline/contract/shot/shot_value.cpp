@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files/named_file.h"
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/colour.h"
+#include "pipeline/contract/shot/enum_names.h"
 #include "pipeline/contract/shot/printable.h"
 
 namespace drench::shot_table {
@@ -151,11 +151,10 @@ class ValueReader {
     return value->get();
   }
 
-  int choice(const toml::node& node) const {
+  std::string_view choice(const toml::node& node) const {
     const std::string word = text(node);
-    for (size_t i = 0; i < parameter_.choices.size(); ++i) {
-      if (word == parameter_.choices[i]) return int(i);
-    }
+    for (const std::string_view known : parameter_.choices)
+      if (word == known) return known;
     const std::string_view near = nearest_word(word, parameter_.choices);
     fail(fmt::format("it must be one of \"{}\"{}", fmt::join(parameter_.choices, "\", \""),
                      near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
@@ -319,9 +318,6 @@ template <class T>
 void put(void* field, T value) {
   as<T>(field) = std::move(value);
 }
-void put_choice(void* field, int index) {  // an enum of int's size whose values count from 0
-  std::memcpy(field, &index, sizeof index);
-}
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -362,12 +358,6 @@ std::string track_text(const Animated<T>& track, OneText one) {
   return text + "]";
 }
 
-std::string choice_text(const Parameter& parameter, const void* field) {
-  int index = 0;
-  std::memcpy(&index, field, sizeof index);
-  return fmt::format("\"{}\"", parameter.choices.at(size_t(index)));
-}
-
 }  // namespace
 
 void read_value(const Parameter& parameter, void* field, const toml::node& value,
@@ -395,7 +385,8 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::mesh_files:
       return put<fs::path>(field, reader.mesh_files(value));
     case Kind::choice:
-      return put_choice(field, reader.choice(value));
+    case Kind::track_mode:
+      return parameter.choose(field, reader.choice(value));
     case Kind::vector:
       return put<V3d>(field, reader.vector(value));
     case Kind::colour:
@@ -413,9 +404,6 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::vector_track:
       reader.track(as<Animated<V3d>>(field), reader.is_keyed(), one_vector);
       break;
-    case Kind::track_mode:  // the row's field is the position of the camera or obstacle
-      as<Animated<V3d>>(field).interpolation = Interpolation(reader.choice(value));
-      break;
     case Kind::vertices:
       return put<std::vector<uint32_t>>(field, reader.vertices(value));
     case Kind::box:
@@ -425,18 +413,15 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
   }
 }
 
-std::vector<std::string> read_grid_pins(const Parameter& parameter, const toml::node& value,
-                                        const Site& site) {
+std::vector<GridPins> read_grid_pins(const Parameter& parameter, const toml::node& value,
+                                     const Site& site) {
   const ValueReader reader(parameter, value, site);
-  std::vector<std::string> names;
-  if (const auto* array = value.as_array()) {
-    for (const toml::node& item : *array) {
-      names.emplace_back(parameter.choices[size_t(reader.choice(item))]);
-    }
-  } else {
-    names.emplace_back(parameter.choices[size_t(reader.choice(value))]);
-  }
-  return names;
+  const auto one = [&](const toml::node& node) { return enum_of<GridPins>(reader.choice(node)); };
+  const auto* const array = value.as_array();
+  if (array == nullptr) return {one(value)};
+  std::vector<GridPins> pins;
+  for (const toml::node& item : *array) pins.push_back(one(item));
+  return pins;
 }
 
 std::string printable(std::string text) {
@@ -477,7 +462,8 @@ std::string value_text(const Parameter& parameter, const void* field) {
     case Kind::mesh_files:
       return as<fs::path>(field).empty() ? "" : quoted(as<fs::path>(field).string());
     case Kind::choice:
-      return choice_text(parameter, field);
+    case Kind::track_mode:
+      return quoted(std::string(parameter.chosen(field)));
     case Kind::vector:
       return vector_text(as<V3d>(field));
     case Kind::colour:
@@ -491,8 +477,6 @@ std::string value_text(const Parameter& parameter, const void* field) {
       return track_text(as<Animated<double>>(field), number_text);
     case Kind::vector_track:
       return track_text(as<Animated<V3d>>(field), vector_text<V3d>);
-    case Kind::track_mode:
-      return choice_text(parameter, &as<Animated<V3d>>(field).interpolation);
     case Kind::vertices: {
       const auto& list = as<std::vector<uint32_t>>(field);
       return list.empty() ? "" : fmt::format("[{}]", fmt::join(list, ", "));

@@ -18,9 +18,9 @@ struct Site {
 
 /// @throws Error naming place, key, value and limits when the value does not fit the row.
 void read_value(const Parameter& parameter, void* field, const toml::node& value, const Site& site);
-/// Names of grid_pins. @throws Error as above.
-std::vector<std::string> read_grid_pins(const Parameter& parameter, const toml::node& value,
-                                        const Site& site);
+/// What grid_pins says. @throws Error as above.
+std::vector<GridPins> read_grid_pins(const Parameter& parameter, const toml::node& value,
+                                     const Site& site);
 
 /// The value as TOML; reading it gives the same bits. Empty for an absent path or box and for an
 /// empty list, which are left out.
