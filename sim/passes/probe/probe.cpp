@@ -59,27 +59,16 @@ StepPressure step_pressure_of(const State& state) {
   const FluidState& f = state.fluid;
   const bool projected = p.incompressible;
   const float h = p.support_radius, h4 = h * h * h * h;
-  StepPressure s{f.position.view(),
-                 f.velocity.view(),
-                 f.acceleration.view(),
-                 f.pressure_term.data(),
-                 projected ? nullptr : f.inverse_density.data(),
-                 projected ? state.pressure.place.data() : nullptr,
-                 projected ? state.pressure.correction.data() : nullptr,
-                 projected ? state.pressure.correction_cross.data() : nullptr,
-                 float(state.dt),
-                 h,
-                 p.particle_mass,
-                 p.rest_density,
-                 p.wall_viscosity,
-                 // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
-                 p.particle_mass / p.rest_density *
-                     (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
-                 {}};
-  s.walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    s.walls.low[k] = p.low[k], s.walls.high[k] = p.high[k], s.walls.on[k] = p.wall[k];
-  return s;
+  return {f.position.view(), f.velocity.view(), f.acceleration.view(), f.pressure_term.data(),
+          projected ? nullptr : f.inverse_density.data(),
+          projected ? state.pressure.place.data() : nullptr,
+          projected ? state.pressure.correction.data() : nullptr,
+          projected ? state.pressure.correction_cross.data() : nullptr, float(state.dt), h,
+          p.particle_mass, p.rest_density, p.wall_viscosity,
+          // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
+          p.particle_mass / p.rest_density *
+              (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
+          halfspace_walls_of(p)};
 }
 
 BodyParts body_parts_of(const State& state) {

@@ -41,7 +41,7 @@ struct StepPressure {
   const Float4* place;                            // of the incompressible solver's solve, else null
   const Float4 *correction, *correction_cross;
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
-  Walls walls;
+  HalfspaceWalls walls;
 
   /// Where the particle was when it was pushed, m: the incompressible solver's prediction, or where
   /// the step started. (Near cloth, whose path test may have moved it, that is not exact.)
@@ -124,7 +124,7 @@ struct BodyParts {
     float open = 1.f;
     for (int side = 0; side < 2; ++side)
       open -= wall_seen(b, axis, side) *
-              WendlandC2::halfspace(image.image(to_wall(b, axis, side), image.on[axis]));
+              WendlandC2::halfspace(image.image(to_wall(b, axis, side), axis));
     return open;
   }
   DRENCH_HD float open_walls(const Beside& b) const {
@@ -149,7 +149,7 @@ struct BodyParts {
       if (!near) return {};
       return {along_axis(axis, component(step.wall_gradient(i), axis)), way};
     }
-    const float begins = image.image(distance, true);
+    const float begins = image.image(distance, axis);
     if (!(begins < 1.f)) return {};
     float slope = step.rest_density * 2.f * image.inverse_h * wall_seen(b, axis, side) *
                   WendlandC2::plane(begins) * b.open * open_obstacles(b, -1);

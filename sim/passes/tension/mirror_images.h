@@ -8,6 +8,7 @@
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
 #include "sim/passes/coupling/contact_exact.h"
+#include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -100,8 +101,7 @@ struct SheetMirrors {
 struct MirrorImages {
   const Float4* place;  // m
   NeighbourView list;
-  float low[3], high[3];  // m
-  bool on[3];
+  DomainWalls walls;
   float support_radius, spacing;  // m
   float period[3], inverse[3];    // m, 1/m; 0 where an axis is not periodic
   ObstacleViews obstacles;
@@ -114,9 +114,10 @@ struct MirrorImages {
     const Vec3<float> x{p[0], p[1], p[2]};
     for (int k = 0; k < 3; ++k) {
       const Vec3<float> up{float(k == 0), float(k == 1), float(k == 2)};
-      const float below = p[k] - low[k], above = high[k] - p[k];
-      if (on[k] && below < h) mirrors.add({up, low[k], below, 1.f, domain_wall});
-      if (on[k] && above < h) mirrors.add({-up, -high[k], above, 1.f, domain_wall});
+      if (!walls.on[k]) continue;
+      const float below = p[k] - walls.low[k], above = walls.high[k] - p[k];
+      if (below < h) mirrors.add({up, walls.low[k], below, 1.f, domain_wall});
+      if (above < h) mirrors.add({-up, -walls.high[k], above, 1.f, domain_wall});
     }
     for (int k = 0; k < obstacles.count; ++k) {
       const ObstacleView& o = obstacles.obstacle[k];
@@ -183,10 +184,10 @@ inline MirrorImages mirror_images_of(const State& state) {
   images.place = s.place.data(), images.list = view_of(s.lists);
   images.support_radius = p.support_radius, images.spacing = p.spacing;
   images.obstacles = state.obstacles.views();
+  images.walls = domain_walls(p);
   images.any_sheet = state.contact.near > 0;
   images.any = p.obstacles > 0 || images.any_sheet;
   for (int k = 0; k < 3; ++k) {
-    images.low[k] = p.low[k], images.high[k] = p.high[k], images.on[k] = p.wall[k];
     images.period[k] = p.periodic[k] ? p.high[k] - p.low[k] : 0.f;
     images.inverse[k] = p.periodic[k] ? 1.f / images.period[k] : 0.f;
     images.any |= p.wall[k];

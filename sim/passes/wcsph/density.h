@@ -1,13 +1,12 @@
 #pragma once
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/pairs.h"
+#include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Domain walls as the fluid sees them: planes, each on or off, in the simulator's local frame.
-struct Walls {
-  float low[3], high[3];  // m
-  bool on[3];
+/// Domain walls as the weakly compressible fluid sees them: half-spaces of rest density.
+struct HalfspaceWalls : DomainWalls {
   float scale;  // Parameters::wall_scale
 
   /// Distance to the nearer wall of an axis; far when the axis is open.
@@ -19,11 +18,15 @@ struct Walls {
   }
 };
 
+inline HalfspaceWalls halfspace_walls_of(const Parameters& p) {
+  return {domain_walls(p), p.wall_scale};
+}
+
 /// Share of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
 /// corners are not counted twice. H is the half-space integral of the kernel, scaled so that a
 /// lattice that ends half a spacing before a wall has rest density: the kernel is too narrow for
 /// the integral itself.
-DRENCH_HD float wall_density_share(const Walls& walls, Vec3<float> p, float inverse_h) {
+DRENCH_HD float wall_density_share(const HalfspaceWalls& walls, Vec3<float> p, float inverse_h) {
   const float x[3] = {p.x, p.y, p.z};
   float open = 1.f;
   for (int k = 0; k < 3; ++k) {
@@ -53,7 +56,7 @@ struct DensitySum {
   float scale;                                       // m Kernel::factor(h) / lattice_sum
   float rest_density;                                // kg/m^3
   float sound_speed2;                                // m^2/s^2
-  Walls walls;
+  HalfspaceWalls walls;
 
   DRENCH_HD Inputs<3> inputs() const { return {{position.x, position.y, position.z}}; }
 

@@ -23,7 +23,7 @@ struct PressureViscosity {
   float wall_viscosity;     // Pa s, fluid on walls
   float rest_density;       // kg/m^3
   Vec3<float> gravity;      // m/s^2
-  Walls walls;
+  HalfspaceWalls walls;
 
   DRENCH_HD Inputs<8> inputs() const {
     return {{position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, pressure_term,

@@ -8,14 +8,6 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-Walls walls_of(const Parameters& p) {
-  Walls walls{};
-  walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
-  return walls;
-}
-
 GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
 
 template <class Kernel>
@@ -31,7 +23,7 @@ DensitySum<Kernel> density_pass(State& state) {
           p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
           p.rest_density,
           p.sound_speed * p.sound_speed,
-          walls_of(p)};
+          halfspace_walls_of(p)};
 }
 
 }  // namespace
@@ -61,7 +53,7 @@ void pressure_viscosity(State& state) {
                                p.wall_viscosity,
                                p.rest_density,
                                {p.gravity[0], p.gravity[1], p.gravity[2]},
-                               walls_of(p)};
+                               halfspace_walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
                   sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
