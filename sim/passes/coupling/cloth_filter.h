@@ -133,9 +133,13 @@ enum class Shaded { near, hidden };
 /// @param position  m, those that the planes of the sheets were taken from
 inline SheetFilter sheet_filter(State& state, const ConstVecView& position, Shaded known) {
   FluidState& f = state.fluid;
-  return {f.shaded.data(),      position,           f.normal.view(),
-          f.plane.data(),       polygons_of(state), state.parameters.support_radius,
-          known == Shaded::near};
+  return {.shaded = f.shaded.data(),
+          .position = position,
+          .normal = f.normal.view(),
+          .plane = f.plane.data(),
+          .polygons = polygons_of(state),
+          .support_radius = state.parameters.support_radius,
+          .nothing_known = known == Shaded::near};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -24,16 +24,19 @@ constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
 /// Rows of the near list as the pressure solve has them.
 struct ClothRows : ContactRows {
-  ConstVecView gradient;    // kg/m^4, G
-  const float* recovery;    // m, that the row may ask for in this step
-  const float* compliance;  // kg^2/m^8
-  const float *gap, *open;  // m; fraction of the density that the cloth leaves
+  ConstVecView gradient{};                      // kg/m^4, G
+  const float* recovery = nullptr;              // m, that the row may ask for in this step
+  const float* compliance = nullptr;            // kg^2/m^8
+  const float *gap = nullptr, *open = nullptr;  // m; fraction of the density that the cloth leaves
 };
 
 inline ClothRows cloth_rows(const State& state) {
   const ContactState& c = state.contact;
-  return {contact_rows(state), c.gradient.view(), c.recovery.data(),
-          c.compliance.data(), c.gap.data(),      c.open.data()};
+  ClothRows rows{contact_rows(state)};
+  rows.gradient = c.gradient.view();
+  rows.recovery = c.recovery.data(), rows.compliance = c.compliance.data();
+  rows.gap = c.gap.data(), rows.open = c.open.data();
+  return rows;
 }
 
 /// Between a sheet that a wall holds and that wall there may be no room for a particle, and no

@@ -76,24 +76,22 @@ struct SheetTopology {
 inline SheetTopology topology_of(const State& state) {
   const ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  SheetTopology sheet{polygons_of(state),
-                      c.neighbour.data(),
-                      c.sheet.data(),
-                      c.fan_start.data(),
-                      c.fan_entry.data(),
-                      c.rim.data(),
-                      c.rest_centroid.view(),
-                      c.half_thickness.data(),
-                      {},
-                      {},
-                      c.rest_period.data()};
   float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
     low[k] = p.wall[k] ? p.low[k] + 0.5f * p.spacing : -1e30f;
     high[k] = p.wall[k] ? p.high[k] - 0.5f * p.spacing : 1e30f;
   }
-  sheet.low = {low[0], low[1], low[2]}, sheet.high = {high[0], high[1], high[2]};
-  return sheet;
+  return {.polygons = polygons_of(state),
+          .neighbour = c.neighbour.data(),
+          .sheet = c.sheet.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .rim = c.rim.data(),
+          .rest_centroid = c.rest_centroid.view(),
+          .half_thickness = c.half_thickness.data(),
+          .low = {low[0], low[1], low[2]},
+          .high = {high[0], high[1], high[2]},
+          .rest_period = c.rest_period.data()};
 }
 
 /// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no

@@ -38,25 +38,25 @@ ContactSetup contact_setup(State& state) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {near_list(state),
-          f.velocity.view(),
-          f.normal.view(),
-          f.sheet_distance.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          c.half_thickness.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          beta,
-          float(state.dt),
-          p.particle_mass,
-          p.rest_density,
-          p.sound_speed,
-          p.support_radius,
-          contact_distance_of(p),
-          p.dynamic_viscosity,
-          0.01f * p.sound_speed,
-          p.wall_scale};
+  return {.near = near_list(state),
+          .velocity = f.velocity.view(),
+          .normal = f.normal.view(),
+          .distance = f.sheet_distance.data(),
+          .pressure_term = f.pressure_term.data(),
+          .inverse_density = f.inverse_density.data(),
+          .half_thickness = c.half_thickness.data(),
+          .inverse_mass = c.inverse_mass.data(),
+          .vertex_share = c.share.data(),
+          .beta = beta,
+          .dt = float(state.dt),
+          .mass = p.particle_mass,
+          .rest_density = p.rest_density,
+          .sound_speed = p.sound_speed,
+          .support_radius = p.support_radius,
+          .contact_distance = contact_distance_of(p),
+          .viscosity = p.dynamic_viscosity,
+          .push_speed = 0.01f * p.sound_speed,
+          .wall_scale = p.wall_scale};
 }
 
 }  // namespace
@@ -140,15 +140,15 @@ void solve_contacts(State& state) {
   const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
-      "contact: prepare", c.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
+      "contact: prepare", c.list.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
   for_each_lane(
-      "contact: soft", c.rows - c.soft_begin, DRENCH_LAMBDA(auto row) {
-        update_contact(c, row + c.soft_begin, predicted, inverse_particle_mass, 1.f);
+      "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
+        update_contact(c, row + c.list.soft_begin, predicted, inverse_particle_mass, 1.f);
       });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
     for_each_lane(
-        "contact: particles", c.close, DRENCH_LAMBDA(auto row) {
+        "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
     sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
@@ -162,8 +162,8 @@ void solve_contacts(State& state) {
         });
   }
   parallel_for(
-      "contact: velocities", c.rows, DRENCH_LAMBDA(int row) {
-        if (c.particle[row] >= 0) velocity.set(c.particle[row], c.velocity[row]);
+      "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
+        if (c.list.particle[row] >= 0) velocity.set(c.list.particle[row], c.velocity[row]);
       });
 }
 

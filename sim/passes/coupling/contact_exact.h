@@ -52,9 +52,15 @@ struct NearView {
 inline NearView near_list(const State& state) {
   const FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
-  return {f.triangle.data(),          c.corner.data(),    f.weight_b.data(),
-          f.weight_c.data(),          f.edge.data(),      state.contact.order.data(),
-          state.contact.start.data(), c.fan_start.data(), c.fan_entry.data()};
+  return {.triangle = f.triangle.data(),
+          .corner = c.corner.data(),
+          .weight_b = f.weight_b.data(),
+          .weight_c = f.weight_c.data(),
+          .edge = f.edge.data(),
+          .order = state.contact.order.data(),
+          .start = state.contact.start.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data()};
 }
 
 /// m, the gap to the sheet's surface that contact keeps.
@@ -98,7 +104,8 @@ inline ContactRows contact_rows(const State& state) {
 }
 
 /// What the solve of the exact coupling keeps of every row.
-struct ExactContacts : ContactRows {
+struct ExactContacts {
+  ContactRows list;
   VecView normal, velocity, drag, change;
   float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
       *drag_scale, *lambda;
@@ -106,13 +113,19 @@ struct ExactContacts : ContactRows {
 
 inline ExactContacts exact_contacts(State& state) {
   ContactState& c = state.contact;
-  return {contact_rows(state),      c.normal.view(),
-          c.velocity.view(),        c.drag.view(),
-          c.change.view(),          c.inverse_row.data(),
-          c.pressure_target.data(), c.pressure_rate.data(),
-          c.pressure_scale.data(),  c.least.data(),
-          c.drag_rate.data(),       c.drag_scale.data(),
-          c.lambda.data()};
+  return {.list = contact_rows(state),
+          .normal = c.normal.view(),
+          .velocity = c.velocity.view(),
+          .drag = c.drag.view(),
+          .change = c.change.view(),
+          .inverse_row = c.inverse_row.data(),
+          .pressure_target = c.pressure_target.data(),
+          .pressure_rate = c.pressure_rate.data(),
+          .pressure_scale = c.pressure_scale.data(),
+          .least = c.least.data(),
+          .drag_rate = c.drag_rate.data(),
+          .drag_scale = c.drag_scale.data(),
+          .lambda = c.lambda.data()};
 }
 
 /// What the solve reads of the particles and the sheet to set contacts up.
@@ -126,15 +139,15 @@ struct ContactSetup {
 
   template <class Index>
   DRENCH_HD void prepare(const ExactContacts& c, Index row) const {
-    const auto member = load(c.particle, row);
+    const auto member = load(c.list.particle, row);
     const auto valid = is_index(member);
     const auto i = select(valid, member, same_index(0, member));
     const auto t = load(near.triangle, i);
     using T = decltype(load(distance, i));
     T sum(1.f / mass);
     for (int k = 0; k < 3; ++k) {
-      const auto vertex = load(c.vertex[k], row);
-      sum = sum + load(c.weight[k], row) * load(vertex_share, vertex) * T(beta) *
+      const auto vertex = load(c.list.vertex[k], row);
+      sum = sum + load(c.list.weight[k], row) * load(vertex_share, vertex) * T(beta) *
                       load(inverse_mass, vertex);
     }
     const T none(0.f), edge = select(valid, load(near.edge, i), none);
@@ -175,9 +188,9 @@ DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecV
                               float inverse_mass, float relaxation) {
   using T = decltype(load(c.lambda, row));
   const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);
-  const Vec3<T> sheet = predicted.at(load(c.vertex[0], row)) * load(c.weight[0], row) +
-                        predicted.at(load(c.vertex[1], row)) * load(c.weight[1], row) +
-                        predicted.at(load(c.vertex[2], row)) * load(c.weight[2], row);
+  const Vec3<T> sheet = predicted.at(load(c.list.vertex[0], row)) * load(c.list.weight[0], row) +
+                        predicted.at(load(c.list.vertex[1], row)) * load(c.list.weight[1], row) +
+                        predicted.at(load(c.list.vertex[2], row)) * load(c.list.weight[2], row);
   const Vec3<T> relative = velocity - sheet;
   const T approach = dot(normal, relative), old = load(c.lambda, row), none(0.f);
   const Vec3<T> slip = relative - normal * approach;

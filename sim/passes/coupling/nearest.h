@@ -28,9 +28,16 @@ struct NearestOfPack {
   DRENCH_HD void test(const PolygonView& polygons, int k) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
-    const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
-                                   one.d12,        one.d22,     one.inverse_ab, one.inverse_ac,
-                                   one.inverse_bc, one.inverse};
+    const PreparedTriangle<Pack> t{.a = all(one.a),
+                                   .ab = all(one.ab),
+                                   .ac = all(one.ac),
+                                   .d11 = one.d11,
+                                   .d12 = one.d12,
+                                   .d22 = one.d22,
+                                   .inverse_ab = one.inverse_ab,
+                                   .inverse_ac = one.inverse_ac,
+                                   .inverse_bc = one.inverse_bc,
+                                   .inverse = one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
     Mask may = distance2_bound(plane, t) < best;

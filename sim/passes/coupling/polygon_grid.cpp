@@ -99,8 +99,12 @@ namespace {
 
 NearestOutput nearest_output(State& state, float reach) {
   FluidState& f = state.fluid;
-  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(), reach,
-          1.5f * reach};
+  return {.triangle = f.triangle.data(),
+          .weight_b = f.weight_b.data(),
+          .weight_c = f.weight_c.data(),
+          .far_by = f.far_by.data(),
+          .reach = reach,
+          .search = 1.5f * reach};
 }
 
 }  // namespace

@@ -105,8 +105,13 @@ inline TriangleImages triangle_images_of(const State& state) {
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   const float margin = 2.f * p.support_radius;
-  TriangleImages images{periods_of(p), c.low,     c.high,     c.largest_radius,
-                        {0, 0, 0},     {1, 1, 1}, c.triangles};
+  TriangleImages images{.period = periods_of(p),
+                        .low = c.low,
+                        .high = c.high,
+                        .radius = c.largest_radius,
+                        .first = {0, 0, 0},
+                        .count = {1, 1, 1},
+                        .triangles = c.triangles};
   const auto span = [&](int k, float period, float& low, float& high) {
     if (!(period > 0.f)) return;
     low = p.low[k] - margin, high = p.high[k] + margin;
@@ -187,20 +192,20 @@ struct PolygonView {
 
 inline PolygonView polygons_of(const State& state) {
   const ClothState& c = state.cloth;
-  return {c.grid,
-          c.cell_start.data(),
-          c.order.data(),
-          c.corner.data(),
-          c.position.view(),
-          c.centroid.view(),
-          c.largest_radius,
-          c.sorted_low.view(),
-          c.sorted_high.view(),
-          c.sorted_triangle.data(),
-          corners_of(c),
-          c.sorted_shift.view(),
-          periods_of(state.parameters),
-          any_periodic(state.parameters)};
+  return {.grid = c.grid,
+          .cell_start = c.cell_start.data(),
+          .order = c.order.data(),
+          .corner = c.corner.data(),
+          .position = c.position.view(),
+          .centroid = c.centroid.view(),
+          .largest_radius = c.largest_radius,
+          .sorted_low = c.sorted_low.view(),
+          .sorted_high = c.sorted_high.view(),
+          .sorted = c.sorted_triangle.data(),
+          .place = corners_of(c),
+          .sorted_shift = c.sorted_shift.view(),
+          .period = periods_of(state.parameters),
+          .periodic = any_periodic(state.parameters)};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

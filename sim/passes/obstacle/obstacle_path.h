@@ -148,12 +148,12 @@ struct ObstacleGuard {
 inline ObstacleGuard obstacle_guard_of(State& state, int start) {
   const float dt = float(state.dt);
   const bool goes_on = start == 1 && state.cloth.vertices > 0;  // see project_density
-  return {state.obstacles.views(),
-          path_mover_of(state.parameters, dt),
-          goes_on ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt),
-          1.f / dt,
-          start,
-          {state.obstacles.stopped.data()}};
+  return {.obstacles = state.obstacles.views(),
+          .walls = path_mover_of(state.parameters, dt),
+          .ends = goes_on ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt),
+          .inverse_dt = 1.f / dt,
+          .start = start,
+          .stopped = {state.obstacles.stopped.data()}};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -27,9 +27,14 @@ double surface_height(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
   const HalfDensity enough = half_density(p, query);
   const float h = p.support_radius;
-  LineDensity line{
-      state.fluid.position.view(),   query.place[0], query.place[2], 1e30f, 0.25f * h, h,
-      p.particle_mass / (h * h * h), periods_of(p)};
+  LineDensity line{.position = state.fluid.position.view(),
+                   .x = query.place[0],
+                   .z = query.place[2],
+                   .from = 1e30f,
+                   .step = 0.25f * h,
+                   .h = h,
+                   .scale = p.particle_mass / (h * h * h),
+                   .period = periods_of(p)};
   bool fine = false;
   while (true) {
     const LineSamples s =
@@ -59,25 +64,32 @@ StepPressure step_pressure_of(const State& state) {
   const FluidState& f = state.fluid;
   const bool projected = p.incompressible;
   const float h = p.support_radius, h4 = h * h * h * h;
-  return {f.position.view(), f.velocity.view(), f.acceleration.view(), f.pressure_term.data(),
-          projected ? nullptr : f.inverse_density.data(),
-          projected ? state.pressure.place.data() : nullptr,
-          projected ? state.pressure.correction.data() : nullptr,
-          projected ? state.pressure.correction_cross.data() : nullptr, float(state.dt), h,
-          p.particle_mass, p.rest_density, p.wall_viscosity,
-          // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
-          p.particle_mass / p.rest_density *
-              (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
-          halfspace_walls_of(p)};
+  // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
+  const float gradient = projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h);
+  return {.position = f.position.view(),
+          .velocity = f.velocity.view(),
+          .acceleration = f.acceleration.view(),
+          .term = f.pressure_term.data(),
+          .inverse_density = projected ? nullptr : f.inverse_density.data(),
+          .place = projected ? state.pressure.place.data() : nullptr,
+          .correction = projected ? state.pressure.correction.data() : nullptr,
+          .correction_cross = projected ? state.pressure.correction_cross.data() : nullptr,
+          .dt = float(state.dt),
+          .h = h,
+          .mass = p.particle_mass,
+          .rest_density = p.rest_density,
+          .wall_viscosity = p.wall_viscosity,
+          .pair_scale = p.particle_mass / p.rest_density * gradient,
+          .walls = halfspace_walls_of(p)};
 }
 
 BodyParts body_parts_of(const State& state) {
-  return {step_pressure_of(state),
-          image_walls_of(state.parameters),
-          obstacle_share_of(state.parameters),
-          state.obstacles.views(),
-          cloth_rows(state),
-          state.fluid.normal.view()};
+  return {.step = step_pressure_of(state),
+          .image = image_walls_of(state.parameters),
+          .law = obstacle_share_of(state.parameters),
+          .obstacles = state.obstacles.views(),
+          .rows = cloth_rows(state),
+          .normal = state.fluid.normal.view()};
 }
 
 /// Sum of f(particle, row) over all particles, each once.
@@ -107,7 +119,8 @@ DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) 
                     other =
                         fabsf(n.x) < 0.6f ? Vec3<float>{1.f, 0.f, 0.f} : Vec3<float>{0.f, 1.f, 0.f},
                     across = cross(n, other), u = across * (1.f / length(across));
-  return {disc, u, cross(n, u), layers, rings, spokes};
+  return {
+      .disc = disc, .u = u, .v = cross(n, u), .layers = layers, .rings = rings, .spokes = spokes};
 }
 
 /// The nearest sheet; none in a shot without any.
@@ -115,8 +128,12 @@ SensorBody sheet_at(const State& state, Vec3<float> place) {
   const ClothState& c = state.cloth;
   if (!state.parameters.incompressible) return {};
   return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
-                         SheetAt{corners_of(c), c.position.view(), c.half_thickness.data(),
-                                 c.sheet.data(), place, periods_of(state.parameters)},
+                         SheetAt{.corners = corners_of(c),
+                                 .position = c.position.view(),
+                                 .half_thickness = c.half_thickness.data(),
+                                 .sheet = c.sheet.data(),
+                                 .place = place,
+                                 .period = periods_of(state.parameters)},
                          SensorBody{});
 }
 
@@ -155,10 +172,14 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   if (body.kind == SensorBody::sheet) {
-    return parallel_reduce(
-               "probe: sheet's area", c.triangles, Totals<1>{},
-               SheetExtent{corners_of(c), c.position.view(), c.sheet.data(), disc, body.of, reach},
-               AddTotals<1>{})
+    return parallel_reduce("probe: sheet's area", c.triangles, Totals<1>{},
+                           SheetExtent{.corners = corners_of(c),
+                                       .position = c.position.view(),
+                                       .sheet = c.sheet.data(),
+                                       .disc = disc,
+                                       .of = body.of,
+                                       .reach = reach},
+                           AddTotals<1>{})
         .value[0];
   }
   const ObstacleViews obstacles = state.obstacles.views();
@@ -181,10 +202,13 @@ double surface_pressure(const State& state, const ProbeQuery& q, const SensorBod
   const float reach = disc.radius + disc.rim;
   const double extent = surface_extent(state, q, disc, body, reach);
   if (!(extent > 1e-3 * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>(
-      "probe: pressure on a surface", state,
-      SurfaceSensor{body_parts_of(state), disc, body, state.fluid.triangle.data(),
-                    state.cloth.sheet.data(), reach});
+  const Totals<1> sum = sum_by_particle<1>("probe: pressure on a surface", state,
+                                           SurfaceSensor{.parts = body_parts_of(state),
+                                                         .disc = disc,
+                                                         .body = body,
+                                                         .triangle = state.fluid.triangle.data(),
+                                                         .sheet = state.cloth.sheet.data(),
+                                                         .reach = reach});
   return sum.value[0] / extent;
 }
 
@@ -213,12 +237,12 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
   }
   if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
   const Totals<1> sum = sum_by_particle<1>("probe: pressure", state,
-                                           InnerSensor{body_parts_of(state),
-                                                       disc,
-                                                       {f.grid, f.cell_start.data()},
-                                                       view_of(state.pressure.lists),
-                                                       normal,
-                                                       sheet.foot});
+                                           InnerSensor{.parts = body_parts_of(state),
+                                                       .disc = disc,
+                                                       .grid = {f.grid, f.cell_start.data()},
+                                                       .list = view_of(state.pressure.lists),
+                                                       .sheet_normal = normal,
+                                                       .sheet_foot = sheet.foot});
   return sum.value[0] / extent;
 }
 
@@ -276,21 +300,34 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
                             p.gravity[2] + p.held[2]};
   const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
   const AddTotals<3> add;
-  const Totals<3> fluid = parallel_reduce(
-      "probe: fluid energy", f.count, Totals<3>{},
-      PointEnergy{f.position.view(), f.velocity.view(), nullptr, p.particle_mass, gravity, zero},
-      add);
+  const Totals<3> fluid = parallel_reduce("probe: fluid energy", f.count, Totals<3>{},
+                                          PointEnergy{.position = f.position.view(),
+                                                      .velocity = f.velocity.view(),
+                                                      .masses = nullptr,
+                                                      .mass = p.particle_mass,
+                                                      .gravity = gravity,
+                                                      .zero = zero},
+                                          add);
   const float behind =
       sheets_are_implicit(p) ? 0.f : float(0.5 * state.dt / std::max(1, state.substeps));
-  const Totals<3> cloth = parallel_reduce(
-      "probe: cloth energy", c.vertices, Totals<3>{},
-      VertexEnergy{{c.position.view(), c.velocity.view(), c.mass.data(), 0.f, gravity, zero},
-                   {c.position.view(), c.velocity.view(), spring_ends_of(c), c.rest_length.data(),
-                    c.stiffness.data(), c.spring_damping.data()},
-                   c.force.view(),
-                   c.inverse_mass.data(),
-                   behind},
-      add);
+  const Totals<3> cloth =
+      parallel_reduce("probe: cloth energy", c.vertices, Totals<3>{},
+                      VertexEnergy{.points = {.position = c.position.view(),
+                                              .velocity = c.velocity.view(),
+                                              .masses = c.mass.data(),
+                                              .mass = 0.f,
+                                              .gravity = gravity,
+                                              .zero = zero},
+                                   .springs = {.position = c.position.view(),
+                                               .velocity = c.velocity.view(),
+                                               .ends = spring_ends_of(c),
+                                               .rest_length = c.rest_length.data(),
+                                               .stiffness = c.stiffness.data(),
+                                               .damping = c.spring_damping.data()},
+                                   .fluid_force = c.force.view(),
+                                   .inverse_mass = c.inverse_mass.data(),
+                                   .behind = behind},
+                      add);
   const Totals<3> springs = parallel_reduce(
       "probe: spring energy", c.vertices, Totals<3>{},
       SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},

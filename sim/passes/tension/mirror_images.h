@@ -193,14 +193,14 @@ inline MirrorImages mirror_images_of(const State& state) {
     images.any |= p.wall[k];
   }
   if (images.any_sheet) {
-    images.sheets = {near_list(state),
-                     f.normal.view(),
-                     f.start.view(),
-                     state.cloth.velocity.view(),
-                     f.sheet_distance.data(),
-                     f.edge.data(),
-                     state.cloth.half_thickness.data(),
-                     float(state.dt)};
+    images.sheets = {.near = near_list(state),
+                     .normal = f.normal.view(),
+                     .start = f.start.view(),
+                     .cloth_velocity = state.cloth.velocity.view(),
+                     .distance = f.sheet_distance.data(),
+                     .edge = f.edge.data(),
+                     .half_thickness = state.cloth.half_thickness.data(),
+                     .dt = float(state.dt)};
   }
   return images;
 }

@@ -175,12 +175,12 @@ TensionForce<Separation> tension_force(const State& state, Float4* kick, Separat
   const Parameters& p = state.parameters;
   const float a = p.spacing, h = p.support_radius;
   const float strength = float(state.dt) * tension_constant * p.surface_tension;
-  return {state.pressure.place.data(),
-          state.tension.normal.data(),
-          kick,
-          strength / (p.rest_density * a * a * h * h * h),
-          a / h,
-          separation};
+  return {.place = state.pressure.place.data(),
+          .normal = state.tension.normal.data(),
+          .kick = kick,
+          .scale = strength / (p.rest_density * a * a * h * h * h),
+          .spacing = a / h,
+          .separation = separation};
 }
 
 /// Uses PressureState::vector.
