@@ -61,15 +61,16 @@ ContactSetup contact_setup(State& state) {
 
 }  // namespace
 
-void sum_by_triangle(State& state, Rows which, bool again) {
+void sum_by_triangle(State& state, Rows which, IdleCorners idle) {
   const ContactRows c = contact_rows(state);
   const ConstVecView given = state.contact.change.view();
   const int triangles = state.cloth.triangles, *start = state.contact.start.data();
   const VecView impulse = state.contact.impulse.view();
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
+  const bool skip = which == Rows::close && idle == IdleCorners::zero;
   parallel_for(
       "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
-        if (again && start[t] == start[t + 1] && last == 0) return;
+        if (skip && start[t] == start[t + 1]) return;
         Vec3<float> sum[3] = {};
         for (int soft = 0; soft <= last; ++soft) {
           const int k = t + soft * triangles;
@@ -151,7 +152,8 @@ void solve_contacts(State& state) {
         "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
-    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
+    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close,
+                    iteration > 1 ? IdleCorners::zero : IdleCorners::unset);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
         "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {

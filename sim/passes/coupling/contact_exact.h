@@ -218,9 +218,11 @@ constexpr float over_relaxation = 1.8f;
 
 enum class Rows { close, all };
 
+/// What the corners of a triangle without contacts hold: anything, or the zeros of a sum before.
+enum class IdleCorners { unset, zero };
+
 /// Adds up what the contacts of each triangle give to its corners, in their order.
-/// @param again  the same rows were the last to be added: where there are none zeros stand already
-void sum_by_triangle(State& state, Rows which, bool again = false);
+void sum_by_triangle(State& state, Rows which, IdleCorners idle = IdleCorners::unset);
 
 /// Rows of the near list; the vertices receive what the path test took from particles.
 void start_contacts(State& state);

@@ -129,10 +129,13 @@ GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, 
       AddGuardCounts{});
 }
 
+/// Which vertices are put back to the substep's start.
+enum class Held { stopped, all };
+
 /// Takes back the substep of the vertices that particles stopped in this round, or of all. A
 /// stopped vertex takes on its common velocity with those particles; what that changes of its
 /// momentum they share.
-void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
+void hold_cloth(State& state, const PathTest& test, const Tested& tested, Held which) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
   const VecView next = c.next.view(), next_v = c.next_velocity.view();
@@ -140,6 +143,7 @@ void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool e
   const VecView velocity = f.velocity.view();
   const int* corner = c.corner.data();
   int* hold = c.held.data();
+  const bool all = which == Held::all;
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
   parallel_for(
@@ -158,7 +162,7 @@ void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool e
   parallel_for(
       "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
-        if (!everywhere && !stopped) return;
+        if (!all && !stopped) return;
         if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
           next_v.set(v, test.stop_velocity(v, next_v[v]));
         for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
@@ -253,10 +257,10 @@ float guard_substep(State& state, float dt, float moved) {
     state.owes |= count.hits > 0;
     if (count.unresolved == 0) break;
     ++state.guard_holds;
-    const bool everywhere = round >= 24;
-    hold_cloth(state, test, tested, everywhere);
+    const Held which = round < 24 ? Held::stopped : Held::all;
+    hold_cloth(state, test, tested, which);
     test = path_test_of(state, moved);
-    if (!everywhere) continue;
+    if (which == Held::stopped) continue;
     f.held.clear_bytes(1);
     test_paths(state, test, tested, dt, round + 1);
     break;
