@@ -1,6 +1,6 @@
 #pragma once
 // Launches: the same text for both backends, named so that a profile reads like the algorithm.
-// Results never depend on the number of threads: every index writes its own place, and the only
+// Results never depend on the number of threads: every index writes its own element, and the only
 // reductions are maxima and minima (order-free) or sums over fixed chunks.
 
 #include "sim/backend/column.h"

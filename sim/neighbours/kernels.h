@@ -1,8 +1,8 @@
 #pragma once
 // SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6, spiky, and
 // the viscosity kernel's Laplacian; and their integrals over a flat layer and over the half-space
-// beyond it, the wall functions of the seed's eqs (8) and (9). q = distance / h throughout. Closed
-// forms and their derivation: tests/validation/README.md, section 4.
+// beyond it, the wall functions of eqs (8) and (9) of Harada et al. 2007. q = distance / h
+// throughout. Closed forms and their derivation: tests/validation/README.md, section 4.
 
 #include "sim/backend/pack.h"
 

@@ -13,7 +13,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// The wind at a place, m/s.
+/// The wind at a position, m/s.
 DRENCH_HD Vec3<float> wind_at(const WindNow& wind, Vec3<float> x) {
   Vec3<float> u{wind.velocity[0], wind.velocity[1], wind.velocity[2]};
   for (int k = 0; k < wind.modes; ++k) {

@@ -46,7 +46,7 @@ ContactSetup contact_setup(State& state) {
           .inverse_density = f.inverse_density.data(),
           .half_thickness = c.half_thickness.data(),
           .inverse_mass = c.inverse_mass.data(),
-          .vertex_share = c.share.data(),
+          .contact_weight = c.share.data(),
           .beta = beta,
           .dt = float(state.dt),
           .mass = p.particle_mass,
@@ -111,7 +111,7 @@ void start_contacts(State& state) {
     state.fluid.owed.clear();
     state.owes = false;
   }
-  float* share = cloth.share.data();
+  float* contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
   parallel_for(
@@ -125,7 +125,7 @@ void start_contacts(State& state) {
         });
         force.set(v,
                   owes ? near.sum_on_vertex(impulse, v) * -inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
-        share[v] = weights;
+        contact_weight[v] = weights;
       });
 }
 
@@ -138,7 +138,7 @@ void solve_contacts(State& state) {
   const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
                 velocity = state.fluid.velocity.view();
   const ConstVecView impulse = state.contact.impulse.view();
-  const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
+  const float *inverse_mass = cloth.inverse_mass.data(), *contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
       "contact: prepare", c.list.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
@@ -157,7 +157,7 @@ void solve_contacts(State& state) {
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
         "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
-          if (share[v] == 0.f) return;
+          if (contact_weight[v] == 0.f) return;
           const Vec3<float> sum = near.sum_on_vertex(impulse, v);
           predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
           force.set(v, force[v] - sum * inverse_dt);
@@ -176,7 +176,8 @@ void find_nearest_centroids(State& state) {
   const VecView normal = f.normal.view();
   int* triangle = f.triangle.data();
   float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data(),
-        *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
+        *distance = f.sheet_distance.data(), *edge = f.edge.data(),
+        *fraction = f.cloth_share.data();
   const WallTable table{state.wall_table};
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
@@ -184,7 +185,7 @@ void find_nearest_centroids(State& state) {
   parallel_for(
       "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> p = position[i];
-        triangle[i] = -1, edge[i] = 0.f, share[i] = 0.f, distance[i] = 1e30f;
+        triangle[i] = -1, edge[i] = 0.f, fraction[i] = 0.f, distance[i] = 1e30f;
         normal.set(i, {0.f, 0.f, 0.f});
         if (p.x < low.x - reach || p.x > high.x + reach || p.y < low.y - reach ||
             p.y > high.y + reach || p.z < low.z - reach || p.z > high.z + reach) {
@@ -216,7 +217,7 @@ void find_nearest_centroids(State& state) {
         triangle[i] = nearest, edge[i] = 1.f, distance[i] = unsigned_d;
         weight_b[i] = weight_c[i] = 1.f / 3.f;  // eq 11: equal thirds
         normal.set(i, n * ((d < 0.f ? -1.f : 1.f) / twice_area));
-        share[i] =
+        fraction[i] =
             spacing / h * table.density(unsigned_d / h);  // eq 9: one layer of particles a apart
       });
 }

@@ -133,7 +133,7 @@ struct ContactSetup {
   NearView near;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass,
-      *vertex_share;
+      *contact_weight;
   float beta, dt, mass, rest_density, sound_speed, support_radius, contact_distance, viscosity,
       push_speed, wall_scale;
 
@@ -147,11 +147,11 @@ struct ContactSetup {
     T sum(1.f / mass);
     for (int k = 0; k < 3; ++k) {
       const auto vertex = load(c.list.vertex[k], row);
-      sum = sum + load(c.list.weight[k], row) * load(vertex_share, vertex) * T(beta) *
+      sum = sum + load(c.list.weight[k], row) * load(contact_weight, vertex) * T(beta) *
                       load(inverse_mass, vertex);
     }
     const T none(0.f), edge = select(valid, load(near.edge, i), none);
-    // No force at and beyond a free edge, where the edge's share is 0.
+    // No force at and beyond a free edge, where the edge's weight is 0.
     store(c.inverse_row, row, select(edge > none, T(1.f) / sum, none));
     c.normal.put(row, normal.at(i));
     c.velocity.put(row, velocity.at(i));
@@ -166,17 +166,17 @@ struct ContactSetup {
     const T pressure = load(pressure_term, i), inverse_rho = load(inverse_density, i),
             plane = spiky_plane(q);
     const T layer = edge * T(rest_density), push_term = layer * pressure;
-    const T share = layer * inverse_rho * inverse_rho;
+    const T drag_term = layer * inverse_rho * inverse_rho;
     const T slope = select(pressure > none,
                            T(wall_scale * sound_speed * sound_speed * rest_density) * plane, none);
     const T kappa =
-        inverse_h * inverse_h * (share * slope * plane + push_term * spiky_plane_slope(q));
+        inverse_h * inverse_h * (drag_term * slope * plane + push_term * spiky_plane_slope(q));
     const T rate = T(dt * dt * mass) * kappa;
     store(c.pressure_target, row, T(dt * mass) * push_term * plane * inverse_h);
     store(c.pressure_rate, row, rate);
     store(c.pressure_scale, row, T(1.f) / (T(1.f) + rate * sum));
     const T drag_rate =
-        T(dt * mass * viscosity) * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+        T(dt * mass * viscosity) * drag_term * viscosity_halfspace(q) * inverse_h * inverse_h;
     store(c.drag_rate, row, drag_rate);
     store(c.drag_scale, row, T(1.f) / (T(1.f) + drag_rate * sum));
   }
@@ -188,10 +188,10 @@ DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecV
                               float inverse_mass, float relaxation) {
   using T = decltype(load(c.lambda, row));
   const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);
-  const Vec3<T> sheet = predicted.at(load(c.list.vertex[0], row)) * load(c.list.weight[0], row) +
-                        predicted.at(load(c.list.vertex[1], row)) * load(c.list.weight[1], row) +
-                        predicted.at(load(c.list.vertex[2], row)) * load(c.list.weight[2], row);
-  const Vec3<T> relative = velocity - sheet;
+  const Vec3<T> foot = predicted.at(load(c.list.vertex[0], row)) * load(c.list.weight[0], row) +
+                       predicted.at(load(c.list.vertex[1], row)) * load(c.list.weight[1], row) +
+                       predicted.at(load(c.list.vertex[2], row)) * load(c.list.weight[2], row);
+  const Vec3<T> relative = velocity - foot;
   const T approach = dot(normal, relative), old = load(c.lambda, row), none(0.f);
   const Vec3<T> slip = relative - normal * approach;
   const T by_pressure =

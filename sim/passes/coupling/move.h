@@ -1,5 +1,5 @@
 #pragma once
-// The end of a step: particles and cloth move to their new places.
+// The end of a step: particles and cloth move to their new positions.
 
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/coupling/continuous_collision.h"
@@ -35,12 +35,12 @@ struct AddGuardCounts {
 
 /// @param moved  how far cloth came in the substeps before, m: a triangle that springs back starts
 /// there.
-PathTest path_test_of(State& state, float moved);
+ContinuousCollision continuous_collision_of(State& state, float moved);
 
 /// The particles that are tested: the guarded ones, or all once cloth has come farther than they
 /// were chosen for.
 struct Tested {
-  const int *order, *guarded;  // the near list, places in it
+  const int *order, *guarded;  // the near list, indices in it
   int count;
   bool all;
   DRENCH_HD int operator[](int k) const { return all ? k : order[guarded[k]]; }

@@ -71,7 +71,7 @@ StepPressure step_pressure_of(const State& state) {
           .acceleration = f.acceleration.view(),
           .term = f.pressure_term.data(),
           .inverse_density = projected ? nullptr : f.inverse_density.data(),
-          .place = projected ? state.pressure.place.data() : nullptr,
+          .predicted = projected ? state.pressure.place.data() : nullptr,
           .correction = projected ? state.pressure.correction.data() : nullptr,
           .correction_cross = projected ? state.pressure.correction_cross.data() : nullptr,
           .dt = float(state.dt),
@@ -99,11 +99,11 @@ Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
   const AddTotals<N> add;
   const Totals<N> away =
       parallel_reduce(name, state.fluid.count, Totals<N>{},
-                      AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
+                      AwayFromCloth<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
   if (!near) return away;
   const ClothRows rows = cloth_rows(state);
   return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
-                                   BesideSheets<N, F>{f, rows.particle}, add));
+                                   BesideCloth<N, F>{f, rows.particle}, add));
 }
 
 SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
@@ -124,15 +124,15 @@ DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) 
 }
 
 /// The nearest sheet; none in a shot without any.
-SensorBody sheet_at(const State& state, Vec3<float> place) {
+SensorBody cloth_at(const State& state, Vec3<float> centre) {
   const ClothState& c = state.cloth;
   if (!state.parameters.incompressible) return {};
   return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
-                         SheetAt{.corners = corners_of(c),
+                         ClothAt{.corners = corners_of(c),
                                  .position = c.position.view(),
                                  .half_thickness = c.half_thickness.data(),
                                  .sheet = c.sheet.data(),
-                                 .place = place,
+                                 .centre = centre,
                                  .period = periods_of(state.parameters)},
                          SensorBody{});
 }
@@ -146,7 +146,7 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
     body.facing = along_axis(q.axis, q.side == 0 ? 1.f : -1.f);
     return body;
   }
-  const Vec3<float> place{q.place[0], q.place[1], q.place[2]},
+  const Vec3<float> centre{q.place[0], q.place[1], q.place[2]},
       n{q.normal[0], q.normal[1], q.normal[2]};
   const float reach = 0.5f * state.parameters.spacing * 1.001f;
   const auto lies_on = [&](const SensorBody& b) {
@@ -154,12 +154,12 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
   };
   const ObstacleViews obstacles = state.obstacles.views();
   body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
-                         ObstacleAt{obstacles, place, q.on}, SensorBody{});
+                         ObstacleAt{obstacles, centre, q.on}, SensorBody{});
   if (lies_on(body)) {
     body.facing = dot(body.facing, n) < 0.f ? -n : n;
     return body;
   }
-  body = sheet_at(state, place);
+  body = cloth_at(state, centre);
   if (lies_on(body)) {
     body.facing = n;
     return body;
@@ -173,7 +173,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
   const ClothState& c = state.cloth;
   if (body.kind == SensorBody::sheet) {
     return parallel_reduce("probe: sheet's area", c.triangles, Totals<1>{},
-                           SheetExtent{.corners = corners_of(c),
+                           ClothExtent{.corners = corners_of(c),
                                        .position = c.position.view(),
                                        .sheet = c.sheet.data(),
                                        .disc = disc,
@@ -219,7 +219,7 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
   const SoftDisc disc = soft_disc_of(q, p);
   const ObstacleViews obstacles = state.obstacles.views();
   // Fluid on the disc's side of the nearest sheet alone, if that is in reach.
-  const SensorBody sheet = sheet_at(state, disc.centre);
+  const SensorBody sheet = cloth_at(state, disc.centre);
   Vec3<float> normal{0.f, 0.f, 0.f};
   if (sheet.distance < disc.rim) {
     const Vec3<float> up = disc.from_centre(sheet.foot) * -1.f;
@@ -241,8 +241,8 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
                                                        .disc = disc,
                                                        .grid = {f.grid, f.cell_start.data()},
                                                        .list = view_of(state.pressure.lists),
-                                                       .sheet_normal = normal,
-                                                       .sheet_foot = sheet.foot});
+                                                       .cloth_normal = normal,
+                                                       .cloth_foot = sheet.foot});
   return sum.value[0] / extent;
 }
 
@@ -253,11 +253,11 @@ double disc_pressure(const State& state, const ProbeQuery& q) {
                                        : surface_pressure(state, q, body);
 }
 
-/// Pressure of what gravity the walls of a full box hold up, Pa; none in its middle.
-double held_pressure(const Parameters& p, const float (&place)[3]) {
+/// Pressure of what gravity the walls of a closed domain hold up, Pa; none in its middle.
+double held_pressure(const Parameters& p, const float (&position)[3]) {
   double sum = 0;
   for (int k = 0; k < 3; ++k)
-    sum += double(p.rest_density) * p.held[k] * (place[k] - 0.5 * (p.low[k] + p.high[k]));
+    sum += double(p.rest_density) * p.held[k] * (position[k] - 0.5 * (p.low[k] + p.high[k]));
   return sum;
 }
 
@@ -280,7 +280,7 @@ std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
 }
 
 double pressure(State& state, const ProbeQuery& query) {
-  // What evens out a full box has had rows of its own since.
+  // What evens out a closed domain has had rows of its own since.
   if (state.parameters.full && query.kind == ProbeKind::inner_pressure) correct_gradients(state);
   return disc_pressure(state, query) + held_pressure(state.parameters, query.place);
 }
@@ -342,8 +342,8 @@ std::vector<double> volume(State& state) {
   if (n > 0 && state.parameters.incompressible) measure_density(state);
   const Totals<4> sum =
       parallel_reduce("probe: volume", n, Totals<4>{},
-                      PlaceAndDensity{state.fluid.position.view(), state.fluid.density.data(),
-                                      1.f / state.parameters.rest_density},
+                      PositionAndDensity{state.fluid.position.view(), state.fluid.density.data(),
+                                         1.f / state.parameters.rest_density},
                       AddTotals<4>{});
   std::vector<double> all{double(n)};
   for (const double value : sum.value)
@@ -370,7 +370,7 @@ double front(const State& state, const ProbeQuery& q) {
   return 0.5 * state.parameters.spacing +
          parallel_reduce(
              "probe: front", state.fluid.count, Farthest{},
-             PlaceAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
+             PositionAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
              Farthest{})
              .value;
 }

@@ -22,11 +22,11 @@ inline HalfspaceWalls halfspace_walls_of(const Parameters& p) {
   return {domain_walls(p), p.wall_scale};
 }
 
-/// Share of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
+/// Fraction of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
 /// corners are not counted twice. H is the half-space integral of the kernel, scaled so that a
 /// lattice that ends half a spacing before a wall has rest density: the kernel is too narrow for
 /// the integral itself.
-DRENCH_HD float wall_density_share(const HalfspaceWalls& walls, Vec3<float> p, float inverse_h) {
+DRENCH_HD float wall_density_fraction(const HalfspaceWalls& walls, Vec3<float> p, float inverse_h) {
   const float x[3] = {p.x, p.y, p.z};
   float open = 1.f;
   for (int k = 0; k < 3; ++k) {
@@ -43,14 +43,14 @@ DRENCH_HD float wall_density_share(const HalfspaceWalls& walls, Vec3<float> p, f
 // belong to one energy: a column that should come to rest boils (rms speed 0.55 m/s in 0.2 m of
 // water at alpha 0.1, any time step). With spiky for both it comes to rest (0.03 m/s); poly6 stays
 // with the paper coupling. A cubic lattice at rest sums to lattice_sum m / a^3; dividing by it
-// makes the lattice stress-free. Walls and cloth add their half-space share (eq 9 of the seed with
-// the layer filled up).
+// makes the lattice stress-free. Walls and cloth add their half-space fraction (eq 9 of Harada et
+// al. 2007 with the layer filled up).
 template <class Kernel>
 struct DensitySum {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
   ConstVecView position;
-  const float* cloth_share;                          // share of density replaced by cloth, or null
+  const float* cloth_share;  // fraction of density replaced by cloth, or null
   float *density, *pressure_term, *inverse_density;  // kg/m^3, p / rho^2 in m^5/(kg s^2), m^3/kg
   float support_radius;                              // m
   float scale;                                       // m Kernel::factor(h) / lattice_sum
@@ -73,9 +73,9 @@ struct DensitySum {
     sum.w = sum.w + Kernel::shape(length2(i.position - j.position), T(support_radius));
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
-    const float share = wall_density_share(walls, position[i], 1.f / support_radius) +
-                        (cloth_share ? cloth_share[i] : 0.f);
-    const float rho = scale * sum.w + rest_density * share, inverse = 1.f / rho;
+    const float fraction = wall_density_fraction(walls, position[i], 1.f / support_radius) +
+                           (cloth_share ? cloth_share[i] : 0.f);
+    const float rho = scale * sum.w + rest_density * fraction, inverse = 1.f / rho;
     density[i] = rho;
     inverse_density[i] = inverse;
     pressure_term[i] = sound_speed2 * max0(rho - rest_density) * inverse * inverse;

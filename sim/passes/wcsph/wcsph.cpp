@@ -35,7 +35,7 @@ void sum_density(State& state) {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state, state.fluid.position.view(), Shaded::near));
+                  cloth_filter(state, state.fluid.position.view(), Shaded::near));
   }
 }
 
@@ -56,7 +56,7 @@ void pressure_viscosity(State& state) {
                                .walls = halfspace_walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
-                  sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
+                  cloth_filter(state, state.fluid.position.view(), Shaded::hidden));
   } else {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
   }
