@@ -25,6 +25,7 @@ __global__ void launch_for(int n, F f) {
   if (i < n) f(i);
 }
 
+/// f(0..n-1), each index by a thread of its own. @param name  of the launch, in errors and profiles
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   if (n <= 0) return;
@@ -93,6 +94,7 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 #else
 
+/// f(0..n-1) on all cores.
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   constexpr int grain = 256;

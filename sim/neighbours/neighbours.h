@@ -13,7 +13,7 @@
 //           template <class Q> struct Particle;  `columns` members of type Q
 //           template <class Q> struct Sum;       members of type Q, zero to start with
 //           template <class T> T weight(T u) const;    of float or Pack
-//           template <class Q> void pair(i, j, Q weight, sum) const;   weight in all four components
+//           template <class Q> void pair(i, j, Q weight, sum) const;   weight in all components
 //           void finish(int i, const Sum<Float4>&) const;
 //           bool idle() const;                   true: nothing is to be done
 // clang-format on

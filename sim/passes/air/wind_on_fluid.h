@@ -40,6 +40,7 @@ inline DropDrag drop_drag_of(const Parameters& p) {
   return {p.air_density, 1.8e-5f, 0.62035f * p.spacing, p.spacing, own};  // (3 / 4 pi)^(1/3)
 }
 
+/// Adds the drag of a step to the particles' velocities, by their density and neighbours.
 void wind_on_fluid(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

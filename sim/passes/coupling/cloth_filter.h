@@ -12,6 +12,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// The Filter of for_each_pair and of neighbour lists (sim/neighbours/pairs.h).
 struct ClothFilter {
   static constexpr int columns = 4;
   int* shaded;  // by particle: 1 where neighbours may be hidden

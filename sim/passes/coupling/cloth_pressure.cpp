@@ -132,9 +132,9 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
 /// tension it is at most C T^-1 C^T, of which no row's magnitudes sum to more than
 ///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: the directions that vertex k may go,
 /// since T^-1 has no negative entry. Flat sheets lose nothing by it: springs along a sheet do not
-/// act across it, and this is its answer to the same pressure all along. The answer with its signs,
-/// to the same pressure along one side, is no bound where a sheet is folded: the pushes of two
-/// flanks cancel, and pressures there rose without end (4e11 Pa in the folds over a small ball).
+/// act across it, and this is its answer to the same pressure all along. The answer with its signs
+/// is no bound where a sheet is folded: the pushes of two flanks cancel
+/// (docs/decisions/0023-bound-of-cloth-in-the-diagonal.md).
 void add_cloth_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const ClothRows c = cloth_rows(state);

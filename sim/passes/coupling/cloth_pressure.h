@@ -15,10 +15,10 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Sweeps at most before the first, between further iterations of the pressures, and at the end; a
-/// pool on a taut sheet takes as many iterations as with an exact answer, with 4 in place of 16 one
-/// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum
-/// of those that nothing holds is whole (balance_loose_sheets).
+/// Sweeps at most before the first, between further iterations of the pressures, and at the end: as
+/// few as leave the pressures the iterations that an exact answer takes
+/// (docs/decisions/0022-cloth-sweeps.md). What is left at the end is of how sheets bend; the
+/// momentum of those that nothing holds is whole (balance_loose_sheets).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
@@ -67,8 +67,8 @@ void add_cloth_to_walls(State& state);
 /// for displacements of at least source / |D_i|; they stop what comes nearer and add `recovery`.
 void limit_recovery(State& state);
 
-/// Sums what the rows give to their vertices into ClothSystem::right, with or without the sheets'
-/// own forces.
+/// Whether ClothSystem::right, the sum of what the rows give to their vertices, has the sheets' own
+/// forces in it.
 enum class Base { none, own };
 
 /// What bounds A from below: inertia, and tension without its direction; what is left out, the
@@ -114,20 +114,22 @@ struct RowSize {
 /// own forces, which may well balance.
 void start_cloth(State& state);
 
-/// The sheets' answer to the pressures beside the positions.
+/// The sheets' answer to the pressures beside the positions, into ClothSystem::change, m.
+/// @param tolerance  of the preconditioned residual, over that of start_cloth
 void respond_cloth(State& state, int sweeps, float tolerance);
 
 /// The sheets' answer to the pressures that the solve ended with, to the tolerance.
 void settle_cloth(State& state);
 
-/// Takes the sheets' motion off the density rates.
+/// Takes the sheets' motion off the density rates, PressureState::product.
 void subtract_cloth_rate(State& state);
 
-/// Leaves the domain's walls alone in the column, for whoever asks for their force.
+/// Leaves the domain's walls and obstacles alone in PressureState::wall, for whoever asks for their
+/// force.
 void take_cloth_off_walls(State& state);
 
 /// Where the sheets end the step if nothing stops them, and the fluid's force on them for whoever
-/// asks: the loads over dt^2, beside what the path test owed.
+/// asks: the loads over dt^2, beside what collisions owed.
 void finish_cloth(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -7,6 +7,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// Triangles with their neighbours across edges and around vertices.
 struct ClothTopology {
   PolygonView polygons;
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
@@ -139,10 +140,12 @@ DRENCH_HD float edge_weight(const ClothTopology& cloth, int t, float wa, float w
   return max0(inside);
 }
 
-// Side, normal, signed distance and wall density of every particle near a cloth. The side is taken
-// from the geometry when a particle comes within reach and remembered while its nearest triangle
-// stays on the same patch (rest centroids within two supports); memory ends beyond the support and
-// at free edges.
+/// Side, normal, signed distance, m, and fraction of density of every particle near cloth, from its
+/// nearest triangle (find_nearest_triangles). The side is taken from the geometry when a particle
+/// comes within reach; the weakly compressible fluid remembers it while its nearest triangle stays
+/// on the same patch (rest centroids within two supports); memory ends beyond the support and at
+/// free edges.
+/// @param position  m, of the particles
 void find_cloth_sides(State& state, const ConstVecView& position);
 
 }  // namespace drench::sim::DRENCH_BACKEND

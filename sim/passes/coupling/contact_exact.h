@@ -12,11 +12,10 @@
 // all contacts on vertex k), the reduced mass shared among simultaneous contacts, so that it cannot
 // overshoot. beta = (S + 1) / 2S is the mean velocity that a steady force gives a free vertex over
 // S substeps, in parts of its last one: exact where the sheet moves as a whole, a bound where
-// springs hold a vertex back. Starting from the impulses of the step before was tried and dropped:
-// light taut cloth answers them late and flutters (vertex speeds 10 m/s in place of 2 m/s under
-// 0.12 m of water on 0.4 kg/m^2). A contact too far off to be reached within the step (the second
-// layer of particles) has a soft pressure alone: it is solved once, implicitly, before the first
-// iteration.
+// springs hold a vertex back. Impulses start at zero
+// (docs/decisions/0020-impulses-start-at-zero.md). A contact too far off to be reached within the
+// step (the second layer of particles) has a soft pressure alone: it is solved once, implicitly,
+// before the first iteration.
 
 #include "sim/backend/parallel.h"
 #include "sim/neighbours/kernels.h"
@@ -71,6 +70,7 @@ inline float contact_distance_of(const Parameters& p) { return 0.5f * p.spacing;
 /// triangle as well.
 void sort_contacts(State& state, float reach);
 
+/// sort_contacts with the reach of a weakly compressible step, a quarter of the speed of sound.
 void sort_exact_contacts(State& state);
 
 /// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the
@@ -211,11 +211,11 @@ DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecV
 }
 
 /// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly
-/// twice as far. A pool of 0.3 m on 0.4 kg/m^2: 4 plain iterations left 18,413 particles to the
-/// path test in half a second, 12 plain ones 2, these 6 left 3.
+/// twice as far, which halves their number (docs/decisions/0021-over-relaxed-contacts.md).
 constexpr int contact_iterations = 6;
 constexpr float over_relaxation = 1.8f;
 
+/// Rows of contacts: those in reach within the step, or the soft ones, too.
 enum class Rows { close, all };
 
 /// What the corners of a triangle without contacts hold: anything, or the zeros of a sum before.
@@ -224,9 +224,12 @@ enum class IdleCorners { unset, zero };
 /// Adds up what the contacts of each triangle give to its corners, in their order.
 void sum_by_triangle(State& state, Rows which, IdleCorners idle = IdleCorners::unset);
 
-/// Rows of the near list; the vertices receive what the path test took from particles.
+/// Fills the rows of the near list and the weights of contacts by vertex (ClothState::share). The
+/// vertices receive what particles owe them (FluidState::owed, kg m/s) as ClothState::force, N.
 void start_contacts(State& state);
 
+/// Solves for the impulses of the rows, N s: leaves the particles' velocities after contact, and in
+/// ClothState::predicted and ClothState::force what the vertices received.
 void solve_contacts(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

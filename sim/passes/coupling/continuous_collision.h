@@ -1,12 +1,12 @@
 #pragma once
-// The last guard of the exact coupling: the straight path of a particle over a cloth substep
-// against the triangles that move meanwhile. In double on the stored floats, so that whoever counts
-// crossings from the stored states finds none. Where they would cross, the lighter one yields: a
-// triangle lighter than the particle is held for the substep and shares its momentum with the
-// particles that stopped it; a lighter particle is put back on its side of the triangle, a small
-// clearance off the point where they met, by an impulse shared with the vertices. What finds no
-// free position is held; if all is held nothing moves, which is free of crossings whatever the
-// tangle.
+// Continuous collision detection, the last guard of the coupling: the straight path of a particle
+// over a cloth substep against the triangles that move meanwhile (Bridson, Fedkiw, Anderson 2002).
+// In double on the stored floats, so that whoever counts crossings from the stored states finds
+// none. Where they would cross, the lighter one yields: a triangle lighter than the particle is
+// held for the substep and shares its momentum with the particles that stopped it; a lighter
+// particle is put back on its side of the triangle, a small clearance off the point where they met,
+// by an impulse shared with the vertices. What finds no free position is held; if all is held
+// nothing moves, which is free of crossings whatever the tangle.
 
 #include "sim/passes/cloth/cloth_implicit.h"
 #include "sim/passes/coupling/geometry.h"
@@ -94,9 +94,11 @@ struct ClothGround {
   }
 };
 
-constexpr float collision_clearance =
-    1e-3f;  // spacings off the triangle where a path that met it ends
+/// Spacings off the triangle where a path that met it ends.
+constexpr float collision_clearance = 1e-3f;
 
+/// Paths of particles against moving triangles, and who yields where they would cross
+/// (docs/decisions/0025-who-yields-in-a-collision.md).
 struct ContinuousCollision {
   PolygonView polygons;            // cells from the start of the step
   ConstVecView cloth, cloth_next;  // this substep
@@ -121,12 +123,14 @@ struct ContinuousCollision {
     int image = -1;  // of the triangle: its index in the grid's order
   };
 
+  /// The triangle over this substep. @param image  as Hit::image
   DRENCH_HD MovingTriangle moving(int image) const {
     const auto from = [&](int e) { return to_double(polygons.corner_in(image, e, cloth)); };
     const auto to = [&](int e) { return to_double(polygons.corner_in(image, e, cloth_next)); };
     return {from(0), from(1), from(2), to(0), to(1), to(2)};
   }
 
+  /// The earliest triangle that the path meets, -1 for none.
   DRENCH_HD Hit first_hit(Vec3<float> from, Vec3<float> to) const {
     Hit hit;
     const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
@@ -144,6 +148,7 @@ struct ContinuousCollision {
     return (hold[k[0]] || inverse_mass[k[0]] == 0.f) && (hold[k[1]] || inverse_mass[k[1]] == 0.f) &&
            (hold[k[2]] || inverse_mass[k[2]] == 0.f);
   }
+  /// Is a triangle's mean vertex lighter than a particle?
   DRENCH_HD bool lighter(int t) const {
     const int* k = polygons.corner + 3 * t;
     return (cloth_mass[k[0]] + cloth_mass[k[1]] + cloth_mass[k[2]]) / 3.f < mass;
@@ -152,8 +157,8 @@ struct ContinuousCollision {
   /// Does a triangle stop for a particle? A light one that comes at it, if that frees the path: a
   /// particle that would also pass through the triangle where it stands has to be turned aside
   /// anyway, and a triangle stopped for it hangs on the particle, step by step, while its springs
-  /// stretch (to 60 J in a sheet of 16 g). So does one at a free edge of the particle's own
-  /// triangle, where no pressure tells it of the springs.
+  /// stretch. So does one at a free edge of the particle's own triangle, where no pressure tells it
+  /// of the springs.
   DRENCH_HD bool triangle_stops(int i, Vec3<float> from, Vec3<float> to, const Hit& hit) const {
     if (!lighter(hit.triangle) || (nearest[i] == hit.triangle && edge[i] < 1.f)) return false;
     MovingTriangle m = moving(hit.image);
@@ -163,6 +168,7 @@ struct ContinuousCollision {
 
   static constexpr double velocity_unit = 1.0 / (1 << 24);  // m/s
 
+  /// Counts a particle of velocity v, m/s, that stops a vertex: in integers, in any order.
   DRENCH_HD void add_stop(int vertex, Vec3<float> v) const {
     long long* sum = stop_sum + 4 * vertex;
     add_atomic(sum, 1);
@@ -173,7 +179,7 @@ struct ContinuousCollision {
   DRENCH_HD int stop_count(int vertex) const { return int(stop_sum[4 * vertex]); }
   /// Of the vertex and the particles that stop it, after an impact without rebound; a particle
   /// gives a third of its mass to each corner. The mean of the particles alone would leave them a
-  /// heavy vertex's momentum to share: 0.08 kg in 0.008 kg, thrown thirty times as fast.
+  /// heavy vertex's momentum to carry off, and a vertex may have ten times their mass.
   DRENCH_HD Vec3<float> stop_velocity(int vertex, Vec3<float> own) const {
     const long long* sum = stop_sum + 4 * vertex;
     const double third = mass / 3., of_cloth = cloth_mass[vertex];
@@ -250,8 +256,8 @@ struct ContinuousCollision {
     return nearest <=
            length(to - start[i]) + length(to - position[i]) + cloth_moved + 2.f * clearance;
   }
-  DRENCH_HD bool normal_is_zero(
-      int i) const {  // beyond a free edge: near, but the distance is not kept
+  /// Beyond a free edge: near, but the distance is not kept.
+  DRENCH_HD bool normal_is_zero(int i) const {
     const Vec3<float> n = normal[i];
     return n.x == 0.f && n.y == 0.f && n.z == 0.f;
   }

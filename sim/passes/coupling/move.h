@@ -6,15 +6,18 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// Fluid alone: a step of symplectic Euler within the domain's walls.
 void move_particles(State& state);
 
+/// Cloth takes on what a substep has left in ClothState::next and next_velocity.
 void finish_substep(ClothState& c);
 
+/// Cloth alone: explicit substeps over a step.
 void move_cloth(State& state);
 
 /// What a particle's path has beside dt times its velocity.
 struct Drift {
-  ConstVecView drift;
+  ConstVecView drift;  // m
   bool any;
   template <class Index>
   DRENCH_HD auto at(Index i) const {
@@ -24,6 +27,7 @@ struct Drift {
 };
 Drift drift_of(const State& state);
 
+/// Particles whose path was changed, and those that need another round.
 struct GuardCount {
   int hits = 0, unresolved = 0;
 };
@@ -33,6 +37,7 @@ struct AddGuardCounts {
   }
 };
 
+/// The collision test of a substep, from the start of it to ClothState::next.
 /// @param moved  how far cloth came in the substeps before, m: a triangle that springs back starts
 /// there.
 ContinuousCollision continuous_collision_of(State& state, float moved);
@@ -46,6 +51,7 @@ struct Tested {
   DRENCH_HD int operator[](int k) const { return all ? k : order[guarded[k]]; }
 };
 
+/// To the bit.
 DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.

@@ -185,8 +185,8 @@ void find_cloth_sides(State& state, const ConstVecView& position) {
   // No path crosses a sheet, so that the side is where a particle is seen to be. Layers do go
   // through each other: a particle between two may then have its nearest triangle behind the other
   // layer, on one patch with the last one and with its other side to it. By the memory that is a
-  // particle deep in the sheet, which pressure would push through it and the path test holds back,
-  // for ever: in the folds over a small ball 0.2 J a step.
+  // particle deep in the sheet, which pressure would push through it and collisions hold back, for
+  // ever (docs/decisions/0024-side-as-seen.md).
   const bool by_memory = !state.parameters.incompressible;
   parallel_for(
       "sheet side", f.count, DRENCH_LAMBDA(int i) {

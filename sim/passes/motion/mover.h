@@ -43,6 +43,7 @@ struct Mover : DomainWalls {
   }
 };
 
+/// @param dt  s
 inline Mover mover_of(const Parameters& p, float dt) {
   Mover mover{domain_walls(p), {p.periodic[0], p.periodic[1], p.periodic[2]}, dt};
   for (int k = 0; k < 3; ++k) {
@@ -53,12 +54,14 @@ inline Mover mover_of(const Parameters& p, float dt) {
 }
 
 /// The same without periodic sides, for paths: they go on beyond the seam, where the images of
-/// triangles are, and `wrap_positions` ends them.
+/// triangles are, and wrap_positions ends them.
 inline Mover path_mover_of(const Parameters& p, float dt) {
   Mover mover = mover_of(p, dt);
   for (bool& axis : mover.periodic) axis = false;
   return mover;
 }
+
+/// Brings the fluid's positions back into the domain along its periodic axes.
 void wrap_positions(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

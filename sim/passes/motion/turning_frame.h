@@ -30,6 +30,7 @@ inline TurningFrame turning_frame_of(const State& state) {
           float(state.dt)};
 }
 
+/// What the turning of the domain does to the velocities of fluid and free vertices in a step.
 void turn_frame(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -100,6 +100,7 @@ struct ObstacleShare {
     return {1.f - (1.f - a.value) * (1.f - b.value),
             a.gradient * (1.f - b.value) + b.gradient * (1.f - a.value)};
   }
+  /// Walls and all obstacles together at x.
   DRENCH_HD WallShare with(WallShare walls, const ObstacleViews& obstacles, Vec3<float> x) const {
     for (int k = 0; k < obstacles.count; ++k) {
       const WallShare share = of(obstacles.obstacle[k], x);

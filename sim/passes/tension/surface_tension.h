@@ -183,7 +183,9 @@ TensionForce<Separation> tension_force(const State& state, Float4* kick, Separat
           .separation = separation};
 }
 
-/// Uses PressureState::vector.
+/// Adds the step's kicks to the velocities; leaves unit normals in TensionState::normal, for
+/// contact angles and the impulses of obstacles, and in FluidState::owed what sheets receive.
+/// Overwrites PressureState::scratch_a.
 void apply_surface_tension(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -60,7 +60,8 @@ struct FaceForce {
   }
 };
 
-/// Uses PressureState::vector.
+/// Adds the step's kicks to the velocities, by the normals of apply_surface_tension. Overwrites
+/// PressureState::scratch_a.
 void apply_contact_angles(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -40,11 +40,11 @@ DRENCH_HD float wall_density_fraction(const HalfspaceWalls& walls, Vec3<float> p
 //   rho_i = sum_j m W(r_ij, h)            Mueller, Charypar, Gross 2003, section 3.1
 //   p_i   = c^2 (rho_i - rho_0), never negative (a free surface must not pull)
 // Mueller et al. sum density with poly6 and take the pressure force from spiky. The two do not
-// belong to one energy: a column that should come to rest boils (rms speed 0.55 m/s in 0.2 m of
-// water at alpha 0.1, any time step). With spiky for both it comes to rest (0.03 m/s); poly6 stays
-// with the paper coupling. A cubic lattice at rest sums to lattice_sum m / a^3; dividing by it
-// makes the lattice stress-free. Walls and cloth add their half-space fraction (eq 9 of Harada et
-// al. 2007 with the layer filled up).
+// belong to one energy, and a column that should come to rest boils: spiky serves for both
+// (docs/decisions/0026-one-kernel-for-density-and-pressure.md), poly6 the paper coupling alone. A
+// cubic lattice at rest sums to lattice_sum m / a^3; dividing by it makes the lattice stress-free.
+// Walls and cloth add their half-space fraction (eq 9 of Harada et al. 2007 with the layer filled
+// up).
 template <class Kernel>
 struct DensitySum {
   static constexpr int columns = 3;

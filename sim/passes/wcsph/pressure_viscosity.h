@@ -53,8 +53,7 @@ struct PressureViscosity {
 
   /// p_i rho_0 / rho_i^2 times the half-space gradient of each wall, fractions as in the density.
   /// Mirrored pressure would double it; but a wall stores no energy of its own, and twice the force
-  /// on the way out makes energy: 0.2 m of water at rest kept an rms speed of 0.3 m/s, against 0.02
-  /// m/s so.
+  /// as a particle leaves makes energy (docs/decisions/0027-walls-push-once.md).
   DRENCH_HD Vec3<float> wall_acceleration(int i) const {
     const Vec3<float> p = position[i], v = velocity[i];
     const float x[3] = {p.x, p.y, p.z}, u[3] = {v.x, v.y, v.z};
