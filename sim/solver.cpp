@@ -237,7 +237,7 @@ class BackendSolver : public Solver {
       if (allocated_.contains(ColumnGroup::drag))
         pressure = pressure(pressure, drag_impulse(state_, k));
       if (state_.contact.near > 0) {
-        pressure = pressure(pressure, pressure_impulse_near_sheets(state_, k));
+        pressure = pressure(pressure, pressure_impulse_near_cloth(state_, k));
       }
       const double push[3] = {pressure.x, pressure.y, pressure.z};
       for (int c = 0; c < 3; ++c) {

@@ -111,7 +111,7 @@ struct ClothState {
   VecColumn air_push;          // N
   VecColumn force;             // N from the fluid, constant over the step
   Column<int> held;            // by the path test for this substep
-  Column<long long> stop_sum;  // 4 a vertex: see PathTest
+  Column<long long> stop_sum;  // 4 a vertex: see ContinuousCollision
 };
 
 /// Scalars of the conjugate gradients of the sheets, in the memory of the backend.

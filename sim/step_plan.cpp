@@ -30,14 +30,14 @@ ConstVecView beside_sheets(const State& state) {
 void exact_nearest(State& state) {
   find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
 }
-void exact_sides(State& state) { find_sheet_sides(state, beside_sheets(state)); }
+void exact_sides(State& state) { find_cloth_sides(state, beside_sheets(state)); }
 void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
 void settle_cloth_alone(State& state) {
   state.contact.near = 0;
   if (state.parameters.air_density > 0) wind_on_cloth(state);
   linearise_cloth(state);
-  settle_sheets(state);
-  finish_sheets(state);
+  settle_cloth(state);
+  finish_cloth(state);
   finish_substep(state.cloth);
 }
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.

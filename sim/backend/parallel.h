@@ -1,6 +1,6 @@
 #pragma once
 // Launches: the same text for both backends, named so that a profile reads like the algorithm.
-// Results never depend on the number of threads: every index writes its own place, and the only
+// Results never depend on the number of threads: every index writes its own element, and the only
 // reductions are maxima and minima (order-free) or sums over fixed chunks.
 
 #include "sim/backend/column.h"
@@ -25,6 +25,7 @@ __global__ void launch_for(int n, F f) {
   if (i < n) f(i);
 }
 
+/// f(0..n-1), each index by a thread of its own. @param name  of the launch, in errors and profiles
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   if (n <= 0) return;
@@ -93,6 +94,7 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 #else
 
+/// f(0..n-1) on all cores.
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   constexpr int grain = 256;

@@ -83,7 +83,7 @@ Shot jet_at_sheet(V3d velocity, int substeps) {
 }
 
 /// Stable steps of at most `substeps` cloth steps, every path counted: none may cross.
-/// @return particles that the path test held back.
+/// @return particles that the collision test held back.
 uint64_t expect_no_crossing(const Shot& shot, int steps, int substeps, int least_near_steps) {
   Stepper run(shot);
   PathCount count(run);

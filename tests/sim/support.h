@@ -52,7 +52,7 @@ double energy_across(const sim::HostVec& velocity);
 /// Index of every id in the columns of a state.
 std::vector<int> place_of_id(const sim::HostState& state);
 
-/// Momentum of fluid and cloth, kg m/s. What the path test took from particles and cloth has not
+/// Momentum of fluid and cloth, kg m/s. What the collision test took from particles and cloth has not
 /// received yet counts as taken from the cloth.
 V3d total_momentum(const sim::Scene& scene, const sim::HostState& state);
 /// Sum of m max(speed, least_speed) over particles and free vertices, kg m/s.

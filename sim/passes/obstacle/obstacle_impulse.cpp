@@ -53,7 +53,7 @@ Impulse pressure_impulse(const State& state, int which) {
       Impulse{});
 }
 
-Impulse pressure_impulse_near_sheets(const State& state, int which) {
+Impulse pressure_impulse_near_cloth(const State& state, int which) {
   const Parameters& p = state.parameters;
   const ObstacleShare law = obstacle_share_of(p);
   const ImageWalls walls = image_walls_of(p);
@@ -88,7 +88,7 @@ Impulse pressure_impulse_near_sheets(const State& state, int which) {
 
 Impulse tension_impulse(const State& state, int which) {
   MirrorImages images = mirror_images_of(state);
-  images.sheets.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
+  images.cloth.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
   const auto force = tension_force(state, nullptr, Straight{});
   const double factor = double(force.scale) * state.parameters.particle_mass;
   return parallel_reduce(

@@ -278,7 +278,7 @@ void find_neighbours(State& state) {
       });
   if (p.obstacles > 0) add_obstacle_shares(state);
   const bool sheets = state.contact.near > 0;
-  if (sheets) add_sheets_to_walls(state);
+  if (sheets) add_cloth_to_walls(state);
   const float scale = mass / (h * h * h);
   const GridView grid{f.grid, f.cell_start.data()};
   const auto add_up = DRENCH_LAMBDA(int i, float sum) {
@@ -287,7 +287,7 @@ void find_neighbours(State& state) {
   };
   if (sheets) {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up,
-                                      sheet_filter(state, f.start.view(), Shaded::near));
+                                      cloth_filter(state, f.start.view(), Shaded::near));
   } else {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
   }
@@ -303,7 +303,7 @@ template <class Move>
 void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   solve_pressure(state);
-  if (state.cloth.vertices > 0) settle_sheets(state);
+  if (state.cloth.vertices > 0) settle_cloth(state);
   const VecView x = f.position.view(), v = f.velocity.view();
   const Float4* displacement = state.pressure.scratch_a.data();
   const float inverse_dt = float(1 / state.dt);
@@ -330,8 +330,8 @@ void move_with_sheets(State& state) {
   const VecView x = f.position.view();
   const ConstVecView v = f.velocity.view(), start = f.start.view();
   const VecView drift = f.drift.view(), end = f.end.view();
-  finish_sheets(state);
-  if (state.contact.near > 0) take_sheets_off_walls(state);
+  finish_cloth(state);
+  if (state.contact.near > 0) take_cloth_off_walls(state);
   parallel_for(
       "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> from = start[i];

@@ -84,7 +84,7 @@ namespace {
 
 /// Levels are for errors that are small and smooth. In fluid that an impact has crushed they are
 /// neither, and what is free of the bound changes with every iteration: by levels particles were
-/// thrown there at 53 km/s. Nor do they know sheets: with the bound of add_sheets_to_diagonal in
+/// thrown there at 53 km/s. Nor do they know sheets: with the bound of add_cloth_to_diagonal in
 /// their stiffness pools on sheets are solved as well as without levels, but a sheet that folds
 /// around water ended in pressures without end.
 void choose_levels(State& state) {
@@ -240,7 +240,7 @@ void find_pressures(State& state, float least) {
   const int n = state.fluid.count, most_iterations = state.parameters.most_iterations;
   if (state.parameters.full) remove_mean(state);
   const bool sheets = state.contact.near > 0;
-  if (sheets) start_sheets(state);
+  if (sheets) start_cloth(state);
   prepare_levels(state);
   const FreeGradient gradient{s.place.data(),   s.product.data(),
                               s.source.data(),  s.inverse_diagonal.data(),
@@ -262,8 +262,8 @@ void find_pressures(State& state, float least) {
     accelerate_by_pressure(state);
     density_rate(state);
     if (sheets) {
-      respond_sheets(state, k == 0 ? first_sweeps : next_sweeps, sheet_tolerance);
-      subtract_sheet_rate(state);
+      respond_cloth(state, k == 0 ? first_sweeps : next_sweeps, cloth_tolerance);
+      subtract_cloth_rate(state);
     }
     correct_on_levels(state, gradient);
     reduce_then(

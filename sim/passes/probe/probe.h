@@ -73,7 +73,7 @@ struct VertexEnergy {
   }
 };
 
-struct PlaceAndDensity {
+struct PositionAndDensity {
   ConstVecView position;
   const float* density;
   float inverse_rest;
@@ -101,7 +101,7 @@ struct Farthest {
     return b.value > a.value ? b : a;
   }
 };
-struct PlaceAlong {
+struct PositionAlong {
   ConstVecView position;
   Vec3<float> normal;
   DRENCH_HD Farthest operator()(int i) const {

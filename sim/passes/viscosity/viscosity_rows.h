@@ -15,6 +15,7 @@
 
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/passes/motion/domain_walls.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -32,14 +33,13 @@ struct WallDrag {
 };
 
 /// The domain's walls as what brakes the fluid within a step, or all that does (body_drag.h).
-struct NoSlipWalls {
-  float low[3], high[3];  // m
-  bool on[3];
-  float velocity[3][2][3];  // m/s
-  float inverse_h;          // 1/m
-  float least;              // of a distance, over h: a quarter of a spacing
-  float strength;           // dt nu / h^2
-  const Float4 *body_rate, *body_cross, *body_source;  // of all that brakes; null: walls alone
+struct NoSlipWalls : DomainWalls {
+  float velocity[3][2][3] = {};  // m/s
+  float inverse_h = 0;           // 1/m
+  float least = 0;               // of a distance, over h: a quarter of a spacing
+  float strength = 0;            // dt nu / h^2
+  /// Of all that brakes; null: walls alone.
+  const Float4 *body_rate = nullptr, *body_cross = nullptr, *body_source = nullptr;
 
   DRENCH_HD void add(float distance, int axis, const float* moving, WallDrag& drag) const {
     const float q = distance * inverse_h;
@@ -168,9 +168,9 @@ struct ViscousBlocks : ViscousPairs<Separation> {
 };
 
 inline NoSlipWalls no_slip_walls_of(const Parameters& p, float strength) {
-  NoSlipWalls walls{};
+  NoSlipWalls walls{domain_walls(p)};
   for (int k = 0; k < 3; ++k) {
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.no_slip && p.wall[k];
+    walls.on[k] &= p.no_slip;
     for (int end = 0; end < 2; ++end) {
       for (int c = 0; c < 3; ++c) walls.velocity[k][end][c] = p.wall_velocity[k][end][c];
     }
