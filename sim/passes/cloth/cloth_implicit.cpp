@@ -149,16 +149,6 @@ void hold_at_walls(State& state) {
       });
 }
 
-bool cloth_ended(const State& state, int sweep) {
-#if defined(__CUDACC__)
-  constexpr int patience = 16;
-  return sweep % patience == patience - 1 && value_at(state.cloth_system.control, 0).done;
-#else
-  (void)sweep;
-  return state.cloth_system.control.data()->done;
-#endif
-}
-
 void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int sweeps,
                  float tolerance) {
   sweep_matrix(state, scaled_cloth_matrix(state), w, right, sweeps, tolerance);
@@ -179,7 +169,7 @@ void balance_loose_sheets(State& state, const VecView& w, const ConstVecView& ri
           return SheetLack{left.x, left.y, left.z, matrix.inertia[i],
                            3. - may.x - may.y - may.z + gripped};
         },
-        SheetLack{},
+        Plus{},
         DRENCH_LAMBDA(const SheetLack& lack) {
           const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
           control->shift = {float(lack.x * inverse), float(lack.y * inverse),

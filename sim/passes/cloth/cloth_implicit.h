@@ -10,6 +10,7 @@
 // stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h) holds up
 // have the w that takes them there.
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_springs.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -218,10 +219,6 @@ struct ClothSweep {
   }
 };
 
-/// Has the solve of the sheets ended? On the GPU the host asks now and then only; launches after
-/// the end do nothing.
-bool cloth_ended(const State& state, int sweep);
-
 /// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
 /// tolerance^2 of ClothControl::reference.
 template <class Matrix>
@@ -258,7 +255,7 @@ void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const Co
           return Two<decltype(z.x)>{dot(residual.at(i), z), dot(z, image_of_z)};
         },
         DRENCH_LAMBDA(double energy, double curvature) { sweep.decide(energy, curvature); });
-    if (k == sweeps || cloth_ended(state, k)) break;
+    if (ended(s.control, k, sweeps)) break;
     for_each_lane(
         "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
   }
@@ -270,8 +267,8 @@ void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int 
 /// something holds.
 struct SheetLack {
   double x = 0, y = 0, z = 0, inertia = 0, held = 0;
-  DRENCH_HD SheetLack operator()(const SheetLack& a, const SheetLack& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z, a.inertia + b.inertia, a.held + b.held};
+  DRENCH_HD SheetLack operator+(const SheetLack& other) const {
+    return {x + other.x, y + other.y, z + other.z, inertia + other.inertia, held + other.held};
   }
 };
 

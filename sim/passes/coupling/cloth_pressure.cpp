@@ -86,7 +86,7 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
         const Vec3<float> r = matrix.moving(i, of[i]);
         return dot_double(r, matrix.scaled(i, r));
       },
-      AddDoubles{},
+      Plus{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
 }
 

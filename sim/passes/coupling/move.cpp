@@ -126,7 +126,7 @@ GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, 
         end.set(i, to);
         return result;
       },
-      AddGuardCounts{});
+      Plus{});
 }
 
 /// Takes back the substep of the vertices that particles stopped in this round, or of all. A

@@ -146,8 +146,8 @@ void start_without_mean(State& state) {
   SolveControl* control = state.pressure.control.data();
   const int n = state.fluid.count;
   reduce_then(
-      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); },
-      AddDoubles{}, DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
+      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); }, Plus{},
+      DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
       "full: first guess", n,
       DRENCH_LAMBDA(int i) { place[i].w = before[i] = before[i] - control->mean; });

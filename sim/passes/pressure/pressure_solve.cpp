@@ -1,5 +1,6 @@
 #include "sim/passes/pressure/pressure_solve.h"
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/pressure/multilevel.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -95,7 +96,7 @@ void choose_levels(State& state) {
   const double most = double(small) * state.parameters.rest_density * state.fluid.count;
   reduce_then(
       "levels: error", state.fluid.count, 0.0,
-      DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, AddDoubles{},
+      DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->levels = !sheets && sum <= most; });
 }
 
@@ -153,18 +154,6 @@ void correct_on_levels(State& state, const FreeGradient& gradient) {
   for (int l = h.levels - 1; l > 0; --l) prolong_nodes(state, l, answer);
 }
 
-/// Has the solve ended? On the GPU the host asks now and then only; launches after the end do
-/// nothing.
-bool solve_ended(const PressureState& s, int iteration) {
-#if defined(__CUDACC__)
-  constexpr int patience = 8;
-  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
-#else
-  (void)iteration;
-  return s.control.data()->done;
-#endif
-}
-
 /// A fluid without a free surface has nowhere to go: its mean density is what it is (the kernel's
 /// sum over particles out of order is above rest), and no pressure changes it. What pressures can
 /// do is to make it even. Against rest density they would rise without end: Taylor and Green's
@@ -175,7 +164,7 @@ void remove_mean(State& state) {
   float* source = s.source.data();
   const int n = state.fluid.count;
   reduce_then(
-      "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); }, AddDoubles{},
+      "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
       "solve: source", n, DRENCH_LAMBDA(int i) { source[i] -= control->mean; });
@@ -229,7 +218,7 @@ void keep_pressures(State& state) {
         const double square = double(term[i]) * term[i];
         return Two<double>{square, square * square};
       },
-      AddPairs{},
+      Plus{},
       DRENCH_LAMBDA(const Two<double>& sum) {
         control->peak = sum.a > 0 ? rest * float(sqrt(5. / 3. * sum.b / sum.a)) : 0.f;
       });
@@ -258,7 +247,7 @@ void find_pressures(State& state, float least) {
                                     gradient,
                                     {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
                                     s.hierarchy.answer.data()};
-  for (int k = 0; k <= most_iterations && !solve_ended(s, k - 1); ++k) {
+  for (int k = 0; !ended(s.control, k, most_iterations + 1); ++k) {  // the last one decides only
     accelerate_by_pressure(state);
     density_rate(state);
     if (sheets) {
@@ -267,8 +256,8 @@ void find_pressures(State& state, float least) {
     }
     correct_on_levels(state, gradient);
     reduce_then(
-        "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        SolveSums{}, DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });
+        "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); }, Plus{},
+        DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });
     parallel_for(
         "solve: extrapolate", n, DRENCH_LAMBDA(int i) { iteration.extrapolate(i); });
   }

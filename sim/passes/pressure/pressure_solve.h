@@ -17,8 +17,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct SolveSums {
   double residual = 0, uphill = 0;
-  DRENCH_HD SolveSums operator()(const SolveSums& a, const SolveSums& b) const {
-    return {a.residual + b.residual, a.uphill + b.uphill};
+  DRENCH_HD SolveSums operator+(const SolveSums& other) const {
+    return {residual + other.residual, uphill + other.uphill};
   }
 };
 

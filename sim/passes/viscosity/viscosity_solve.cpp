@@ -1,5 +1,6 @@
 #include "sim/passes/viscosity/viscosity_solve.h"
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_cloth.h"
 #include "sim/passes/viscosity/viscosity_rows.h"
@@ -99,7 +100,7 @@ Impulse drag_impulse(const State& state, int which) {
             law.add_obstacle(obstacles.obstacle[k], x, BesideSheet{}, drag);
         return velocity.on(drag, i, mass);
       },
-      Impulse{});
+      Plus{});
   if (!sheets) return far;
   const SheetGaps gaps = sheet_gaps(state, state.cloth.next_velocity.view());  // swapped by now
   const Impulse near = parallel_reduce(
@@ -114,8 +115,8 @@ Impulse drag_impulse(const State& state, int which) {
             law.add_obstacle(obstacles.obstacle[k], x, gaps.of(row, x), drag);
         return velocity.on(drag, i, mass);
       },
-      Impulse{});
-  return far(far, near);
+      Plus{});
+  return far + near;
 }
 
 namespace {
@@ -210,7 +211,7 @@ void start_sheet_drag(State& state) {
   const SheetDragIteration iteration = sheet_drag_iteration(state);
   reduce_then(
       "sheet drag: start", state.cloth.vertices, Two<double>{0, 0},
-      DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, AddPairs{},
+      DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) { iteration.keep(sums); });
 }
 
@@ -235,7 +236,7 @@ void multiply_sheet_drag(State& state) {
   const SheetDragIteration iteration = sheet_drag_iteration(state);
   reduce_then(
       "sheet drag: curvature", state.cloth.vertices, 0.,
-      DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, AddDoubles{},
+      DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(double sum) { iteration.control->sheet_curvature = sum; });
 }
 
@@ -243,7 +244,7 @@ void step_sheet_drag(State& state) {
   const SheetDragIteration iteration = sheet_drag_iteration(state);
   reduce_then(
       "sheet drag: step", state.cloth.vertices, Two<double>{0, 0},
-      DRENCH_LAMBDA(int v) { return iteration.step(v); }, AddPairs{},
+      DRENCH_LAMBDA(int v) { return iteration.step(v); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) {
         if (!iteration.control->done) iteration.keep(sums);
       });
@@ -274,16 +275,6 @@ void give_back_sheet_drag(State& state) {
       });
   sweep_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);
   balance_loose_sheets(state, change, right);
-}
-
-bool viscous_solve_ended(const ViscosityState& s, int iteration) {
-#if defined(__CUDACC__)
-  constexpr int patience = 8;
-  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
-#else
-  (void)iteration;
-  return s.control.data()->done;
-#endif
 }
 
 ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
@@ -336,18 +327,17 @@ void solve_viscosity(State& state, const Separation& separation) {
   if (sheets) start_sheet_drag(state);
   reduce_then(
       "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
-      ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
-  for (int k = 0; k < state.parameters.most_viscous_iterations && !viscous_solve_ended(s, k - 1);
-       ++k) {
+      Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
+  for (int k = 0; !ended(s.control, k, state.parameters.most_viscous_iterations); ++k) {
     for_each_neighbour("viscosity: product", lists, n, product);
     if (sheets) multiply_sheet_drag(state);
     reduce_then(
         "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
-        AddDoubles{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
+        Plus{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
     if (sheets) step_sheet_drag(state);
     reduce_then(
         "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
+        Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
     parallel_for(
         "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
     if (sheets) turn_sheet_drag(state);

@@ -27,8 +27,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct ViscousSums {
   double square = 0, product = 0, size = 0;  // r . r, r . B r, b . b
-  DRENCH_HD ViscousSums operator()(const ViscousSums& a, const ViscousSums& b) const {
-    return {a.square + b.square, a.product + b.product, a.size + b.size};
+  DRENCH_HD ViscousSums operator+(const ViscousSums& other) const {
+    return {square + other.square, product + other.product, size + other.size};
   }
 };
 
