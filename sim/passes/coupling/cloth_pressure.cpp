@@ -129,7 +129,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
 
 /// Adds to the solve's diagonal a bound of C A^-1 C^T: with T <= A the matrix of inertia and
 /// tension it is at most C T^-1 C^T, of which no row's magnitudes sum to more than
-///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: the ways that vertex k may go,
+///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: on the free directions of vertex k,
 /// since T^-1 has no negative entry. Flat sheets lose nothing by it: springs along a sheet do not
 /// act across it, and this is its answer to the same pressure all along. The answer with its signs,
 /// to the same pressure along one side, is no bound where a sheet is folded: the pushes of two
@@ -137,7 +137,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
 void add_sheets_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const ClothRows c = cloth_rows(state);
-  const RowSize size{c, free_ways(state)};
+  const RowSize size{c, constraint_projection(state)};
   const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
                              state.cloth.inverse_mass.data()};
   const VecView answer = s.answer.view();
@@ -145,7 +145,7 @@ void add_sheets_to_diagonal(State& state) {
   sum_row_sizes(state, size, right);
   s.answer.clear();
   add_to_reference(state, matrix, right, 0.f);
-  sweep_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
+  solve_cloth_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
   float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
@@ -176,7 +176,7 @@ void respond_sheets(State& state, int sweeps, float tolerance) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::own);
-  sweep_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
+  solve_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
 }
 
 void settle_sheets(State& state) {
@@ -189,11 +189,11 @@ void settle_sheets(State& state) {
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
-    sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
+    solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
   if (state.parameters.obstacles > 0)
     settle_at_obstacles(state, given, last_sweeps, last_tolerance);
-  balance_loose_sheets(state, s.change.view(), given);
+  balance_loose_cloth(state, s.change.view(), given);
 }
 
 void subtract_sheet_rate(State& state) {

@@ -18,7 +18,7 @@ namespace drench::sim::DRENCH_BACKEND {
 /// Sweeps at most before the first, between further iterations of the pressures, and at the end; a
 /// pool on a taut sheet takes as many iterations as with an exact answer, with 4 in place of 16 one
 /// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum
-/// of those that nothing holds is whole (balance_loose_sheets).
+/// of those that nothing holds is whole (balance_loose_cloth).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
@@ -95,12 +95,13 @@ struct TensionMatrix {
   }
 };
 
-/// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex on the ways that it may go.
+/// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex along its free directions.
 struct RowSize {
   ClothRows rows;
-  FreeWays free;
+  ConstraintProjection constraints;
   DRENCH_HD float at(int row, int k) const {
-    return rows.weight[k][row] * length(free.of(rows.vertex[k][row], rows.gradient[row]));
+    return rows.weight[k][row] *
+           length(constraints.project(rows.vertex[k][row], rows.gradient[row]));
   }
 };
 

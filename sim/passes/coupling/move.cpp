@@ -71,7 +71,7 @@ PathTest path_test_of(State& state, float moved) {
           path_clearance * p.spacing,
           std::max(std::sqrt(moved2), moved),
           4,
-          {free_ways(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
+          {constraint_projection(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
 }
 
 namespace {

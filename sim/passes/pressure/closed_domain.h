@@ -50,6 +50,6 @@ struct Relaxation {
   }
 };
 
-void project_full_box(State& state);
+void project_closed_domain(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

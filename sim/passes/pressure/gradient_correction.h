@@ -109,7 +109,8 @@ struct GradientCorrection {
   }
 };
 
-/// L of every particle, from positions, walls and densities. Uses PressureState::vector and push.
+/// L of every particle, from positions, walls and densities. Uses PressureState::scratch_a and
+/// scratch_b.
 void correct_gradients(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -27,9 +27,9 @@ struct FinestNodes {
 
   /// Where a particle stands within block (x, y, z), from 0 to 1.
   DRENCH_HD Vec3<float> within(Float4 p, int x, int y, int z) const {
-    return {share((p.x - grid.origin.x) * grid.inverse_edge.x, shift.x, x),
-            share((p.y - grid.origin.y) * grid.inverse_edge.y, shift.y, y),
-            share((p.z - grid.origin.z) * grid.inverse_edge.z, shift.z, z)};
+    return {fraction((p.x - grid.origin.x) * grid.inverse_edge.x, shift.x, x),
+            fraction((p.y - grid.origin.y) * grid.inverse_edge.y, shift.y, y),
+            fraction((p.z - grid.origin.z) * grid.inverse_edge.z, shift.z, z)};
   }
   /// Of what stands on the nodes.
   DRENCH_HD float interpolate(Float4 p, const float* nodes) const {
@@ -55,7 +55,7 @@ struct FinestNodes {
 
  private:
   DRENCH_HD static int beyond(int k, const NodeAxis& axis) { return k + 1 == axis.n ? 0 : k + 1; }
-  DRENCH_HD static float share(float cells, int shift, int block) {
+  DRENCH_HD static float fraction(float cells, int shift, int block) {
     return minimum(max0(cells / float(1 << shift) - float(block)), 1.f);
   }
 };

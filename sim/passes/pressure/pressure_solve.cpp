@@ -231,22 +231,26 @@ void find_pressures(State& state, float least) {
   const bool sheets = state.contact.near > 0;
   if (sheets) start_sheets(state);
   prepare_levels(state);
-  const FreeGradient gradient{s.place.data(),   s.product.data(),
-                              s.source.data(),  s.inverse_diagonal.data(),
-                              s.control.data(), least};
-  const PressureIteration iteration{s.place.data(),
-                                    s.before.data(),
-                                    s.next.data(),
-                                    s.source.data(),
-                                    s.inverse_diagonal.data(),
-                                    s.product.data(),
-                                    s.control.data(),
-                                    state.parameters.tolerance,
-                                    1.f / (float(n) * state.parameters.rest_density),
-                                    most_iterations,
-                                    gradient,
-                                    {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
-                                    s.hierarchy.answer.data()};
+  const FreeGradient gradient{.place = s.place.data(),
+                              .product = s.product.data(),
+                              .source = s.source.data(),
+                              .inverse_diagonal = s.inverse_diagonal.data(),
+                              .control = s.control.data(),
+                              .least = least};
+  const PressureIteration iteration{
+      .place = s.place.data(),
+      .before = s.before.data(),
+      .next = s.next.data(),
+      .source = s.source.data(),
+      .inverse_diagonal = s.inverse_diagonal.data(),
+      .product = s.product.data(),
+      .control = s.control.data(),
+      .tolerance = state.parameters.tolerance,
+      .scale = 1.f / (float(n) * state.parameters.rest_density),
+      .most_iterations = most_iterations,
+      .on_levels = gradient,
+      .finest = {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
+      .answer = s.hierarchy.answer.data()};
   for (int k = 0; !ended(s.control, k, most_iterations + 1); ++k) {  // the last one decides only
     accelerate_by_pressure(state);
     density_rate(state);

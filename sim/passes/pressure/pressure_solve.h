@@ -108,7 +108,7 @@ void keep_pressures(State& state);
 /// s.scratch_a.
 void find_pressures(State& state, float least);
 
-/// Pressures that push fluid apart to rest density.
+/// Pressures that take crowded fluid back to rest density.
 void solve_pressure(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

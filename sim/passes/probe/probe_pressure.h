@@ -122,7 +122,7 @@ struct BodyParts {
     float open = 1.f;
     for (int side = 0; side < 2; ++side)
       open -= wall_seen(b, axis, side) *
-              WendlandC2::halfspace(image.image(to_wall(b, axis, side), image.on[axis]));
+              WendlandC2::halfspace(image.on[axis] ? image.image(to_wall(b, axis, side)) : 1.f);
     return open;
   }
   DRENCH_HD float open_walls(const Beside& b) const {
@@ -147,7 +147,7 @@ struct BodyParts {
       if (!near) return {};
       return {along_axis(axis, component(step.wall_gradient(i), axis)), way};
     }
-    const float begins = image.image(distance, true);
+    const float begins = image.image(distance);
     if (!(begins < 1.f)) return {};
     float slope = step.rest_density * 2.f * image.inverse_h * wall_seen(b, axis, side) *
                   WendlandC2::plane(begins) * b.open * open_obstacles(b, -1);
