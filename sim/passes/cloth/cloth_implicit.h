@@ -152,7 +152,7 @@ void linearise_cloth(State& state);
 
 /// Vertices that forces would take through a wall end at it, and the forces on them act on it: a
 /// sheet on the floor bears its water. Their blocks are those of what is left free: see
-/// free_block_inverse (a wrinkled sheet on a floor was thrown along it at 26 m/s).
+/// free_block_inverse (with whole ones a wrinkled sheet on a floor is thrown along it at 26 m/s).
 void hold_at_walls(State& state);
 
 DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {

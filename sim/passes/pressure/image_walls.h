@@ -5,8 +5,7 @@
 // half-space beyond the wall itself. Its gradient is twice that of a standing half-space, which is
 // what balances a uniform pressure on the first layer. With the standing half-space that layer
 // gives way until it touches the wall, and a tenth of all particles carry nine tenths of the
-// density error (mean 0.067 % in place of 0.005 %, 99.9th percentile 2.4 % in place of 0.05 %, on a
-// collapsing column).
+// density error (docs/decisions/0006-mirror-walls.md).
 
 #include "sim/backend/vec3.h"
 #include "sim/neighbours/kernels.h"

@@ -157,9 +157,8 @@ void smooth_velocities(State& state) {
 namespace {
 
 /// First guess: the pressures of the last step less their mean. No divergence asks for a mean where
-/// there is no free surface, and hardly any takes it back: left to itself it grew to 0.15 of the
-/// friction in Couette's channel, and what a sheared packing answers to it bent the profile by 2.5
-/// %.
+/// there is no free surface, and hardly any takes it back: left to itself it grows to 0.15 of the
+/// friction in Couette's channel, and what a sheared packing answers to it bends the profile.
 void start_without_mean(State& state) {
   start_from_last_step(state);
   Float4* place = state.pressure.place.data();

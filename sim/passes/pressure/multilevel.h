@@ -4,8 +4,8 @@
 // P_l: trilinear interpolation from the nodes of a grid, the finest over the cells that particles
 // are sorted by, every other one twice as wide; D_l: the stiffness of each node's own function.
 // Sums only, nothing is solved. The diagonal alone lowers errors of wavelength L in about L / h
-// iterations, and what it leaves is smooth: with 80 layers of water at rest the pressures came out
-// from a tenth of to five times what they should, and threw the water up.
+// iterations, and what it leaves is smooth: without levels pressures of 80 layers of water at
+// rest are up to five times what they should be, and throw the water up.
 //
 // For smooth pressures A is -rho^2 times Laplace's operator: a node's stiffness is the energy
 // sum_i rho_i^2 |grad phi(x_i)|^2, taken as that of a function whose support particles fill evenly,

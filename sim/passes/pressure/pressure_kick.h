@@ -5,7 +5,7 @@
 // 50 to the side 8 % of their rate. Pushed from where neighbours stood half a step before, with the
 // same pressures, velocities that are free of divergence at the ends of steps lose nothing (the
 // trapezoidal rule). With a free surface the same, a whole step back (Verlet's), keeps more of a
-// wave but is not stable (docs/benchmarks.md).
+// wave but is not stable (docs/decisions/0005-closed-domain.md).
 //
 // Back they go by the mean velocity around them: what a neighbourhood does together is kept, what a
 // particle does by itself stays damped.

@@ -84,10 +84,9 @@ void shape_levels(State& state) {
 namespace {
 
 /// Levels are for errors that are small and smooth. In fluid that an impact has crushed they are
-/// neither, and what is free of the bound changes with every iteration: by levels particles were
-/// thrown there at 53 km/s. Nor do they know sheets: with the bound of add_sheets_to_diagonal in
-/// their stiffness pools on sheets are solved as well as without levels, but a sheet that folds
-/// around water ended in pressures without end.
+/// neither, and what is free of the bound changes with every iteration: levels throw particles.
+/// Nor do they know cloth, in whose folds pressures would grow without end
+/// (docs/decisions/0004-where-levels-take-part.md).
 void choose_levels(State& state) {
   constexpr float small = 0.02f;  // of the rest density, in the mean
   SolveControl* control = state.pressure.control.data();
@@ -130,7 +129,7 @@ void prepare_levels(State& state) {
     const float smooth = bend(level.x) * mean(level.y) * mean(level.z) +
                          mean(level.x) * bend(level.y) * mean(level.z) +
                          mean(level.x) * mean(level.y) * bend(level.z);
-    constexpr float part = 0.3f;  // of a node's own step; 0.15 to 0.5 tried: levels overlap
+    constexpr float part = 0.3f;  // of a node's own step, as levels overlap
     parallel_for(
         "levels: stiffness", level.count(), DRENCH_LAMBDA(int n) {
           const int at = level.first + n;
@@ -157,7 +156,7 @@ void correct_on_levels(State& state, const FreeGradient& gradient) {
 /// A fluid without a free surface has nowhere to go: its mean density is what it is (the kernel's
 /// sum over particles out of order is above rest), and no pressure changes it. What pressures can
 /// do is to make it even. Against rest density they would rise without end: Taylor and Green's
-/// vortices decayed 56 % too fast at 50 particles to the side in place of 18.6 %.
+/// vortices decay three times as much too fast (docs/decisions/0005-closed-domain.md).
 void remove_mean(State& state) {
   PressureState& s = state.pressure;
   SolveControl* control = s.control.data();

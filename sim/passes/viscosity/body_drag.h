@@ -4,9 +4,9 @@
 // perpendicular. A body that fills less of what lies beyond its tangent plane brakes less: by the
 // fraction of the half-space's integral of the kernel that it fills, with the closed forms of
 // obstacle_share.h; by its square along what is curved, as what lies beside the perpendicular
-// weighs most there. Against the integral over a ball of 3 spacings this is 5 to 13 % too much
-// along and 4 to 8 % too little across, and up to 29 % too much at a box's edge
-// (tests/sim/body_drag_test.cpp). Walls and obstacles behind a sheet are not seen through it.
+// weighs most there. Against the integral over a ball of 3 spacings this is
+// up to 13 % off, at a box's edge 29 % (tests/sim/body_drag_test.cpp). Walls and obstacles behind a
+// sheet are not seen through it.
 //
 // Of all these a particle has one block of the viscous matrix. That of a sheet acts on both: rows
 // of the near list keep its rates for viscosity_cloth.h.

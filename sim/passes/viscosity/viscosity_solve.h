@@ -12,7 +12,7 @@
 // never longer than dt g there; after an impact it is not, so that it is cut to this length.
 // Without the cut the pressure of an impact would keep itself up: as friction undoes what it does,
 // the next step finds it again. In a closed domain a is that of its second solve, which velocities
-// do not feel; with that of the first, or none, sheared packings stir more (docs/benchmarks.md).
+// do not feel; with that of the first, or none, sheared packings stir more.
 //
 // What a solve leaves, r = b - (1 + K) u, is added to u: v = b - K u is what forces between pairs
 // make of b, so that momentum and angular momentum are kept to rounding, and since 0 <= K the error
