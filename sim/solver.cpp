@@ -231,18 +231,14 @@ class BackendSolver : public Solver {
     const int count = state_.parameters.obstacles;
     std::vector<ObstacleImpulse> impulses(count);
     for (int k = 0; k < count && state_.dt > 0; ++k) {
-      Impulse pressure = pressure_impulse(state_, k);
-      if (allocated_.contains(ColumnGroup::tension))
-        pressure = pressure(pressure, tension_impulse(state_, k));
-      if (allocated_.contains(ColumnGroup::drag))
-        pressure = pressure(pressure, drag_impulse(state_, k));
-      if (state_.contact.near > 0) {
-        pressure = pressure(pressure, pressure_impulse_near_cloth(state_, k));
-      }
-      const double push[3] = {pressure.x, pressure.y, pressure.z};
+      Impulse all = pressure_impulse(state_, k);
+      if (allocated_.contains(ColumnGroup::tension)) all = all + tension_impulse(state_, k);
+      if (allocated_.contains(ColumnGroup::drag)) all = all + drag_impulse(state_, k);
+      if (state_.contact.near > 0) all = all + pressure_impulse_near_cloth(state_, k);
+      const double impulse[3] = {all.x, all.y, all.z};
       for (int c = 0; c < 3; ++c) {
-        impulses[k].impulse[c] =
-            push[c] + double(stopped[4 * k + c]) / StopSums::unit * state_.parameters.particle_mass;
+        impulses[k].impulse[c] = impulse[c] + double(stopped[4 * k + c]) / StopSums::unit *
+                                                  state_.parameters.particle_mass;
       }
       impulses[k].stopped = stopped[4 * k + 3];
     }

@@ -254,7 +254,7 @@ struct PressureState {
   Column<Float4> scratch_a, scratch_b;
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
   Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
-  Column<Float4> mean_displacement;             // m, see MeanWay; only in a closed domain
+  Column<Float4> mean_displacement;             // m, see MeanDisplacement; only in a closed domain
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
   Hierarchy hierarchy;

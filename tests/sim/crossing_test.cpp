@@ -74,7 +74,7 @@ Shot block_over_sheet(V3d velocity) {
 Shot jet_at_sheet(V3d velocity, int substeps) {
   Shot shot = block_over_sheet(velocity);
   if (substeps == 1) return shot;
-  const Stepper run(shot);
+  Stepper run(shot);
   const double wanted_limit = run.stable_dt() / (substeps - 0.4);
   const double ratio = run.scene.parameters.cloth_dt_limit / wanted_limit;
   shot.cloth[0].adjacent_stiffness *= ratio * ratio;

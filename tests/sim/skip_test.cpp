@@ -90,8 +90,8 @@ TEST(Skip, OnlyAFullBoxMakesItsDensityEven) {
   add_box(missing, V3d(0), {8, 8, 7});
   const auto with = names(Stepper(full).solver->plan()),
              without = names(Stepper(missing).solver->plan());
-  EXPECT_TRUE(with.count("project_full_box") && !with.count("project_density"));
-  EXPECT_TRUE(!without.count("project_full_box") && without.count("project_density"));
+  EXPECT_TRUE(with.count("project_closed_domain") && !with.count("project_density"));
+  EXPECT_TRUE(!without.count("project_closed_domain") && without.count("project_density"));
 }
 
 TEST(Skip, AWeaklyCompressibleFluidHasNothingOfThePressureSolve) {

@@ -18,9 +18,9 @@ DRENCH_HD Vec3<float> wind_at(const WindNow& wind, Vec3<float> x) {
   Vec3<float> u{wind.velocity[0], wind.velocity[1], wind.velocity[2]};
   for (int k = 0; k < wind.modes; ++k) {
     const float* wave = wind.wave[k];
-    const float* push = wind.push[k];
+    const float* amplitude = wind.amplitude[k];
     const float s = sinf(wave[0] * x.x + wave[1] * x.y + wave[2] * x.z + wind.phase[k]);
-    u = u + Vec3<float>{push[0], push[1], push[2]} * s;
+    u = u + Vec3<float>{amplitude[0], amplitude[1], amplitude[2]} * s;
   }
   return u;
 }

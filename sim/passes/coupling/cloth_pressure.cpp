@@ -87,7 +87,7 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
         const Vec3<float> r = matrix.moving(i, of[i]);
         return dot_double(r, matrix.scaled(i, r));
       },
-      AddDoubles{},
+      Plus{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
 }
 
@@ -138,7 +138,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
 void add_cloth_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const ClothRows c = cloth_rows(state);
-  const RowSize size{c, free_ways(state)};
+  const RowSize size{c, constraint_projection(state)};
   const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
                              state.cloth.inverse_mass.data()};
   const VecView answer = s.answer.view();
@@ -146,7 +146,7 @@ void add_cloth_to_diagonal(State& state) {
   sum_row_sizes(state, size, right);
   s.answer.clear();
   add_to_reference(state, matrix, right, 0.f);
-  sweep_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
+  solve_cloth_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
   float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
@@ -177,7 +177,7 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::own);
-  sweep_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
+  solve_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
 }
 
 void settle_cloth(State& state) {
@@ -190,11 +190,11 @@ void settle_cloth(State& state) {
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
-    sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
+    solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
   if (state.parameters.obstacles > 0)
     settle_at_obstacles(state, given, last_sweeps, last_tolerance);
-  balance_loose_sheets(state, s.change.view(), given);
+  balance_loose_cloth(state, s.change.view(), given);
 }
 
 void subtract_cloth_rate(State& state) {

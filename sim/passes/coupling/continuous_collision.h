@@ -73,7 +73,7 @@ DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<do
 
 /// What walls and obstacles hold of implicit sheets does not give way to what presses it on them.
 struct ClothGround {
-  FreeWays free;
+  ConstraintProjection free;
   Vec3<float> middle;  // m, between the walls
   bool holds;
 

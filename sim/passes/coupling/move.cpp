@@ -49,29 +49,30 @@ ContinuousCollision continuous_collision_of(State& state, float moved) {
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
   const ClothWalls walls = cloth_walls_of(p);
-  return {.polygons = polygons_of(state),
-          .cloth = c.position.view(),
-          .cloth_next = next,
-          .cloth_velocity = c.next_velocity.view(),
-          .velocity = f.velocity.view(),
-          .normal = f.normal.view(),
-          .start = f.start.view(),
-          .position = f.position.view(),
-          .owed = f.owed.view(),
-          .hold = c.held.data(),
-          .stop_sum = c.stop_sum.data(),
-          .stopped = f.stopped.data(),
-          .nearest = f.triangle.data(),
-          .edge = f.edge.data(),
-          .distance = f.sheet_distance.data(),
-          .cloth_mass = c.mass.data(),
-          .inverse_mass = c.inverse_mass.data(),
-          .contact_weight = c.share.data(),
-          .mass = p.particle_mass,
-          .clearance = collision_clearance * p.spacing,
-          .cloth_moved = std::max(std::sqrt(moved2), moved),
-          .attempts = 4,
-          .ground = {free_ways(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
+  return {
+      .polygons = polygons_of(state),
+      .cloth = c.position.view(),
+      .cloth_next = next,
+      .cloth_velocity = c.next_velocity.view(),
+      .velocity = f.velocity.view(),
+      .normal = f.normal.view(),
+      .start = f.start.view(),
+      .position = f.position.view(),
+      .owed = f.owed.view(),
+      .hold = c.held.data(),
+      .stop_sum = c.stop_sum.data(),
+      .stopped = f.stopped.data(),
+      .nearest = f.triangle.data(),
+      .edge = f.edge.data(),
+      .distance = f.sheet_distance.data(),
+      .cloth_mass = c.mass.data(),
+      .inverse_mass = c.inverse_mass.data(),
+      .contact_weight = c.share.data(),
+      .mass = p.particle_mass,
+      .clearance = collision_clearance * p.spacing,
+      .cloth_moved = std::max(std::sqrt(moved2), moved),
+      .attempts = 4,
+      .ground = {constraint_projection(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
 }
 
 namespace {
@@ -126,7 +127,7 @@ GuardCount resolve_paths(State& state, const ContinuousCollision& test, const Te
         end.set(i, to);
         return result;
       },
-      AddGuardCounts{});
+      Plus{});
 }
 
 /// Which vertices are put back to the substep's start.

@@ -30,10 +30,8 @@ Drift drift_of(const State& state);
 /// Particles whose path was changed, and those that need another round.
 struct GuardCount {
   int hits = 0, unresolved = 0;
-};
-struct AddGuardCounts {
-  DRENCH_HD GuardCount operator()(GuardCount a, GuardCount b) const {
-    return {a.hits + b.hits, a.unresolved + b.unresolved};
+  DRENCH_HD GuardCount operator+(GuardCount other) const {
+    return {hits + other.hits, unresolved + other.unresolved};
   }
 };
 

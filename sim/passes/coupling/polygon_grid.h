@@ -28,13 +28,6 @@ struct JoinBounds {
   }
 };
 
-struct Larger {
-  template <class T>
-  DRENCH_HD T operator()(T a, T b) const {
-    return a > b ? a : b;
-  }
-};
-
 /// A float of its own, or eight of them one after the other: how a pass over packs fills an array
 /// of structs.
 DRENCH_HD void put_triangle(PreparedTriangle<float>* out, int k, const PreparedTriangle<float>& t) {

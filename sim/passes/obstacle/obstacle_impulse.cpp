@@ -46,11 +46,11 @@ Impulse pressure_impulse(const State& state, int which) {
           WallShare others = walls.share(x);
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image) others = law.both(others, law.of(obstacles.obstacle[k], x));
-          sum = sum(sum, times(own.gradient, factor * at.w * (1.f - others.value)));
+          sum = sum + times(own.gradient, factor * at.w * (1.f - others.value));
         }
         return sum;
       },
-      Impulse{});
+      Plus{});
 }
 
 Impulse pressure_impulse_near_cloth(const State& state, int which) {
@@ -78,12 +78,11 @@ Impulse pressure_impulse_near_cloth(const State& state, int which) {
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image)
               others = law.both(others, law.seen(obstacles.obstacle[k], x, n, gap, walls));
-          sum = sum(sum,
-                    times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value)));
+          sum = sum + times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value));
         }
         return sum;
       },
-      Impulse{});
+      Plus{});
 }
 
 Impulse tension_impulse(const State& state, int which) {
@@ -98,11 +97,11 @@ Impulse tension_impulse(const State& state, int which) {
         const Mirrors mirrors = images.of(i);
         for (int k = 0; k < mirrors.count; ++k) {
           if (mirrors.mirror[k].of != which) continue;
-          impulse = impulse(impulse, times(images.sum(i, mirrors, force).by[k], factor));
+          impulse = impulse + times(images.sum(i, mirrors, force).by[k], factor);
         }
         return impulse;
       },
-      Impulse{});
+      Plus{});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,8 +8,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct Impulse {
   double x = 0, y = 0, z = 0;
-  DRENCH_HD Impulse operator()(const Impulse& a, const Impulse& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  DRENCH_HD Impulse operator+(const Impulse& other) const {
+    return {x + other.x, y + other.y, z + other.z};
   }
 };
 

@@ -1,12 +1,11 @@
 #pragma once
 // Domain walls of the incompressible fluid: mirrors. Beyond a wall lies the fluid's own image,
-// which comes as near as the particle does: a particle at distance d misses the share of density
+// which comes as near as the particle does: a particle at distance d misses the part of density
 // that lies beyond 2 d - a/2, where the image's first layer begins; at d = a/2 that is the
 // half-space beyond the wall itself. Its gradient is twice that of a standing half-space, which is
 // what balances a uniform pressure on the first layer. With the standing half-space that layer
 // gives way until it touches the wall, and a tenth of all particles carry nine tenths of the
-// density error (mean 0.067 % in place of 0.005 %, 99.9th percentile 2.4 % in place of 0.05 %, on a
-// collapsing column).
+// density error (docs/decisions/0006-mirror-walls.md).
 
 #include "sim/backend/vec3.h"
 #include "sim/neighbours/kernels.h"
@@ -34,7 +33,7 @@ struct ImageWalls : DomainWalls {
     return 1.f - minimum(max0(behind) / (0.2f * spacing), 1.f);
   }
 
-  /// Share of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
+  /// Fraction of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
   /// corners are not counted twice; H is the kernel's integral over the image, over h.
   DRENCH_HD WallShare share(Vec3<float> p) const { return share(p, {0.f, 0.f, 0.f}, 0.f); }
 

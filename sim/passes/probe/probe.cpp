@@ -96,14 +96,13 @@ BodyParts body_parts_of(const State& state) {
 template <int N, class F>
 Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
   const bool near = state.parameters.incompressible && state.contact.near > 0;
-  const AddTotals<N> add;
   const Totals<N> away =
       parallel_reduce(name, state.fluid.count, Totals<N>{},
-                      AwayFromCloth<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
+                      AwayFromCloth<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, Plus{});
   if (!near) return away;
   const ClothRows rows = cloth_rows(state);
-  return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
-                                   BesideCloth<N, F>{f, rows.particle}, add));
+  return away + parallel_reduce(name, rows.rows, Totals<N>{}, BesideClothOf<N, F>{f, rows.particle},
+                                Plus{});
 }
 
 SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
@@ -134,7 +133,7 @@ SensorBody cloth_at(const State& state, Vec3<float> centre) {
                                  .sheet = c.sheet.data(),
                                  .centre = centre,
                                  .period = periods_of(state.parameters)},
-                         SensorBody{});
+                         NearerBody{});
 }
 
 /// What a disc lies on: within half a spacing and 25 degrees of its surface. On obstacles either
@@ -154,7 +153,7 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
   };
   const ObstacleViews obstacles = state.obstacles.views();
   body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
-                         ObstacleAt{obstacles, centre, q.on}, SensorBody{});
+                         ObstacleAt{obstacles, centre, q.on}, NearerBody{});
   if (lies_on(body)) {
     body.facing = dot(body.facing, n) < 0.f ? -n : n;
     return body;
@@ -179,7 +178,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
                                        .disc = disc,
                                        .of = body.of,
                                        .reach = reach},
-                           AddTotals<1>{})
+                           Plus{})
         .value[0];
   }
   const ObstacleViews obstacles = state.obstacles.views();
@@ -192,7 +191,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
                                        body,
                                        p.spacing,
                                        reach},
-                         AddTotals<1>{})
+                         Plus{})
       .value[0];
 }
 
@@ -232,7 +231,7 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
         parallel_reduce(
             "probe: volume of a disc", points.count(), Totals<1>{},
             InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
-            AddTotals<1>{})
+            Plus{})
             .value[0];
   }
   if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
@@ -288,8 +287,7 @@ double pressure(State& state, const ProbeQuery& query) {
 /// Force of the fluid on a range of vertices, N: the impulses they were given in the step, over dt.
 std::vector<double> cloth_force(const State& state, const ProbeQuery& query) {
   return to_vector(parallel_reduce("probe: cloth force", query.end - query.begin, Totals<3>{},
-                                   VertexForce{state.cloth.force.view(), query.begin},
-                                   AddTotals<3>{}));
+                                   VertexForce{state.cloth.force.view(), query.begin}, Plus{}));
 }
 
 std::vector<double> energy(const State& state, const ProbeQuery& query) {
@@ -299,7 +297,6 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const Vec3<float> gravity{p.gravity[0] + p.held[0], p.gravity[1] + p.held[1],
                             p.gravity[2] + p.held[2]};
   const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
-  const AddTotals<3> add;
   const Totals<3> fluid = parallel_reduce("probe: fluid energy", f.count, Totals<3>{},
                                           PointEnergy{.position = f.position.view(),
                                                       .velocity = f.velocity.view(),
@@ -307,7 +304,7 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
                                                       .mass = p.particle_mass,
                                                       .gravity = gravity,
                                                       .zero = zero},
-                                          add);
+                                          Plus{});
   const float behind =
       sheets_are_implicit(p) ? 0.f : float(0.5 * state.dt / std::max(1, state.substeps));
   const Totals<3> cloth =
@@ -327,12 +324,12 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
                                    .fluid_force = c.force.view(),
                                    .inverse_mass = c.inverse_mass.data(),
                                    .behind = behind},
-                      add);
+                      Plus{});
   const Totals<3> springs = parallel_reduce(
       "probe: spring energy", c.vertices, Totals<3>{},
       SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},
-      add);
-  return to_vector(add(add(fluid, cloth), springs));
+      Plus{});
+  return to_vector(fluid + cloth + springs);
 }
 
 /// Measures the incompressible fluid's density anew; that of the weakly compressible one is of the
@@ -344,7 +341,7 @@ std::vector<double> volume(State& state) {
       parallel_reduce("probe: volume", n, Totals<4>{},
                       PositionAndDensity{state.fluid.position.view(), state.fluid.density.data(),
                                          1.f / state.parameters.rest_density},
-                      AddTotals<4>{});
+                      Plus{});
   std::vector<double> all{double(n)};
   for (const double value : sum.value)
     all.push_back(n > 0 ? value / n : std::numeric_limits<double>::quiet_NaN());
@@ -359,7 +356,7 @@ std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
                                                        {q.place[0], q.place[1], q.place[2]},
                                                        periods_of(state.parameters),
                                                        q.radius * q.radius},
-                                        AddTotals<4>{});
+                                        Plus{});
   if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
   return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
 }
@@ -369,10 +366,9 @@ double front(const State& state, const ProbeQuery& q) {
   if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
   return 0.5 * state.parameters.spacing +
          parallel_reduce(
-             "probe: front", state.fluid.count, Farthest{},
+             "probe: front", state.fluid.count, -1e30,
              PositionAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
-             Farthest{})
-             .value;
+             Larger{});
 }
 
 std::vector<double> vertex(const State& state, int v) {

@@ -21,12 +21,10 @@ namespace drench::sim::DRENCH_BACKEND {
 template <int N>
 struct Totals {
   double value[N] = {};
-};
-template <int N>
-struct AddTotals {
-  DRENCH_HD Totals<N> operator()(Totals<N> a, const Totals<N>& b) const {
-    for (int k = 0; k < N; ++k) a.value[k] += b.value[k];
-    return a;
+  DRENCH_HD Totals operator+(const Totals& other) const {
+    Totals sum;
+    for (int k = 0; k < N; ++k) sum.value[k] = value[k] + other.value[k];
+    return sum;
   }
 };
 template <int N>
@@ -186,7 +184,7 @@ struct AwayFromCloth {
   }
 };
 template <int N, class F>
-struct BesideCloth {
+struct BesideClothOf {
   F f;
   const int* particle;
   DRENCH_HD Totals<N> operator()(int row) const {

@@ -78,6 +78,8 @@ struct SensorBody {
   Vec3<float> facing{0.f, 0.f, 0.f};  // unit, to the fluid that is measured
   Vec3<float> foot{0.f, 0.f, 0.f};    // m, on a sheet
   float distance = 1e30f;             // m, of the disc's centre from its surface
+};
+struct NearerBody {
   DRENCH_HD SensorBody operator()(const SensorBody& a, const SensorBody& b) const {
     return fabsf(b.distance) < fabsf(a.distance) ? b : a;
   }

@@ -20,7 +20,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// The share of the matrix of what brakes a particle, a symmetric 3 x 3 block.
+/// What walls, obstacles and cloth add to the matrix of a particle, a symmetric 3 x 3 block.
 struct WallDrag {
   Vec3<float> rate, cross;  // xx, yy, zz and xy, yz, zx
   Vec3<float> source;       // the block times the wall's velocity, m/s
@@ -99,15 +99,16 @@ struct ViscousProduct : ViscousPairs<Separation> {
   };
   template <class Q>
   struct Sum {
-    Q push;
+    Q friction;
   };
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
     const Q apart = separation(i.place, j.place);
-    sum.push = multiply_add(weight * apart, splat_sum(apart * (i.vector - j.vector)), sum.push);
+    sum.friction =
+        multiply_add(weight * apart, splat_sum(apart * (i.vector - j.vector)), sum.friction);
   }
   DRENCH_HD Vec3<float> result(int i, const Sum<Float4>& sum) const {
-    const Float4 v = vector[i], p = sum.push;
+    const Float4 v = vector[i], p = sum.friction;
     const Vec3<float> drag = walls.drag(i, place[i]).times({v.x, v.y, v.z});
     return {scale * p.x + drag.x, scale * p.y + drag.y, scale * p.z + drag.z};
   }
