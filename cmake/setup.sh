@@ -1,5 +1,6 @@
 # Sourced by run, test, bench: installs what is missing, configures and builds. Debian 12 names; also
-# right on Debian 13 and Ubuntu 24.04 where they exist. Needs `root` set to the repository.
+# right on Debian 13 and Ubuntu 24.04 where they exist. Needs `root` set to the repository;
+# drench_yes=yes installs without asking.
 
 # libboost-iostreams-dev brings the Boost headers that OpenVDB's own include.
 # What the build needs, each with a file that shows it is there: asking dpkg would miss a library that
@@ -52,6 +53,22 @@ drench_missing_packages() {
   done
 }
 
+# Whether a person is there to be asked.
+drench_on_terminal() { [[ -t 0 && -t 2 ]]; }
+
+# Scripts and CI are not asked: they have asked for the packages by calling.
+drench_may_install() {
+  local answer
+  if [[ ${drench_yes:-no} == yes ]] || ! drench_on_terminal; then return 0; fi
+  printf 'drench: missing: %s\nInstall these packages with apt-get? [y/N] ' "$*" >&2
+  read -r answer || answer=
+  case $answer in
+    [yY] | [yY][eE][sS]) return 0 ;;
+  esac
+  printf 'drench: nothing was installed. By hand: apt-get install %s\n' "$*" >&2
+  return 1
+}
+
 drench_install() {
   local missing as_root=()
   mapfile -t missing < <(drench_missing_packages)
@@ -68,6 +85,7 @@ drench_install() {
     fi
     as_root=(sudo)
   fi
+  drench_may_install "${missing[@]}" || return 1
   printf 'drench: installing %s\n' "${missing[*]}" >&2
   "${as_root[@]}" apt-get update -qq >&2
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \

@@ -10,16 +10,3 @@ if(DRENCH_SANITIZE)
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(drench_flags INTERFACE -fsanitize=address,undefined)
 endif()
-
-# drench_add_tests(AREA LIBRARIES lib... SOURCES file...): one GoogleTest program an area,
-# build/bin/drench_AREA_tests, every test registered with CTest.
-function(drench_add_tests area)
-  cmake_parse_arguments(arg "" "" "LIBRARIES;SOURCES" ${ARGN})
-  set(program drench_${area}_tests)
-  add_executable(${program} ${arg_SOURCES})
-  target_link_libraries(${program} PRIVATE drench_flags ${arg_LIBRARIES} GTest::gtest GTest::gtest_main)
-  target_compile_definitions(${program} PRIVATE DRENCH_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-  include(GoogleTest)
-  gtest_discover_tests(${program} DISCOVERY_MODE PRE_TEST TEST_PREFIX ${area}.
-    PROPERTIES TIMEOUT 600 LABELS ${area})
-endfunction()

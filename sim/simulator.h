@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/error.h"
 #include "pipeline/contract/files/files.h"
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/geometry/level_set.h"
@@ -52,6 +53,15 @@ struct ProbeText {
   std::string name, csv;
 };
 
+/// The state is not finite or far too fast: says frame, time, particle and the last good
+/// checkpoint.
+class BlowUp : public Error {
+ public:
+  BlowUp(const std::string& text, std::filesystem::path last_good)
+      : Error(text), checkpoint(std::move(last_good)) {}
+  std::filesystem::path checkpoint;  // that the text names; empty: none was written or read
+};
+
 class Simulator {
  public:
   /// Builds the initial state, before any pre-roll. @throws Error if fluid overlaps cloth, a cloth
@@ -65,7 +75,7 @@ class Simulator {
   /// the first frame is read, unless the state comes from a checkpoint.
   /// @param keep_going  asked before every step; false throws Stopped after the current state is
   /// whole.
-  /// @throws Error on NaN or blow-up with frame, time, particle and the last good checkpoint.
+  /// @throws Error, BlowUp among them.
   StepReport preroll(const std::function<bool()>& keep_going = {});
   /// Advances from frame to frame + 1; steps land exactly on frames. What is left of the pre-roll
   /// goes first. @param keep_going, @throws as above.

@@ -18,7 +18,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct VecColumn {
   Column<float> x, y, z;
-  VecView view() const { return {x.data(), y.data(), z.data()}; }
+  VecView view() { return {x.data(), y.data(), z.data()}; }
+  ConstVecView view() const { return {x.data(), y.data(), z.data()}; }
   void resize(size_t n) { x.resize(n), y.resize(n), z.resize(n); }
   void swap(VecColumn& o) noexcept { x.swap(o.x), y.swap(o.y), z.swap(o.z); }
   void clear() { x.clear_bytes(0), y.clear_bytes(0), z.clear_bytes(0); }
@@ -52,8 +53,8 @@ struct FluidState {
   Column<int>
       shaded;  // 1 where a sheet may hide neighbours; after the density pass: where one does
   Column<float> cloth_share;  // share of density that the sheet replaces
-  VecColumn impulse;          // paper coupling: kg m/s; path test: m, where particles end and,
-                              // incompressible, would end
+  VecColumn impulse;          // kg m/s, of the sheet it is near      (published coupling)
+  VecColumn end;              // m, where its path ends or, incompressible, would end
   VecColumn start;            // m, position at the start of the step
   VecColumn drift;            // m, of a path beside dt times the velocity (incompressible)
   Column<int> moved;          // 1: cannot meet a sheet, has made its whole step
@@ -110,7 +111,7 @@ struct ClothState {
   VecColumn air_push;          // N
   VecColumn force;             // N from the fluid, constant over the step
   Column<int> held;            // by the path test for this substep
-  Column<long long> stop_sum;  // 4 a vertex: see PathTest
+  Column<long long> stop_sum;  // 4 a vertex: see ContinuousCollision
 };
 
 /// Scalars of the conjugate gradients of the sheets, in the memory of the backend.
@@ -144,12 +145,28 @@ struct ClothSystem {
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
-  int near = 0;         // particles within the support radius of a sheet: the first of order
-  int close = 0;        // of these, those that the contact distance may concern in this step
-  Column<int> index;    // 4 fields a row of contact_exact.h: particle and vertices
-  Column<float> field;  // 23 fields a row
-  int stride = 0;       // from field to field
-  VecColumn impulse;    // 3 a triangle: what its contacts give to its corners, kg m/s
+  int near = 0;   // particles within the support radius of a sheet: the first of order
+  int close = 0;  // of these, those that the contact distance may concern in this step
+  // rows of the near list (ContactRows), rebuilt every step
+  int stride = 0;        // from one corner's field to the next
+  Column<int> particle;  // -1: empty
+  Column<int> vertex;    // 3 fields
+  Column<float> weight;  // 3 fields
+  VecColumn change;      // kg m/s exact, kg m incompressible: what a row gives to its vertices
+  // of the exact coupling (ExactContacts)
+  VecColumn normal, velocity, drag;  // unit; m/s, of the particle; kg m/s
+  Column<float> inverse_row;         // kg, 0 at and beyond a free edge
+  Column<float> pressure_target, pressure_rate, pressure_scale;  // kg m/s, kg, 1
+  Column<float> least;                                           // m/s, least speed of separation
+  Column<float> drag_rate, drag_scale;                           // kg, 1
+  Column<float> lambda;                                          // kg m/s
+  // of the incompressible fluid (ClothRows)
+  VecColumn gradient;                     // kg/m^4, G
+  Column<float> recovery;                 // m, that the row may ask for in this step
+  Column<float> compliance;               // kg^2/m^8
+  Column<float> gap, open;                // m; fraction of the density that the cloth leaves
+  Column<float> rate_along, rate_across;  // 1, of cloth that holds the fluid beside it
+  VecColumn impulse;                 // 3 a triangle: what its contacts give to its corners, kg m/s
   Column<int> guarded, guard_start;  // places in order of the particles whose paths are tested
   int guard_count = 0;
   float cloth_reach = 0;  // m, how far cloth may move in the step before all are tested
@@ -232,22 +249,15 @@ struct Hierarchy {
 /// warm start is FluidState::pressure_term.
 struct PressureState {
   NeighbourLists lists;
-  Column<Float4> place;   // m, position; w: a pressure
-  Column<Float4> vector;  // a vector field; w: 0
+  Column<Float4> place;  // m, position; w: a pressure
+  // Scratch of a pass over the lists and what it is read by: vector fields, w: 0, and a scalar one.
+  Column<Float4> scratch_a, scratch_b;
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
   Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
-  Column<Float4> push;  // m^4/(kg s^2) a unit of q of the particle itself: acceleration
-  Column<Float4> way;   // m, see MeanWay; only in a full box
+  Column<Float4> mean_displacement;             // m, see MeanDisplacement; only in a closed domain
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
   Hierarchy hierarchy;
-
-  void resize(size_t n) {
-    for (Column<Float4>* c : {&place, &vector, &wall, &correction, &correction_cross, &push})
-      c->resize(n);
-    for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
-    control.resize(1);
-  }
 };
 
 /// Columns of surface tension (passes/tension/surface_tension.h), rebuilt every step.

@@ -16,97 +16,28 @@
 #include "sim/passes/tension/wetting.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_solve.h"
-#include "sim/passes/wcsph/density.h"
-#include "sim/passes/wcsph/pressure_viscosity.h"
+#include "sim/passes/wcsph/wcsph.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-Walls walls_of(const Parameters& p) {
-  Walls walls{};
-  walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
-  return walls;
-}
-
-GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
-
-template <class Kernel>
-DensitySum<Kernel> density_pass(const State& state) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  return {f.position.view(),
-          f.cloth_share.size() ? f.cloth_share.data() : nullptr,
-          f.density.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          p.support_radius,
-          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
-          p.rest_density,
-          p.sound_speed * p.sound_speed,
-          walls_of(p)};
-}
-
-void sum_density(State& state) {
-  if (state.cloth.triangles == 0) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state));
-  } else if (state.parameters.paper) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
-  } else {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state, state.fluid.position.view(), Shaded::near));
-  }
-}
-
-void pressure_viscosity(State& state) {
-  const Parameters& p = state.parameters;
-  FluidState& f = state.fluid;
-  const PressureViscosity pass{f.position.view(),
-                               f.velocity.view(),
-                               f.pressure_term.data(),
-                               f.inverse_density.data(),
-                               f.acceleration.view(),
-                               p.support_radius,
-                               p.particle_mass * spiky_gradient_factor(p.support_radius),
-                               p.dynamic_viscosity,
-                               p.wall_viscosity,
-                               p.rest_density,
-                               {p.gravity[0], p.gravity[1], p.gravity[2]},
-                               walls_of(p)};
-  if (state.cloth.triangles > 0 && !p.paper) {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
-                  sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
-  } else {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
-  }
-}
-
-void integrate_velocity(State& state) {
-  FluidState& f = state.fluid;
-  const VecView v = f.velocity.view(), a = f.acceleration.view();
-  const float dt = float(state.dt);
-  parallel_for(
-      "integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
-}
-
 void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
 /// Particles stand where sheets do: at the start of the step.
-VecView beside_sheets(const State& state) {
+ConstVecView beside_sheets(const State& state) {
   return state.parameters.incompressible ? state.fluid.start.view() : state.fluid.position.view();
 }
 void exact_nearest(State& state) {
   find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
 }
-void exact_sides(State& state) { find_sheet_sides(state, beside_sheets(state)); }
+void exact_sides(State& state) { find_cloth_sides(state, beside_sheets(state)); }
 void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
 void settle_cloth_alone(State& state) {
   state.contact.near = 0;
   if (state.parameters.air_density > 0) wind_on_cloth(state);
   linearise_cloth(state);
-  settle_sheets(state);
-  finish_sheets(state);
+  settle_cloth(state);
+  finish_cloth(state);
   finish_substep(state.cloth);
 }
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.
@@ -136,7 +67,7 @@ bool around_obstacles(const Parameters& p, bool cloth) {
 }
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
 bool tense(const Parameters& p, bool cloth) { return projected(p, cloth) && p.surface_tension > 0; }
-bool wetting(const Parameters& p, bool cloth) { return tense(p, cloth) && p.wets; }
+bool wets(const Parameters& p, bool cloth) { return tense(p, cloth) && p.wets; }
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
@@ -153,7 +84,9 @@ bool turning_compressible(const Parameters& p, bool cloth) {
   return p.turns && compressible(p, cloth);
 }
 bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
-bool exact(const Parameters& p, bool cloth) { return coupled(p, cloth) && !p.incompressible; }
+bool coupled_exactly(const Parameters& p, bool cloth) {
+  return coupled(p, cloth) && !p.incompressible;
+}
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
@@ -168,80 +101,82 @@ bool implicit_alone(const Parameters& p, bool cloth) {
   return cloth_alone(p, cloth) && sheets_are_implicit(p);
 }
 
-constexpr unsigned moving = column_position | column_velocity;
+using enum ColumnGroup;
+constexpr ColumnSet moving = position | velocity;
+constexpr ColumnSet walls =
+    projection | solve;  // of the pressure solve, at the predicted positions
+constexpr ColumnSet sheets = cloth | cloth_fixed;
+constexpr ColumnSet near_list = near_cloth | contact | rows | cloth_fixed;
+/// What a pressure solve writes beside cloth.
+constexpr ColumnSet response = cloth_system | cloth_obstacles | loads;
 
 const Pass all_passes[] = {
-    {"turn_frame", turning, column_position, column_velocity, turn_frame},
-    {"predict_particles", free_of_obstacles, moving, moving, predict_particles},
-    {"predict_around_obstacles", around_obstacles, moving, moving, predict_around_obstacles},
-    {"sort_particles", fluid, column_position, moving, sort_particles},
-    {"polygon_grid", coupled, column_cloth, column_cloth, exact_grid},
-    {"nearest_triangle", coupled, column_position | column_cloth, column_sheet, exact_nearest},
-    {"sheet_side", coupled, column_position | column_cloth, column_sheet | column_memory,
-     exact_sides},
-    {"sort_near", strong, column_sheet, column_contact, sort_all_contacts},
-    {"start_rows", strong, column_sheet | column_contact, column_cloth, start_contacts},
+    {"turn_frame", turning, moving | cloth, velocity, turn_frame, cloth},
+    {"predict_particles", free_of_obstacles, moving, moving, predict_particles, start},
+    {"predict_around_obstacles", around_obstacles, moving, moving | stopped,
+     predict_around_obstacles, start},
+    {"sort_particles", fluid, position, moving | pressure | cells | sorting, sort_particles,
+     memory | near_cloth | start},
+    {"polygon_grid", coupled, sheets, polygons | sorting, exact_grid},
+    {"nearest_triangle", coupled, position | start | sheets | polygons | memory, near_cloth,
+     exact_nearest},
+    {"sheet_side", coupled, position | start | sheets | polygons, near_cloth | memory, exact_sides},
+    {"sort_near", strong, near_cloth, contact | sorting, sort_all_contacts},
+    {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
-    {"wind_on_cloth", strong_in_wind, column_cloth, column_cloth, wind_on_cloth},
-    {"linearise_cloth", strong, column_cloth, column_cloth_system, linearise_cloth},
-    {"find_neighbours", projected, column_position, column_density | column_projection,
-     find_neighbours},
-    {"apply_surface_tension", tense, column_velocity | column_projection,
-     column_velocity | column_projection | column_tension, apply_surface_tension},
-    {"apply_contact_angles", wetting, column_velocity | column_projection | column_tension,
-     column_velocity | column_projection | column_tension, apply_contact_angles},
-    {"smooth_velocities", smoothed, column_velocity | column_projection,
-     column_velocity | column_projection, smooth_velocities},
-    {"project_full_box", without_surface, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_full_box},
-    {"project_density", with_surface, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_density},
-    {"project_around_obstacles", around_obstacles, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_around_obstacles},
-    {"find_body_drag", dragged, column_velocity | column_projection, column_drag, find_body_drag},
-    {"apply_viscosity", viscous, column_velocity | column_projection,
-     column_velocity | column_projection, apply_viscosity},
-    {"wind_on_fluid", windy, moving | column_density | column_projection, column_velocity,
-     wind_on_fluid},
-    {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
-    {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
+    {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
+    {"linearise_cloth", strong, sheets | cloth_load | cloth_air, cloth_system, linearise_cloth},
+    {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
+     find_neighbours, cloth_rows},
+    {"apply_surface_tension", tense, velocity | lists | walls, velocity | tension | scratch,
+     apply_surface_tension, memory},
+    {"apply_contact_angles", wets, velocity | lists | walls | tension, velocity | wetting | scratch,
+     apply_contact_angles},
+    {"smooth_velocities", smoothed, velocity | lists, velocity | scratch, smooth_velocities},
+    {"project_closed_domain", without_surface, moving | lists | projection,
+     moving | pressure | solve | scratch | mean_displacement | projection, project_closed_domain,
+     response},
+    {"project_density", with_surface, moving | density | pressure | lists | projection,
+     moving | pressure | solve | scratch, project_density, response},
+    {"project_around_obstacles", around_obstacles, moving | density | pressure | lists | projection,
+     moving | pressure | solve | scratch | projection | stopped, project_around_obstacles,
+     response},
+    {"find_body_drag", dragged, velocity | solve, drag, find_body_drag, cloth_drag},
+    {"apply_viscosity", viscous, velocity | lists | solve | drag, velocity | scratch | viscosity,
+     apply_viscosity, cloth_drag | cloth_system | loads},
+    {"wind_on_fluid", windy, moving | density | lists | solve, velocity, wind_on_fluid},
+    {"paper_polygon_grid", paper, sheets, polygons | sorting, paper_grid},
+    {"paper_nearest_centroid", paper, position | sheets | polygons, near_cloth,
      find_nearest_centroids},
-    {"density", compressible, column_position, column_density, sum_density},
-    {"pressure_viscosity", compressible, moving | column_density, column_acceleration,
+    {"density", compressible, position | cells, density | pressure | inverse_density, sum_density,
+     near_cloth},
+    {"pressure_viscosity", compressible, moving | pressure | inverse_density | cells, acceleration,
      pressure_viscosity},
-    {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
-    {"turn_frame", turning_compressible, column_position, column_velocity, turn_frame},
-    {"integrate_velocity", compressible, column_acceleration, column_velocity, integrate_velocity},
-    {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
-    {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth,
+    {"paper_forces", paper, near_cloth | moving, acceleration | impulse, add_paper_forces},
+    {"turn_frame", turning_compressible, moving | cloth, velocity, turn_frame, cloth},
+    {"integrate_velocity", compressible, acceleration, velocity, integrate_velocity},
+    {"sort_contacts", coupled_exactly, near_cloth, contact | sorting, sort_exact_contacts},
+    {"start_contacts", coupled_exactly, near_list | memory, rows | loads | memory | cloth_load,
      start_contacts},
-    {"cloth_predict", exact, column_cloth, column_cloth, cloth_predict},
-    {"contact_exact", exact, column_sheet | column_density | column_cloth,
-     column_velocity | column_contact | column_cloth, solve_contacts},
-    {"paper_reaction", paper, column_contact, column_cloth, paper_reaction},
+    {"cloth_predict", coupled_exactly, sheets | cloth_load, cloth_substep | cloth_air,
+     cloth_predict},
+    {"contact_exact", coupled_exactly, near_list | velocity | pressure | inverse_density | sheets,
+     velocity | exact | loads | cloth_load | cloth_substep, solve_contacts},
+    {"paper_reaction", paper, impulse | near_cloth, contact | cloth_load | sorting, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
-    {"move_cloth", explicit_alone, column_cloth, column_cloth, move_cloth},
-    {"settle_cloth", implicit_alone, column_cloth, column_cloth | column_cloth_system,
+    {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
+    {"settle_cloth", implicit_alone, sheets,
+     cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped,
      settle_cloth_alone},
-    {"move_with_sheets", strong, moving | column_cloth | column_cloth_system,
-     moving | column_cloth | column_contact, move_with_sheets},
-    {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact,
+    {"move_with_sheets", strong, moving | near_list | sheets | start | drift | cloth_system,
+     moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
+         sorting | cloth_load | stopped,
+     move_with_sheets},
+    {"move_coupled", coupled_exactly, moving | near_list | sheets,
+     moving | cloth | cloth_substep | near_cloth | memory | path | start | cloth_air | contact |
+         sorting,
      move_coupled},
-    {"paper_move", paper, moving | column_cloth, moving | column_cloth, paper_move},
-};
-
-struct JoinLimits {
-  DRENCH_HD Limits operator()(const Limits& a, const Limits& b) const {
-    Limits joined = a;
-    joined.max_speed = a.max_speed > b.max_speed ? a.max_speed : b.max_speed;
-    joined.max_acceleration =
-        a.max_acceleration > b.max_acceleration ? a.max_acceleration : b.max_acceleration;
-    joined.bad_particle = first(a.bad_particle, b.bad_particle);
-    joined.bad_vertex = first(a.bad_vertex, b.bad_vertex);
-    return joined;
-  }
-  /// The smaller index, whatever the order of the reduction; -1 is none.
-  DRENCH_HD static int first(int a, int b) { return a < 0 || (b >= 0 && b < a) ? b : a; }
+    {"paper_move", paper, moving | sheets, moving | cloth | cloth_substep, paper_move},
 };
 
 }  // namespace
@@ -251,7 +186,9 @@ std::span<const Pass> every_pass() { return all_passes; }
 std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
   std::vector<Pass> plan;
   for (const Pass& pass : all_passes) {
-    if (pass.when(parameters, cloth)) plan.push_back(pass);
+    if (!pass.when(parameters, cloth)) continue;
+    plan.push_back(pass);
+    if (cloth) plan.back().writes |= pass.writes_beside_cloth;
   }
   return plan;
 }
@@ -260,48 +197,6 @@ void step_cloth_alone(State& state) {
   state.cloth.force.clear();
   if (state.parameters.turns) turn_frame(state);
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
-}
-
-Limits measure_limits(State& state) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  // Twenty times the speed of sound is no flow but a blow-up; NaN fails the comparison as well.
-  const float absurd = p.fluid ? 20.f * p.sound_speed : 1e4f;
-  const VecView v = f.velocity.view(), a = f.acceleration.view(), cv = state.cloth.velocity.view();
-  const bool accelerated = f.acceleration.x.size() > 0;  // the incompressible solver keeps none
-  Limits limits;
-  if (f.count > 0) {
-    limits = parallel_reduce(
-        "limits: fluid", f.count, Limits{},
-        DRENCH_LAMBDA(int i) {
-          const float speed = length(v[i]), push = accelerated ? length(a[i]) : 0.f;
-          Limits one;
-          if (!(speed < absurd) || !(push < 1e30f)) {
-            one.bad_particle = i;
-          } else {
-            one.max_speed = speed, one.max_acceleration = push;
-          }
-          return one;
-        },
-        JoinLimits{});
-  }
-  if (state.cloth.vertices > 0) {
-    const Limits cloth = parallel_reduce(
-        "limits: cloth", state.cloth.vertices, Limits{},
-        DRENCH_LAMBDA(int i) {
-          const float speed = length(cv[i]);
-          Limits one;
-          if (speed < absurd) {
-            one.max_speed = speed;
-          } else {
-            one.bad_vertex = i;
-          }
-          return one;
-        },
-        JoinLimits{});
-    limits = JoinLimits{}(limits, cloth);
-  }
-  return limits;
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -11,8 +11,9 @@ namespace drench::sim::DRENCH_BACKEND {
 struct Pass {
   const char* name;
   bool (*when)(const Parameters& p, bool cloth);
-  unsigned reads, writes;  // ColumnGroup
+  ColumnSet reads, writes;
   void (*launch)(State& state);
+  ColumnSet writes_beside_cloth = {};  // in a shot with cloth, too; step_plan adds it to writes
 };
 
 /// Every pass there is, in order.
@@ -22,8 +23,5 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth);
 
 /// A step of cloth that no fluid touches.
 void step_cloth_alone(State& state);
-
-/// Limits of the current state.
-Limits measure_limits(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

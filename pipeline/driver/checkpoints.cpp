@@ -12,19 +12,19 @@ namespace drench {
 
 namespace fs = std::filesystem;
 
-CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, const Wanted& wanted,
+CheckpointKeeper::CheckpointKeeper(fs::path folder, Manifest& manifest, const Targets& targets,
                                    std::vector<Digest> keys, int every, int kept)
     : folder_(std::move(folder)),
       manifest_(manifest),
-      first_(wanted.first),
+      first_(targets.first),
       keys_(std::move(keys)),
-      parts_(wanted.simulate.parts),
+      parts_(targets.simulate.parts),
       every_(every),
       kept_(kept) {}
 
 void CheckpointKeeper::remove_stale() {
   for (const auto& [file, record] : manifest_.records()) {
-    if (record.step != checkpoint_step) continue;
+    if (record.step != checkpoint_record) continue;
     // Those beyond the frames asked for now may belong to the same, longer simulation.
     const bool beyond = record.frame >= first_ + int(keys_.size());
     const bool same_stage = record.parts == parts_;
@@ -58,7 +58,8 @@ void CheckpointKeeper::remove_unlisted() {
 std::vector<Record> CheckpointKeeper::on_frames() const {
   std::vector<Record> found;
   for (const auto& [file, record] : manifest_.records()) {
-    if (record.step == checkpoint_step && file != layout::stop_checkpoint) found.push_back(record);
+    if (record.step == checkpoint_record && file != layout::stop_checkpoint)
+      found.push_back(record);
   }
   std::sort(found.begin(), found.end(),
             [](const Record& a, const Record& b) { return a.frame < b.frame; });
@@ -67,7 +68,7 @@ std::vector<Record> CheckpointKeeper::on_frames() const {
 
 void CheckpointKeeper::write(const Simulation& simulation, int frame, const std::string& file) {
   Record record = record_of_file(folder_, simulation.write_checkpoint(folder_ / file));
-  record.step = checkpoint_step;
+  record.step = checkpoint_record;
   record.frame = frame;
   record.key = keys_.at(size_t(frame - first_));
   record.parts = parts_;
@@ -97,9 +98,9 @@ bool CheckpointKeeper::on_stop(const Simulation& simulation, int frame) {
   return true;
 }
 
-std::string CheckpointKeeper::last_good() const {
+fs::path CheckpointKeeper::last_good() const {
   const std::vector<Record> found = on_frames();
-  return found.empty() ? "none" : (folder_ / found.back().file).string();
+  return found.empty() ? fs::path() : folder_ / found.back().file;
 }
 
 }  // namespace drench

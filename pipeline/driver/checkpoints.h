@@ -7,7 +7,7 @@
 
 #include "pipeline/driver/manifest.h"
 #include "pipeline/driver/stages.h"
-#include "pipeline/driver/wanted.h"
+#include "pipeline/driver/targets.h"
 
 namespace drench {
 
@@ -15,7 +15,7 @@ namespace drench {
 class CheckpointKeeper {
  public:
   /// @param keys  of frames first ... last, simulation_keys().
-  CheckpointKeeper(std::filesystem::path folder, Manifest& manifest, const Wanted& wanted,
+  CheckpointKeeper(std::filesystem::path folder, Manifest& manifest, const Targets& targets,
                    std::vector<Digest> keys, int every, int kept);
 
   /// Removes checkpoints of other keys and files that no record names.
@@ -26,8 +26,8 @@ class CheckpointKeeper {
   /// On stop: the state may stand between `frame`, which is committed, and the next.
   /// @return whether there is something to continue, and so a checkpoint.
   bool on_stop(const Simulation& simulation, int frame);
-  /// The file of the last one, or "none".
-  std::string last_good() const;
+  /// The file of the last one; empty if there is none.
+  std::filesystem::path last_good() const;
 
  private:
   std::vector<Record> on_frames() const;  // sorted by frame

@@ -21,6 +21,7 @@
 #include "pipeline/driver/inputs.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/plan.h"
+#include "pipeline/driver/plan_text.h"
 #include "pipeline/driver/process.h"
 #include "pipeline/driver/scene_text.h"
 #include "pipeline/driver/standard_output.h"
@@ -36,11 +37,11 @@ using nlohmann::json;
 
 namespace {
 
-/// A shot, what it wants and where it goes.
+/// A shot, what is to be made of it and where it goes.
 struct Job {
   Shot shot;
   fs::path folder;
-  Wanted wanted;
+  Targets targets;
 };
 
 Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
@@ -51,7 +52,8 @@ Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
   std::vector<int> frames = arguments.frames.empty()
                                 ? all_frames(job.shot.timeline)
                                 : parse_frames(arguments.frames, job.shot.timeline);
-  job.wanted = want(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
+  job.targets =
+      targets_of(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
   return job;
 }
 
@@ -71,7 +73,7 @@ void write_shot_lock(const Job& job, Manifest& manifest) {
   const std::optional<Record> before = manifest.find(file);
   if (before && before->digest == digest && has_recorded_digest(job.folder, *before)) return;
   Record record = record_of_file(job.folder, write_file_whole(job.folder / file, text));
-  record.step = "shot";
+  record.step = shot_record;
   record.key = digest;
   manifest.add(record);
 }
@@ -126,7 +128,7 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
   if (arguments.format == OutputFormat::json) {
     print(json_line({{"shot", job.shot.name},
                      {"folder", job.folder.string()},
-                     {"frames", job.wanted.frames},
+                     {"frames", job.targets.frames},
                      {"nothing_to_do", nothing},
                      {"planned", nothing ? 0 : counts.ran},
                      {"skipped", counts.skipped},
@@ -138,7 +140,7 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
                                    counts.skipped, job.folder.string()));
   } else {
     log_info("driver",
-             fmt::format("done: {} frames in {}", job.wanted.frames.size(), job.folder.string()));
+             fmt::format("done: {} frames in {}", job.targets.frames.size(), job.folder.string()));
   }
 }
 
@@ -163,11 +165,11 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style());
   const std::unique_ptr<Stages> stages =
       shot_stages(job.shot, job.folder, {arguments.device, arguments.memory_gib});
-  Again again(job.folder, manifest);
+  Retries retries(job.folder, manifest);
   for (int attempt = 1;; ++attempt) {
     const Plan plan =
-        make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
-    if (again.drops_inputs_of(job.wanted, plan)) continue;
+        make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+    if (retries.drop_damaged_inputs(job.targets, plan)) continue;
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
     if (attempt == 1 && renders(plan)) warn_of_empty_pictures(job.shot);
@@ -175,22 +177,17 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
     if (plan.nothing_to_do()) return plan;
     try {
       const GracefulStop graceful;
-      execute(job.wanted, plan, job.folder, manifest, *stages, progress,
+      execute(job.targets, plan, job.folder, manifest, *stages, progress,
               execute_options(arguments));
       return plan;
-    } catch (const PlanAgain& found) {
+    } catch (const DamagedInput& found) {
       log_warning("driver", fmt::format("{}; it is made again", found.what()));
-      again.found(found);
+      retries.count(found);
     }
   }
 }
 
 }  // namespace
-
-std::vector<Step> all_steps() {
-  return {Step::simulate, Step::mesh,          Step::foam, Step::render,
-          Step::denoise,  Step::contact_sheet, Step::movie};
-}
 
 void make_command(const ShotArguments& arguments, const std::vector<Step>& steps) {
   std::optional<tbb::global_control> limit;
@@ -226,7 +223,7 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
 void plan_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   const Manifest manifest(job.folder / layout::manifest);
-  Plan plan = make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  Plan plan = make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
   for (const std::string& warning : plan.warnings) log_warning("driver", warning);
   if (renders(plan)) warn_of_empty_pictures(job.shot);
   std::string text = plan_text(plan), scene_object;
@@ -238,7 +235,8 @@ void plan_command(const ShotArguments& arguments) {
     scene_object = json_line(scene_json(scene.report));
   }
   if (plan.simulation.needed || renders(plan)) check_obstacle_meshes(job.shot);
-  if (renders(plan)) check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
+  if (renders(plan))
+    render::check_pictures(job.shot, render::PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
   print(printable(text, Lines::many));
@@ -257,7 +255,7 @@ void clean_command(const ShotArguments& arguments) {
   Manifest manifest(job.folder / layout::manifest);
   manifest.open_for_append();
   const Plan plan =
-      make_plan(job.wanted, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+      make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
   for (const std::string& file : plan.beyond) {
     manifest.drop(file);
     std::error_code code;

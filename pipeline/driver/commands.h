@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/driver/wanted.h"
+#include "pipeline/driver/step.h"
 #include "sim/simulator.h"
 
 namespace drench {
@@ -40,8 +40,5 @@ void verify_command(const std::filesystem::path& folder, OutputFormat format);
 enum class InitialShot { commented, reference };
 /// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.
 void init_command(const std::filesystem::path& name, InitialShot kind);
-
-/// Every step, in order.
-std::vector<Step> all_steps();
 
 }  // namespace drench

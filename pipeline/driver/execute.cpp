@@ -3,22 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <semaphore>
 #include <set>
 #include <system_error>
 #include <thread>
 
-#include "build_id.h"
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/driver/channel.h"
 #include "pipeline/driver/checkpoints.h"
 #include "pipeline/driver/layout.h"
+#include "pipeline/driver/make.h"
 #include "pipeline/driver/process.h"
-#include "pipeline/driver/stats_file.h"
 
 namespace drench {
 
@@ -30,12 +29,11 @@ namespace {
 constexpr size_t queued_frames = 2;
 /// Two frames are rendered at once, so that one is read and built while the other has all tiles at
 /// work; and one more for every so many cores, which its ends would leave idle.
-constexpr int cores_a_frame = 32, most_frames_at_once = 4;
-constexpr int most_stage_threads = 2 + most_frames_at_once;
+constexpr int cores_a_frame = 32;
 
 int cores(int threads) { return threads > 0 ? threads : tbb::this_task_arena::max_concurrency(); }
 int frames_at_once(int threads) {
-  return std::min(2 + cores(threads) / cores_a_frame, most_frames_at_once);
+  return std::min(2 + cores(threads) / cores_a_frame, most_frames_rendered_at_once);
 }
 
 double seconds_since(Clock::time_point start) {
@@ -44,7 +42,7 @@ double seconds_since(Clock::time_point start) {
 
 class Executor {
  public:
-  Executor(const Wanted& wanted, const Plan& plan, const fs::path& folder, Manifest& manifest,
+  Executor(const Targets& targets, const Plan& plan, const fs::path& folder, Manifest& manifest,
            Stages& stages, Progress& progress, const ExecuteOptions& options);
   void run();
 
@@ -53,25 +51,18 @@ class Executor {
   void produce(int frame);
   void start_simulation();
   void advance_to(int frame);
-  void mesh_frames();
-  bool is_held(int frame) const;
-  StageReport held_mesh(int frame);
-  void make_mesh(int frame);
-  void make_foam(int frame);
-  void render_frames();
-  void make_image(int frame);
-  bool neighbours_are_rendered(int frame) const;
-  void denoise_beside(int frame);
-  void denoise_rest();
-  void make_denoised(int frame);
-  void make_dailies(Step step);
-
+  std::string with_last_good(const char* text) const;
   void write_probes(int frame);
-  void commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
-              const Key& key);
-  void finished(Step step, int frame, Clock::time_point start, const StageReport& report);
-  std::optional<KnownFile> look_up(const std::string& file) const;
-  Attributes attributes_of(int frame, const Key& key) const;
+
+  void mesh_frames();
+  void render_frames();
+  std::vector<const Rule*> rules_of(Worker worker) const;
+  void make_due(const Rule& rule, int frame);
+  void make_up_to(const Rule& rule, int frame);
+  void make_beside(const Rule& rule, int frame);
+  void make_rest(const Rule& rule);
+  bool neighbours_are_made(const Rule& rule, int frame) const;
+  bool is_planned(const Rule& rule) const;
 
   bool stopping() const {
     return failed_ || (options_.stop_requested && options_.stop_requested());
@@ -81,23 +72,23 @@ class Executor {
   void start(std::vector<std::thread>& threads, void (Executor::*work)());
   void watch();
   std::string memory_message() const;
-  /// Runs one frame of one stage in that stage's arena, when fewer than `threads` others compute.
-  template <class Work>
-  void compute(tbb::task_arena& arena, const Work& work);
-  /// The same for work on files of the folder: none is read before its digest was checked.
-  template <class Work>
-  void compute_from(const std::vector<std::string>& files, tbb::task_arena& arena,
-                    const Work& work);
 
-  const Wanted& wanted_;
+  /// How far a rule has come.
+  struct Reached {
+    int next = 0;           // Frames::from_first, of one thread: frame that was not looked at yet
+    std::set<int> ready;    // Frames::with_neighbours: frames delivered whose own inputs are made
+    std::set<int> started;  // frames that a thread has taken on
+  };
+
+  const Targets& targets_;
   const Plan& plan_;
   const fs::path folder_;
   Manifest& manifest_;
   Stages& stages_;
   Progress& progress_;
   const ExecuteOptions& options_;
-  const Lookup lookup_;
-  StatsFile stats_;
+  StageRunner runner_;
+  Maker maker_;
 
   std::set<int> to_simulate_;
   std::vector<Digest> keys_;
@@ -108,14 +99,10 @@ class Executor {
   bool kept_work_ = false;  // in a checkpoint, when it was stopped
   double over_memory_ = 0;  // bytes in use when that were too many
 
-  int next_foam_;  // frame that foam was not looked at yet; foam comes in order
-  std::mutex denoise_mutex_;
-  std::set<int> rendered_;  // wanted frames that are as they shall be
-  std::set<int> denoised_;  // frames that someone has taken on
+  std::array<Reached, size_t(Step::count)> reached_;  // by step
+  std::mutex neighbours_mutex_;
   std::atomic<int> renderers_{0};
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
-  tbb::task_arena simulate_arena_, mesh_arena_, render_arena_;
-  std::counting_semaphore<most_stage_threads> slots_;
   std::atomic<bool> failed_{false};
   std::atomic<int> running_{0};
   std::atomic<bool> simulating_{false};
@@ -123,40 +110,25 @@ class Executor {
   std::exception_ptr error_;
 };
 
-int slots(int threads) {
-  return threads > 0 ? std::min(threads, most_stage_threads) : most_stage_threads;
-}
-int arena_size(int threads) { return threads > 0 ? threads : tbb::task_arena::automatic; }
-
-Executor::Executor(const Wanted& wanted, const Plan& plan, const fs::path& folder,
+Executor::Executor(const Targets& targets, const Plan& plan, const fs::path& folder,
                    Manifest& manifest, Stages& stages, Progress& progress,
                    const ExecuteOptions& options)
-    : wanted_(wanted),
+    : targets_(targets),
       plan_(plan),
       folder_(folder),
       manifest_(manifest),
       stages_(stages),
       progress_(progress),
       options_(options),
-      lookup_([this](const std::string& file) { return look_up(file); }),
-      stats_(folder / layout::stats),
-      keys_(simulation_keys(wanted, wanted.frames.back())),
-      checkpoints_(folder, manifest, wanted, keys_, options.checkpoint_every,
-                   options.checkpoints_kept),
-      next_foam_(wanted.first),
-      simulate_arena_(arena_size(options.threads)),
-      mesh_arena_(arena_size(options.threads)),
-      render_arena_(arena_size(options.threads)),
-      slots_(slots(options.threads)) {
+      runner_(folder, manifest, stages, progress, options.threads),
+      maker_(targets, folder, manifest, stages, progress, runner_, [this] { return stopping(); }),
+      keys_(simulation_keys(targets, targets.frames.back())),
+      checkpoints_(folder, manifest, targets, keys_, options.checkpoint_every,
+                   options.checkpoints_kept) {
+  for (Reached& reached : reached_) reached.next = targets.first;
   for (const Task& task : plan.tasks) {
     if (task.step == Step::simulate && task.action == Action::run) to_simulate_.insert(task.frame);
   }
-}
-
-std::optional<KnownFile> Executor::look_up(const std::string& file) const {
-  const std::optional<Record> record = manifest_.find(file);
-  if (!record) return {};
-  return KnownFile{*record, state_of(folder_, *record)};
 }
 
 void Executor::fail(std::exception_ptr error) {
@@ -181,76 +153,26 @@ void Executor::guard(void (Executor::*work)()) {
   --running_;
 }
 
-template <class Work>
-void Executor::compute(tbb::task_arena& arena, const Work& work) {
-  slots_.acquire();
-  try {
-    arena.initialize();
-    const ArithmeticMode mode(arena);
-    arena.execute(work);
-  } catch (...) {
-    slots_.release();
-    throw;
-  }
-  slots_.release();
-}
-
-template <class Work>
-void Executor::compute_from(const std::vector<std::string>& files, tbb::task_arena& arena,
-                            const Work& work) {
-  for (const std::string& file : files) check_input(folder_, manifest_, file);
-  try {
-    compute(arena, work);
-  } catch (const Error&) {
-    drop_unreadable(folder_, manifest_, files,
-                    [this](const fs::path& file) { return stages_.why_unreadable(file); });
-    throw;
-  }
-}
-
-void Executor::commit(const std::vector<WrittenFile>& files, std::string_view step, int frame,
-                      const Key& key) {
-  for (const WrittenFile& written : files) {
-    Record record = record_of_file(folder_, written);
-    record.step = step;
-    record.frame = frame;
-    record.key = key.digest;
-    record.parts = key.parts;
-    const std::optional<Record> before = manifest_.find(record.file);
-    if (before && before->key == record.key && before->digest != record.digest) {
-      log_warning("driver", fmt::format("{} came out different from the same inputs; what follows "
-                                        "from it is made again",
-                                        record.file));
-    }
-    manifest_.add(record);
-  }
-}
-
-void Executor::finished(Step step, int frame, Clock::time_point start, const StageReport& report) {
-  const double seconds = seconds_since(start);
-  stats_.add(step_name(step), frame, seconds, report.json);
-  progress_.done(step, frame, seconds, report.line);
-}
-
 // ---- simulate ----
 
 void Executor::start_simulation() {
   checkpoints_.remove_stale();
-  compute(simulate_arena_, [&] { simulation_ = stages_.start_simulation(); });
+  runner_.compute(Worker::simulate, [&] { simulation_ = stages_.start_simulation(); });
   const std::string& file = plan_.simulation.checkpoint;
   if (file.empty()) {
-    return compute(simulate_arena_, [&] { simulation_->preroll([this] { return !stopping(); }); });
+    return runner_.compute(Worker::simulate,
+                           [&] { simulation_->preroll([this] { return !stopping(); }); });
   }
   check_input(folder_, manifest_, file);
   try {
-    compute(simulate_arena_, [&] { simulation_->read_checkpoint(folder_ / file); });
+    runner_.compute(Worker::simulate, [&] { simulation_->read_checkpoint(folder_ / file); });
   } catch (const Error& error) {
     manifest_.drop(file);
-    throw PlanAgain(fmt::format("{} cannot be used: {}", file, error.what()), file);
+    throw DamagedInput(fmt::format("{} cannot be used: {}", file, error.what()), file);
   }
   if (simulation_->frame() != plan_.simulation.from) {
     manifest_.drop(file);
-    throw PlanAgain(
+    throw DamagedInput(
         fmt::format("{} holds frame {}, not {}", file, simulation_->frame(), plan_.simulation.from),
         file);
   }
@@ -261,22 +183,28 @@ void Executor::start_simulation() {
   log_info("sim", fmt::format("continues from frame {}", plan_.simulation.from));
 }
 
+std::string Executor::with_last_good(const char* text) const {
+  const fs::path good = checkpoints_.last_good();
+  return fmt::format("{}\nLast good checkpoint in the output folder: {}", text,
+                     good.empty() ? "none" : good.string());
+}
+
 void Executor::advance_to(int frame) {
   while (simulation_->frame() < frame) {
     const Clock::time_point start = Clock::now();
     StageReport report;
     try {
-      compute(simulate_arena_,
-              [&] { report = simulation_->advance([this] { return !stopping(); }); });
-    } catch (const Error& error) {
+      runner_.compute(Worker::simulate,
+                      [&] { report = simulation_->advance([this] { return !stopping(); }); });
+    } catch (const BlowUp& error) {
       // The simulator names a checkpoint it wrote or read itself; one of an earlier run it cannot
       // know.
-      const std::string good = checkpoints_.last_good();
-      if (std::string_view(error.what()).find(good) != std::string_view::npos) throw;
-      throw Error(
-          fmt::format("{}\nLast good checkpoint in the output folder: {}", error.what(), good));
+      if (error.checkpoint == checkpoints_.last_good()) throw;
+      throw Error(with_last_good(error.what()));
+    } catch (const Error& error) {
+      throw Error(with_last_good(error.what()));
     }
-    finished(Step::simulate, simulation_->frame(), start, report);
+    runner_.finished(Step::simulate, simulation_->frame(), start, report);
   }
 }
 
@@ -286,30 +214,30 @@ void Executor::produce(int frame) {
   // Before the frame: once a frame is there, so is its checkpoint, wherever a kill falls.
   checkpoints_.before_frame(*simulation_, frame);
   std::vector<WrittenFile> files;
-  compute(simulate_arena_, [&] { files = simulation_->write_frame(folder_); });
-  commit(files, step_name(Step::simulate), frame,
-         {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});
+  runner_.compute(Worker::simulate, [&] { files = simulation_->write_frame(folder_); });
+  runner_.commit(files, step_name(Step::simulate), frame,
+                 {keys_.at(size_t(frame - targets_.first)), targets_.simulate.parts});
   committed_ = frame;
   has_committed_ = true;
-  const bool now_and_then = (frame - wanted_.first) % options_.checkpoint_every == 0;
-  if (now_and_then || frame == wanted_.frames.back()) write_probes(frame);
-  if (frame == wanted_.first || frame == plan_.simulation.from) {
+  const bool now_and_then = (frame - targets_.first) % options_.checkpoint_every == 0;
+  if (now_and_then || frame == targets_.frames.back()) write_probes(frame);
+  if (frame == targets_.first || frame == plan_.simulation.from) {
     progress_.not_needed(Step::simulate, frame);  // a state that was there costs no time
   }
 }
 
 /// Whole every time, and so only with the checkpoints and at the end.
 void Executor::write_probes(int frame) {
-  if (!decide_probes(wanted_, frame, lookup_).make) return;
+  if (!decide_probes(targets_, frame, maker_.lookup()).make) return;
   std::vector<WrittenFile> files;
   // The records first: a kill in between leaves files that nothing trusts and the next run
   // replaces.
-  for (const std::string& file : probe_files(wanted_)) {
+  for (const std::string& file : probe_files(targets_)) {
     if (manifest_.find(file)) manifest_.drop(file);
   }
-  compute(simulate_arena_, [&] { files = simulation_->write_probes(folder_); });
-  commit(files, probe_step, frame,
-         {keys_.at(size_t(frame - wanted_.first)), wanted_.simulate.parts});
+  runner_.compute(Worker::simulate, [&] { files = simulation_->write_probes(folder_); });
+  runner_.commit(files, probe_record, frame,
+                 {keys_.at(size_t(frame - targets_.first)), targets_.simulate.parts});
 }
 
 void Executor::simulate_frames() {
@@ -318,12 +246,12 @@ void Executor::simulate_frames() {
     kept_work_ = checkpoints_.on_stop(*simulation_, committed_);
   };
   try {
-    const int begin = to_simulate_.empty() ? wanted_.frames.front() : wanted_.first;
+    const int begin = to_simulate_.empty() ? targets_.frames.front() : targets_.first;
     size_t next = 0;
-    for (int frame = begin; frame <= wanted_.frames.back(); ++frame) {
+    for (int frame = begin; frame <= targets_.frames.back(); ++frame) {
       if (stopping()) break;
       if (to_simulate_.contains(frame)) produce(frame);
-      if (next >= wanted_.frames.size() || wanted_.frames[next] != frame) continue;
+      if (next >= targets_.frames.size() || targets_.frames[next] != frame) continue;
       ++next;
       if (!to_mesh_.push(frame)) break;
     }
@@ -335,189 +263,99 @@ void Executor::simulate_frames() {
   to_mesh_.finish();
 }
 
-// ---- mesh and render ----
+// ---- what the rules make ----
 
-/// Whether the mesh of the frame before is that of this one: of the same bytes, with nothing around
-/// that moves.
-bool Executor::is_held(int frame) const {
-  if (wanted_.obstacles_move || frame == wanted_.first) return false;
-  const std::vector<std::string> now = simulated_files(wanted_, frame),
-                                 before = simulated_files(wanted_, frame - 1);
-  for (size_t k = 0; k < now.size(); ++k) {
-    const auto file = manifest_.find(now[k]), earlier = manifest_.find(before[k]);
-    if (!file || !earlier || file->digest != earlier->digest) return false;
+/// Rules that this run may carry out, in order.
+std::vector<const Rule*> Executor::rules_of(Worker worker) const {
+  std::vector<const Rule*> found;
+  for (const Rule& rule : rules())
+    if (worker_of(rule.step) == worker && is_active(rule, targets_)) found.push_back(&rule);
+  return found;
+}
+
+/// What a rule makes as soon as the steps before it are done with a frame.
+void Executor::make_due(const Rule& rule, int frame) {
+  switch (rule.frames) {
+    case Frames::delivered:
+      return maker_.make(rule, frame);
+    case Frames::from_first:
+      return make_up_to(rule, frame);
+    case Frames::with_neighbours:
+      return make_beside(rule, frame);
+    case Frames::once:
+      return;
   }
-  const std::optional<Decision> decision = decide_mesh(wanted_, frame - 1, lookup_);
-  return decision && !decision->make;
 }
 
-StageReport Executor::held_mesh(int frame) {
-  StageReport report;
-  const std::vector<std::string> files = mesh_files(wanted_, frame),
-                                 before = mesh_files(wanted_, frame - 1);
-  for (size_t k = 0; k < files.size(); ++k) {
-    report.files.push_back(
-        write_file_whole(folder_ / files[k], checked_bytes(folder_, manifest_, before[k])));
+/// In order, whichever frames are asked for.
+void Executor::make_up_to(const Rule& rule, int frame) {
+  for (int& next = reached_[size_t(rule.step)].next; next <= frame && !stopping(); ++next)
+    maker_.make(rule, next);
+}
+
+/// Frames delivered that waited for this one and for no other.
+void Executor::make_beside(const Rule& rule, int frame) {
+  Reached& reached = reached_[size_t(rule.step)];
+  std::vector<int> due;
+  {
+    const std::scoped_lock lock(neighbours_mutex_);
+    reached.ready.insert(frame);
+    for (const Input& input : rule.inputs)
+      for (const int near : possible_frames(rule, input, targets_, frame))
+        if (targets_.includes(near) && neighbours_are_made(rule, near) &&
+            reached.started.insert(near).second)
+          due.push_back(near);
   }
-  report.line = fmt::format("as frame {}", frame - 1);
-  report.json = fmt::format("{{\"held\":{}}}", frame - 1);
-  return report;
+  for (const int near : due) {
+    if (stopping()) return;
+    maker_.make(rule, near);
+  }
 }
 
-void Executor::make_mesh(int frame) {
-  const std::optional<Decision> decision = decide_mesh(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the caches of frame {} are missing", frame), "");
-  if (!decision->make) return progress_.not_needed(Step::mesh, frame);
-  const Clock::time_point start = Clock::now();
-  StageReport report;
-  compute_from(simulated_files(wanted_, frame), mesh_arena_,
-               [&] { report = is_held(frame) ? held_mesh(frame) : stages_.mesh(folder_, frame); });
-  commit(report.files, step_name(Step::mesh), frame, decision->key);
-  finished(Step::mesh, frame, start, report);
+/// Whether nothing of this run can change what a frame that it delivers is made from.
+bool Executor::neighbours_are_made(const Rule& rule, int frame) const {
+  const std::set<int>& ready = reached_[size_t(rule.step)].ready;
+  for (const Input& input : rule.inputs)
+    for (const int near : possible_frames(rule, input, targets_, frame)) {
+      if (targets_.includes(near) && !ready.contains(near)) return false;
+      if (targets_.includes(near)) continue;
+      // Whether one that is not delivered may be used is known when all its caches are made.
+      for (const std::string& file : input.files(targets_, near))
+        if (manifest_.find(file)) return false;
+    }
+  return true;
 }
 
-void Executor::make_foam(int frame) {
-  const std::optional<Decision> decision = decide_foam(wanted_, frame, lookup_);
-  if (!decision)
-    throw PlanAgain(fmt::format("what the foam of frame {} is made of is missing", frame), "");
-  if (!decision->make) return progress_.not_needed(Step::foam, frame);
-  const Clock::time_point start = Clock::now();
-  StageReport report;
-  compute_from(foam_inputs(wanted_, frame), mesh_arena_,
-               [&] { report = stages_.foam(folder_, frame); });
-  commit(report.files, step_name(Step::foam), frame, decision->key);
-  finished(Step::foam, frame, start, report);
+/// Once all that it reads is made: frames at the ends of what is delivered, and beside it.
+void Executor::make_rest(const Rule& rule) {
+  if (rule.frames != Frames::with_neighbours) return;
+  for (const int frame : frames_of(rule, targets_, maker_.lookup())) {
+    if (stopping()) return;
+    if (reached_[size_t(rule.step)].started.insert(frame).second) maker_.make(rule, frame);
+  }
+}
+
+bool Executor::is_planned(const Rule& rule) const {
+  return std::any_of(plan_.tasks.begin(), plan_.tasks.end(), [&](const Task& task) {
+    return task.step == rule.step && task.action != Action::skip;
+  });
 }
 
 void Executor::mesh_frames() {
+  const std::vector<const Rule*> active = rules_of(Worker::mesh);
   while (const std::optional<int> frame = to_mesh_.pop()) {
-    if (wanted_.may(Step::mesh) && wanted_.fluid) make_mesh(*frame);
-    for (; wanted_.may(Step::foam) && wanted_.has_foam && next_foam_ <= *frame; ++next_foam_) {
-      if (stopping()) return;
-      make_foam(next_foam_);
-    }
-    if (!to_render_.push(*frame)) return;
+    for (const Rule* rule : active) make_due(*rule, *frame);
+    if (stopping() || !to_render_.push(*frame)) return;
   }
   to_render_.finish();
 }
 
-Attributes Executor::attributes_of(int frame, const Key& key) const {
-  // Only what the key covers: equal inputs give equal files.
-  Attributes attributes{{"shot", wanted_.shot},
-                        {"frame", std::to_string(frame)},
-                        {"version", std::string(build_id::version)},
-                        {"key.render", key.digest.hex()}};
-  for (const std::string& file : render_inputs(wanted_, frame)) {
-    if (const auto record = manifest_.find(file)) {
-      attributes.emplace_back(fmt::format("key.{}", file), record->digest.hex());
-    }
-  }
-  return attributes;
-}
-
-void Executor::make_image(int frame) {
-  const std::optional<Decision> decision = decide_render(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the meshes of frame {} are missing", frame), "");
-  if (!decision->make) return progress_.not_needed(Step::render, frame);
-  const Clock::time_point start = Clock::now();
-  StageReport report;
-  const auto share = [&](double finished) {
-    if (stopping()) throw Stopped("stopped while rendering");
-    progress_.share(Step::render, frame, finished);
-  };
-  compute_from(render_inputs(wanted_, frame), render_arena_, [&] {
-    report = stages_.render(folder_, frame, attributes_of(frame, decision->key), share);
-  });
-  commit(report.files, step_name(Step::render), frame, decision->key);
-  finished(Step::render, frame, start, report);
-}
-
 void Executor::render_frames() {
-  const bool denoises = wanted_.may(Step::render) && wanted_.denoised_later;
-  while (const std::optional<int> frame = to_render_.pop()) {
-    if (!wanted_.may(Step::render)) continue;
-    make_image(*frame);
-    if (denoises) denoise_beside(*frame);
-  }
-  if (--renderers_ == 0 && denoises && !stopping()) denoise_rest();
-}
-
-/// Whether nothing of this run can change what a wanted frame is denoised by.
-bool Executor::neighbours_are_rendered(int frame) const {
-  for (int k = -wanted_.denoise_frames; k <= wanted_.denoise_frames; ++k) {
-    const int near = frame + k;
-    // Whether one that is not wanted may be used is known when all its caches are made.
-    if (wanted_.wants(near) ? !rendered_.contains(near)
-                            : manifest_.find(layout::noisy(wanted_.shot, near)).has_value())
-      return false;
-  }
-  return true;
-}
-
-/// Denoises the frames that waited for this one and for no other.
-void Executor::denoise_beside(int frame) {
-  std::vector<int> ready;
-  {
-    const std::scoped_lock lock(denoise_mutex_);
-    rendered_.insert(frame);
-    for (int k = -wanted_.denoise_frames; k <= wanted_.denoise_frames; ++k) {
-      const int near = frame + k;
-      if (wanted_.wants(near) && neighbours_are_rendered(near) && denoised_.insert(near).second)
-        ready.push_back(near);
-    }
-  }
-  for (const int near : ready) {
-    if (stopping()) return;
-    make_denoised(near);
-  }
-}
-
-/// Once all frames are rendered: those at the ends of what is wanted.
-void Executor::denoise_rest() {
-  for (const int frame : denoised_frames(wanted_, lookup_)) {
-    if (stopping()) return;
-    if (denoised_.insert(frame).second) make_denoised(frame);
-  }
-}
-
-void Executor::make_denoised(int frame) {
-  const std::optional<Decision> decision = decide_denoise(wanted_, frame, lookup_);
-  if (!decision) throw PlanAgain(fmt::format("the noisy frame {} is missing", frame), "");
-  if (!decision->make) return progress_.not_needed(Step::denoise, frame);
-  const Clock::time_point start = Clock::now();
-  const NoisyFiles noisy = denoise_inputs(wanted_, frame, lookup_);
-  Attributes attributes{{"key.denoise", decision->key.digest.hex()}};
-  for (const std::string& file : noisy.all()) {
-    const std::optional<Record> record = manifest_.find(file);
-    if (record)
-      attributes.emplace_back(fmt::format("key.noisy.{}", record->frame), record->digest.hex());
-  }
-  StageReport report;
-  compute_from(noisy.all(), render_arena_,
-               [&] { report = stages_.denoise(folder_, frame, noisy, attributes); });
-  commit(report.files, step_name(Step::denoise), frame, decision->key);
-  finished(Step::denoise, frame, start, report);
-}
-
-void Executor::make_dailies(Step step) {
-  if (!wanted_.may(step)) return;
-  const auto planned = std::find_if(plan_.tasks.begin(), plan_.tasks.end(),
-                                    [&](const Task& task) { return task.step == step; });
-  if (planned == plan_.tasks.end() || planned->action == Action::skip) return;
-  const std::optional<Decision> decision = decide_dailies(wanted_, step, lookup_);
-  if (!decision) throw PlanAgain("a rendered frame is missing", "");
-  if (!decision->make) return progress_.not_needed(step, 0);
-  const Clock::time_point start = Clock::now();
-  std::vector<std::string> images;
-  for (const int frame : wanted_.frames) images.push_back(layout::image(wanted_.shot, frame));
-  StageReport report;
-  compute_from(images, render_arena_, [&] {
-    report = step == Step::movie
-                 ? stages_.movie(folder_, wanted_.frames, [this] { return !stopping(); })
-                 : stages_.contact_sheet(folder_, wanted_.frames);
-  });
-  commit(report.files, step_name(step), 0, decision->key);
-  finished(step, 0, start, report);
+  const std::vector<const Rule*> active = rules_of(Worker::render);
+  while (const std::optional<int> frame = to_render_.pop())
+    for (const Rule* rule : active) make_due(*rule, *frame);
+  if (--renderers_ > 0 || stopping()) return;
+  for (const Rule* rule : active) make_rest(*rule);
 }
 
 // ---- all together ----
@@ -567,10 +405,8 @@ void Executor::run() {
   for (int k = 0; k < at_once; ++k) start(threads, &Executor::render_frames);
   watch();
   for (std::thread& thread : threads) thread.join();
-  if (!stopping()) {
-    make_dailies(Step::contact_sheet);
-    if (!stopping()) make_dailies(Step::movie);
-  }
+  for (const Rule* rule : rules_of(Worker::last))
+    if (!stopping() && is_planned(*rule)) maker_.make(*rule, 0);
   progress_.finish();
   if (error_) std::rethrow_exception(error_);
   if (over_memory_ > 0) throw Error(memory_message());
@@ -587,9 +423,9 @@ std::string Executor::memory_message() const {
 
 }  // namespace
 
-void execute(const Wanted& wanted, const Plan& plan, const fs::path& folder, Manifest& manifest,
+void execute(const Targets& targets, const Plan& plan, const fs::path& folder, Manifest& manifest,
              Stages& stages, Progress& progress, const ExecuteOptions& options) {
-  Executor(wanted, plan, folder, manifest, stages, progress, options).run();
+  Executor(targets, plan, folder, manifest, stages, progress, options).run();
 }
 
 }  // namespace drench

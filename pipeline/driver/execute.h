@@ -22,11 +22,12 @@ struct ExecuteOptions {
   std::function<void()> abandon;  // called when that is over; everything committed is safe
 };
 
-/// Brings the folder to what is wanted.
+/// Brings the folder to its targets.
 /// @param manifest  open for append, the folder's lock held.
-/// @throws Stopped after a stop request; PlanAgain; Error of a stage or when memory or threads are
+/// @throws Stopped after a stop request; DamagedInput; Error of a stage or when memory or threads
+/// are
 ///         short. The simulation wrote a checkpoint before if it had work to lose.
-void execute(const Wanted& wanted, const Plan& plan, const std::filesystem::path& folder,
+void execute(const Targets& targets, const Plan& plan, const std::filesystem::path& folder,
              Manifest& manifest, Stages& stages, Progress& progress, const ExecuteOptions& options);
 
 }  // namespace drench

@@ -16,15 +16,15 @@ namespace drench {
 
 /// A file that should have been there is missing or damaged. Its record is dropped already: plan
 /// again.
-class PlanAgain : public std::runtime_error {
+class DamagedInput : public std::runtime_error {
  public:
   /// @param file  whose record was dropped; empty if none was.
-  PlanAgain(const std::string& text, std::string dropped)
+  DamagedInput(const std::string& text, std::string dropped)
       : std::runtime_error(text), file(std::move(dropped)) {}
   std::string file;
 };
 
-/// @throws PlanAgain if the file has another digest than recorded, or no record; Error if that
+/// @throws DamagedInput if the file has another digest than recorded, or no record; Error if that
 /// cannot be found out (state_by_digest).
 void check_input(const std::filesystem::path& folder, Manifest& manifest, const std::string& file);
 
@@ -34,27 +34,23 @@ std::string checked_bytes(const std::filesystem::path& folder, Manifest& manifes
 
 /// For a stage that failed: drops the first of its inputs that cannot be read. Returns if all can.
 /// @param why_unreadable  the reason for a path, empty if the file can be read.
-/// @throws PlanAgain
+/// @throws DamagedInput
 void drop_unreadable(
-    const std::filesystem::path& folder, Manifest& manifest, const std::vector<std::string>& files,
+    const std::filesystem::path& folder, Manifest& manifest, const std::vector<InputFile>& files,
     const std::function<std::string(const std::filesystem::path&)>& why_unreadable);
-
-/// Recorded files that the tasks of a plan read.
-std::vector<std::string> inputs_of(const Wanted& wanted, const Plan& plan,
-                                   const Manifest& manifest);
 
 /// Ends what keeps planning again without getting further, which files would do that are damaged
 /// whenever they were made, and finds further damage at once instead of file by file.
-class Again {
+class Retries {
  public:
-  Again(std::filesystem::path folder, Manifest& manifest)
+  Retries(std::filesystem::path folder, Manifest& manifest)
       : folder_(std::move(folder)), manifest_(manifest) {}
 
   /// Takes note of what was found. @throws Error when the same was found too often.
-  void found(const PlanAgain& found);
+  void count(const DamagedInput& found);
   /// After the first find: hashes what the plan reads and was not hashed yet, and drops the records
   /// of what is damaged. @return whether there was any, so that the plan no longer holds.
-  bool drops_inputs_of(const Wanted& wanted, const Plan& plan);
+  bool drop_damaged_inputs(const Targets& targets, const Plan& plan);
 
  private:
   const std::filesystem::path folder_;

@@ -1,6 +1,7 @@
 #pragma once
 // Names inside an output folder, relative to it.
 
+#include <array>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,10 @@ inline constexpr std::string_view lock = ".lock";
 inline constexpr std::string_view shot_lock = "shot.lock.toml";
 inline constexpr std::string_view contact_sheet = "contact_sheet.png";
 inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
+
+/// All that files are written into; "" is the output folder itself.
+inline constexpr auto folders =
+    std::to_array<std::string_view>({"", "sim", "sim/checkpoint", "mesh", "render", "noisy"});
 
 std::string particles(int frame);                               // sim/particles.1001.vdb
 std::string cloth(const std::string& name, int frame);          // sim/cloth.flag.1001.ply

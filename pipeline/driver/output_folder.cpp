@@ -185,9 +185,8 @@ void remove_frame_samples(const fs::path& folder) {
 
 void remove_leftovers(const fs::path& folder) {
   int removed = 0;
-  for (const char* part : {"", "sim", "sim/checkpoint", "mesh", "render", "noisy"}) {
+  for (const std::string_view part : layout::folders)
     removed += remove_stale_temporaries(folder / part);
-  }
   if (removed > 0) log_verbose("driver", fmt::format("removed {} half-written files", removed));
 }
 

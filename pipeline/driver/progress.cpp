@@ -22,8 +22,6 @@ std::string clock_text(double seconds) {
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
-bool is_framed(Step step) { return step != Step::contact_sheet && step != Step::movie; }
-
 std::string_view log_part(Step step) { return step == Step::simulate ? "sim" : step_name(step); }
 
 }  // namespace
@@ -62,7 +60,7 @@ void Progress::done(Step step, int frame, double seconds, std::string_view line)
   }
   if (style_ != ProgressStyle::lines) return;
   log_info(log_part(step),
-           fmt::format("{}{}{}ms={:.0f}", is_framed(step) ? fmt::format("frame={} ", frame) : "",
+           fmt::format("{}{}{}ms={:.0f}", is_per_frame(step) ? fmt::format("frame={} ", frame) : "",
                        line, line.empty() ? "" : " ", seconds * 1000));
 }
 
@@ -100,7 +98,7 @@ std::string Progress::text() const {
       const double at_once = std::max<double>(1, double(count.share.size()));
       left = std::max(left, (count.planned - finished) * count.seconds / (count.ran * at_once));
     }
-    if (count.ran > 0 && is_framed(step)) frames = count.ran;  // of the last stage at work
+    if (count.ran > 0 && is_per_frame(step)) frames = count.ran;  // of the last stage at work
   }
   const double share = planned > 0 ? done / planned : 1;
   constexpr int width = 20;

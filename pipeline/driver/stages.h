@@ -11,7 +11,6 @@
 
 #include "pipeline/contract/files/files.h"
 #include "pipeline/contract/shot/shot.h"
-#include "pipeline/driver/plan.h"
 #include "sim/simulator.h"
 
 namespace drench {
@@ -31,13 +30,20 @@ class Simulation {
   /// To the first frame, before it is written; nothing to do after read_checkpoint. @throws as
   /// advance.
   virtual void preroll(const std::function<bool()>& keep_going) = 0;
-  /// To the next frame. @throws Stopped when keep_going says so; Error on blow-up.
+  /// To the next frame. @throws Stopped when keep_going says so; BlowUp.
   virtual StageReport advance(const std::function<bool()>& keep_going) = 0;
   virtual std::vector<WrittenFile> write_frame(const std::filesystem::path& folder) const = 0;
   /// The probes' files, whole, with every step so far; a shot without probes has none.
   virtual std::vector<WrittenFile> write_probes(const std::filesystem::path&) const { return {}; }
   virtual WrittenFile write_checkpoint(const std::filesystem::path& file) const = 0;
   virtual void read_checkpoint(const std::filesystem::path& file) = 0;
+};
+
+/// Names of noisy frames: the one to denoise, and those beside it, the nearest first.
+struct NoisyFiles {
+  std::string frame;
+  std::vector<std::string> before, after;
+  std::vector<std::string> all() const;
 };
 
 using Attributes = std::vector<std::pair<std::string, std::string>>;

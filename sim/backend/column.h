@@ -59,7 +59,8 @@ class Column {
   void clear_bytes(int byte) {
     if (size_) check_cuda(cudaMemsetAsync(data_, byte, size_ * sizeof(T)), "clearing");
   }
-  T* data() const { return data_; }
+  T* data() { return data_; }
+  const T* data() const { return data_; }
   size_t size() const { return size_; }
   size_t capacity() const { return capacity_; }  // elements that memory is held for
   void swap(Column& other) noexcept {
@@ -93,7 +94,8 @@ class Column {
   void clear_bytes(int byte) {
     if (!data_.empty()) std::memset(data_.data(), byte, data_.size() * sizeof(T));
   }
-  T* data() const { return const_cast<T*>(data_.data()); }
+  T* data() { return data_.data(); }
+  const T* data() const { return data_.data(); }
   size_t size() const { return size_; }
   size_t capacity() const { return data_.capacity(); }
   void swap(Column& other) noexcept { data_.swap(other.data_), std::swap(size_, other.size_); }
@@ -113,14 +115,14 @@ std::vector<T> to_host(const Column<T>& column, size_t size) {
 }
 /// One value, read back.
 template <class T>
-T value_at(const Column<T>& column, size_t place) {
+T value_at(const Column<T>& column, size_t index) {
 #if defined(__CUDACC__)
   T value;
-  check_cuda(cudaMemcpy(&value, column.data() + place, sizeof(T), cudaMemcpyDeviceToHost),
+  check_cuda(cudaMemcpy(&value, column.data() + index, sizeof(T), cudaMemcpyDeviceToHost),
              "reading back");
   return value;
 #else
-  return column.data()[place];
+  return column.data()[index];
 #endif
 }
 template <class T>

@@ -47,15 +47,26 @@ DRENCH_HD T decay(T x) {
   return e * e;
 }
 
-/// Three columns read and written as one vector. A view: it does not own them.
-struct VecView {
-  float *x, *y, *z;
+/// Three columns read as one vector. A view: it does not own them.
+struct ConstVecView {
+  const float *x, *y, *z;
   DRENCH_HD Vec3<float> operator[](int i) const { return {x[i], y[i], z[i]}; }
-  DRENCH_HD void set(int i, Vec3<float> a) const { x[i] = a.x, y[i] = a.y, z[i] = a.z; }
   /// The same for an index of any kind: int, eight consecutive, eight arbitrary.
   template <class Index>
   DRENCH_HD auto at(Index i) const {
     return Vec3<decltype(load(x, i))>{load(x, i), load(y, i), load(z, i)};
+  }
+};
+
+/// Three columns that are written, too.
+struct VecView {
+  float *x, *y, *z;
+  DRENCH_HD operator ConstVecView() const { return {x, y, z}; }
+  DRENCH_HD Vec3<float> operator[](int i) const { return {x[i], y[i], z[i]}; }
+  DRENCH_HD void set(int i, Vec3<float> a) const { x[i] = a.x, y[i] = a.y, z[i] = a.z; }
+  template <class Index>
+  DRENCH_HD auto at(Index i) const {
+    return ConstVecView(*this).at(i);
   }
   template <class Index, class T>
   DRENCH_HD void put(Index i, Vec3<T> a) const {

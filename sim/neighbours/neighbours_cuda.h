@@ -1,5 +1,5 @@
 #pragma once
-// Neighbour lists on the GPU: see neighbours.h. Counted, scanned and filled; a thread walks the
+// Neighbour lists on the GPU: see neighbours.h. Counted, scanned and filled; a thread traverses the
 // list of its particle.
 
 namespace drench::sim::cuda {
@@ -7,7 +7,7 @@ namespace drench::sim::cuda {
 /// Calls visit(j, squared distance) for all neighbours of particle i within h, in the order of
 /// cells.
 template <class Filter, class Visit>
-__device__ void for_each_within(const GridView& grid, const VecView& position, int i, float h,
+__device__ void for_each_within(const GridView& grid, const ConstVecView& position, int i, float h,
                                 const Filter& filter, const Visit& visit) {
   const GridShape& g = grid.shape;
   const Vec3<float> p = position[i];
@@ -28,7 +28,7 @@ __device__ void for_each_within(const GridView& grid, const VecView& position, i
 }
 
 template <class Kernel, class Density, class Filter = NoFilter>
-void build_neighbour_lists(const GridView& grid, int n, const VecView& position, float h,
+void build_neighbour_lists(const GridView& grid, int n, const ConstVecView& position, float h,
                            NeighbourLists& lists, SortScratch& scratch, const Density& density,
                            const Filter& filter = {}) {
   lists.begin.resize(size_t(n) + 1), lists.blocks.resize(n);

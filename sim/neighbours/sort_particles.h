@@ -8,83 +8,9 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-inline void permute(Column<float>& column, Column<float>& spare, const int* order, int n) {
-  const float* from = column.data();
-  float* to = spare.data();
-  parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
-  column.swap(spare);
-}
-inline void permute(Column<int>& column, Column<int>& spare, const int* order, int n) {
-  const int* from = column.data();
-  int* to = spare.data();
-  parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
-  column.swap(spare);
-}
-inline void permute(VecColumn& column, Column<float>& spare, const int* order, int n) {
-  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, spare, order, n);
-}
-
 /// Cells of all particles, their order by cell and where cells begin.
-inline void sort_by_cell(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  const int n = f.count;
-  const VecView x = f.position.view();
-  // Past an open side of the domain by more than a support a particle is lost: it sorts behind all,
-  // and the grid ends there, however far it flies.
-  float low[3], high[3];
-  for (int k = 0; k < 3; ++k)
-    low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
-  const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
-  Bounds box = bounds_of_points("fluid bounds", x, n);
-  const auto clamped = [&](Vec3<float> q) {
-    return Vec3<float>{minimum(maximum(q.x, low[0]), high[0]),
-                       minimum(maximum(q.y, low[1]), high[1]),
-                       minimum(maximum(q.z, low[2]), high[2])};
-  };
-  box = {clamped(box.low), clamped(box.high)};
-  const Vec3<float> period = periods_of(p);
-  if (period.x > 0.f) box.low.x = p.low[0];
-  if (period.y > 0.f) box.low.y = p.low[1];
-  if (period.z > 0.f) box.low.z = p.low[2];
-  f.grid = make_grid_shape(box.low, box.high, p.support_radius, period);
-  const GridShape grid = f.grid;
-  const int lost = grid.cells(), sinks = state.sinks.count;
-  int* cell = f.cell.data();
-  parallel_for(
-      "fluid cells", n, DRENCH_LAMBDA(int i) {
-        const Vec3<float> q = x[i];
-        const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
-                            q.z >= lower.z && q.z <= upper.z;
-        cell[i] = inside ? grid.cell(q) : lost + sinks;
-      });
-  if (state.sinks.count > 0) mark_drained(state, lost);
-  stable_sort_keys(f.cell, n, lost + state.sinks.count, f.order, f.cell_start, state.scratch);
-}
+void sort_by_cell(State& state);
 
-inline void sort_particles(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  const int n = f.count;
-  sort_by_cell(state);
-  const int* order = f.order.data();
-  // Their cells are of no use any more: the columns of integers are permuted into that.
-  permute(f.position, state.swap_float, order, n);
-  permute(f.velocity, state.swap_float, order, n);
-  permute(f.id, f.cell, order, n);
-  if (p.incompressible) permute(f.pressure_term, state.swap_float, order, n);
-  if (f.memory_triangle.size()) {
-    if (p.incompressible) permute(f.start, state.swap_float, order, n);
-    permute(f.memory_triangle, f.cell, order, n);
-    permute(f.memory_side, f.cell, order, n);
-    permute(f.owed, state.swap_float, order, n);
-    permute(f.far_by, state.swap_float, order, n);
-  }
-  bool open = false;
-  for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];
-  if (open || state.sinks.count > 0) drop_removed(state);
-}
+void sort_particles(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -172,7 +172,7 @@ TEST(DenoiseStep, OfNoFramesIsNone) {
   make_ranges(folder, {{}}, 0);
   const ToySettings settings = neighbourly({}, 0);
   const Manifest manifest(folder.path() / layout::manifest);
-  const Plan plan = make_plan(toy_wanted(settings), take_snapshot(folder.path(), manifest), 6);
+  const Plan plan = make_plan(toy_targets(settings), take_snapshot(folder.path(), manifest), 6);
   EXPECT_TRUE(plan.nothing_to_do());
   EXPECT_EQ(plan.beyond.size(), 6u);  // noisy frames, for `drench clean`
 }

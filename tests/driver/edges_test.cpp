@@ -14,6 +14,7 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "pipeline/driver/output_folder.h"
+#include "pipeline/driver/step.h"
 #include "tests/driver/tiny_shot.h"
 
 namespace drench {
@@ -342,7 +343,7 @@ TEST(Edges, ForgedRecordsAreDroppedAndHarmNothing) {
   EXPECT_TRUE(verified.code == done || verified.code == user_error) << verified.err;
   // A record of a probe that names a frame of the year 200,000.
   for (const auto& [file, record] : Manifest(shot.out() / layout::manifest).records()) {
-    if (record.step != "probe") continue;
+    if (record.step != probe_record) continue;
     Manifest manifest(shot.out() / layout::manifest);
     manifest.open_for_append();
     Record later = record;

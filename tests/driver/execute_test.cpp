@@ -19,6 +19,7 @@ using test::digests_in;
 using test::Event;
 using test::flip_bit_quietly;
 using test::make_toy;
+using test::Mark;
 using test::TemporaryFolder;
 using test::ToySettings;
 using test::ToyStages;
@@ -36,9 +37,9 @@ std::map<std::string, std::string> undisturbed(const ToySettings& settings) {
   return digests_in(folder.path());
 }
 
-size_t position(const std::vector<Event>& events, Step step, int frame, bool begin) {
+size_t position(const std::vector<Event>& events, Step step, int frame, Mark mark) {
   const auto found = std::find_if(events.begin(), events.end(), [&](const Event& event) {
-    return event.step == step && event.frame == frame && event.begin == begin;
+    return event.step == step && event.frame == frame && event.mark == mark;
   });
   return size_t(found - events.begin());
 }
@@ -53,10 +54,10 @@ TEST(Execute, MakesEveryFileOnceInTheOrderOfItsInputs) {
   EXPECT_EQ(stages.count(Step::contact_sheet), 1);
   const std::vector<Event> events = stages.events();
   for (int frame = 2; frame <= 25; ++frame) {
-    EXPECT_LT(position(events, Step::simulate, frame, false),
-              position(events, Step::mesh, frame, true));
-    EXPECT_LT(position(events, Step::mesh, frame, false),
-              position(events, Step::render, frame, true));
+    EXPECT_LT(position(events, Step::simulate, frame, Mark::end),
+              position(events, Step::mesh, frame, Mark::begin));
+    EXPECT_LT(position(events, Step::mesh, frame, Mark::end),
+              position(events, Step::render, frame, Mark::begin));
   }
   EXPECT_EQ(events.back().step, Step::contact_sheet);
 }
@@ -72,7 +73,7 @@ TEST(Execute, MeshesAndRendersWhileItSimulates) {
     if (step != Step::simulate || frame != 5) return;
     for (int k = 0; k < 2000 && !overlapped; ++k) {
       const std::vector<Event> events = stages.events();
-      overlapped = position(events, Step::render, 1, false) < events.size();
+      overlapped = position(events, Step::render, 1, Mark::end) < events.size();
       std::this_thread::sleep_for(10ms);
     }
   };
@@ -84,7 +85,7 @@ TEST(Execute, MeshesAndRendersWhileItSimulates) {
 int most_at_once(const std::vector<Event>& events, Step step) {
   int now = 0, most = 0;
   for (const Event& event : events)
-    if (event.step == step) most = std::max(most, now += event.begin ? 1 : -1);
+    if (event.step == step) most = std::max(most, now += event.mark == Mark::begin ? 1 : -1);
   return most;
 }
 
@@ -121,8 +122,8 @@ TEST(Execute, NeverRunsMoreThanTwoQueuedFramesAhead) {
   make_toy(settings, stages, folder.path());
   int simulated = 1, meshed = 0, most = 0;
   for (const Event& event : stages.events()) {
-    if (event.step == Step::simulate && event.begin) simulated = event.frame;
-    if (event.step == Step::mesh && event.begin) meshed = event.frame;
+    if (event.step == Step::simulate && event.mark == Mark::begin) simulated = event.frame;
+    if (event.step == Step::mesh && event.mark == Mark::begin) meshed = event.frame;
     most = std::max(most, simulated - meshed);
   }
   EXPECT_LE(most, 5);

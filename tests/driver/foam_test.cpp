@@ -9,6 +9,7 @@
 #include "pipeline/contract/files/mesh_file.h"
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/shot/shot_file.h"
+#include "pipeline/driver/plan_text.h"
 #include "surfacing/foam.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/driver/folder.h"
@@ -22,6 +23,7 @@ using test::digests_in;
 using test::Event;
 using test::flip_bit_quietly;
 using test::make_toy;
+using test::Mark;
 using test::TemporaryFolder;
 using test::TinyShot;
 using test::ToySettings;
@@ -56,15 +58,15 @@ TEST(FoamSteps, ComeInOrderAfterTheirFluidAndBeforeTheirPictures) {
   const Made stages(foamy(), folder);
   EXPECT_EQ(stages.frames(Step::foam), range(1, 25));
   const std::vector<Event> events = stages.events();
-  const auto at = [&](Step step, int frame, bool begin) {
+  const auto at = [&](Step step, int frame, Mark mark) {
     return std::find_if(events.begin(), events.end(), [&](const Event& e) {
-      return e.step == step && e.frame == frame && e.begin == begin;
+      return e.step == step && e.frame == frame && e.mark == mark;
     });
   };
   for (int frame = 2; frame <= 25; ++frame) {
-    EXPECT_LT(at(Step::simulate, frame, false), at(Step::foam, frame, true));
-    EXPECT_LT(at(Step::foam, frame - 1, false), at(Step::foam, frame, true));
-    EXPECT_LT(at(Step::foam, frame, false), at(Step::render, frame, true));
+    EXPECT_LT(at(Step::simulate, frame, Mark::end), at(Step::foam, frame, Mark::begin));
+    EXPECT_LT(at(Step::foam, frame - 1, Mark::end), at(Step::foam, frame, Mark::begin));
+    EXPECT_LT(at(Step::foam, frame, Mark::end), at(Step::render, frame, Mark::begin));
   }
   const Made again(foamy(), folder);
   EXPECT_TRUE(again.events().empty());
@@ -195,25 +197,27 @@ TEST(FoamOfAShot, StopsAtMeshes) {
   }
 }
 
-Wanted wanted_of(const TinyShot& shot, const std::vector<std::string>& set) {
-  return want(read_shot(shot.file(), {.set = set}), {1001, 1002},
-              {Step::simulate, Step::mesh, Step::foam, Step::render}, "cpu");
+Targets targets_of_shot(const TinyShot& shot, const std::vector<std::string>& set) {
+  return targets_of(read_shot(shot.file(), {.set = set}), {1001, 1002},
+                    {Step::simulate, Step::mesh, Step::foam, Step::render}, "cpu");
 }
 
 TEST(FoamOfAShot, ChangesNoKeyWhileItIsOff) {
   const TinyShot shot;
-  const Wanted plain = wanted_of(shot, {});
-  const Wanted off = wanted_of(shot, {"foam.lifetime=7", "foam.radius=0.5"});
-  const Wanted on = wanted_of(shot, {"foam.present=true"});
+  const Targets plain = targets_of_shot(shot, {});
+  const Targets off = targets_of_shot(shot, {"foam.lifetime=7", "foam.radius=0.5"});
+  const Targets on = targets_of_shot(shot, {"foam.present=true"});
   EXPECT_FALSE(off.has_foam);
   EXPECT_TRUE(on.has_foam);
-  for (const Wanted& other : {off, on}) {
+  for (const Targets& other : {off, on}) {
     EXPECT_EQ(plain.simulate.digest, other.simulate.digest);
     EXPECT_EQ(plain.mesh.digest, other.mesh.digest);
     EXPECT_EQ(plain.render.digest, other.render.digest);
   }
-  EXPECT_EQ(render_inputs(plain, 1001), render_inputs(off, 1001));
-  EXPECT_NE(render_inputs(plain, 1001), render_inputs(on, 1001));
+  EXPECT_EQ(possible_inputs(rule_of(Step::render), plain, 1001),
+            possible_inputs(rule_of(Step::render), off, 1001));
+  EXPECT_NE(possible_inputs(rule_of(Step::render), plain, 1001),
+            possible_inputs(rule_of(Step::render), on, 1001));
   EXPECT_EQ(plan_text(make_plan(plain, {}, 1012)), plan_text(make_plan(off, {}, 1012)));
   EXPECT_EQ(plan_text(make_plan(plain, {}, 1012)).find("foam"), std::string::npos);
 }
@@ -221,7 +225,7 @@ TEST(FoamOfAShot, ChangesNoKeyWhileItIsOff) {
 TEST(FoamOfAShot, HasAKeyThatFollowsWallsAndGravityButNoProbe) {
   const TinyShot shot;
   const auto key = [&](const std::string& change) {
-    return wanted_of(shot, {"foam.present=true", change}).foam.digest;
+    return targets_of_shot(shot, {"foam.present=true", change}).foam.digest;
   };
   const Digest plain = key("foam.present=true");
   EXPECT_NE(key("shot.gravity=[0,-5,0]"), plain);

@@ -11,7 +11,7 @@
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/shot_file.h"
-#include "pipeline/driver/wanted.h"
+#include "pipeline/driver/keys.h"
 #include "sim/passes/obstacle/obstacle_view.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
@@ -140,7 +140,7 @@ TEST(MeshObstacle, OfASequenceDependsOnItsFrameAndTheFirst) {
   Shot shot = falling_on(swelling_ball(folder, [](int) { return 0.05; }));
   shot.timeline = {1001, 1013, 24};
   const auto inputs = [&](int frame) {
-    return sequence_inputs(want(shot, {1001}, {Step::mesh}, "cpu"), frame, frame);
+    return sequence_inputs(targets_of(shot, {1001}, {Step::mesh}, "cpu"), frame, frame);
   };
   const InputDigests third = inputs(1003), last = inputs(1013);
   EXPECT_EQ(third, inputs(1003));
@@ -220,7 +220,8 @@ TEST(PlaneObstacle, IsDrawnAnewInAnotherDomain) {
                                         << "\n[[fluid.sphere]]\ncenter = [0, 1, 0]\nradius = 0.1\n"
                                            "[[obstacle]]\nname = \"o\"\ntype = \""
                                         << type << "\"\nposition = [0, 0.1, 0]\n";
-    return want(read_shot(folder / "ball.toml", {}), {1001}, {Step::render}, "cpu").render.digest;
+    return targets_of(read_shot(folder / "ball.toml", {}), {1001}, {Step::render}, "cpu")
+        .render.digest;
   };
   EXPECT_NE(key("plane", "[1, 2, 1]"), key("plane", "[1, 3, 1]"));
   EXPECT_EQ(key("sphere", "[1, 2, 1]"), key("sphere", "[1, 3, 1]"));

@@ -5,12 +5,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/driver/plan_text.h"
 #include "tests/driver/toy_shot.h"
 
 namespace drench {
 namespace {
 
-using test::toy_wanted;
+using test::toy_targets;
 using test::ToySettings;
 
 void put(Snapshot& snapshot, const std::string& file, Step step, int frame, const Key& key,
@@ -34,32 +35,34 @@ Lookup in(const Snapshot& snapshot) {
 
 /// Everything made and intact.
 Snapshot complete(const ToySettings& settings) {
-  const Wanted wanted = toy_wanted(settings);
-  const std::vector<Digest> keys = simulation_keys(wanted, wanted.frames.back());
+  const Targets targets = toy_targets(settings);
+  const std::vector<Digest> keys = simulation_keys(targets, targets.frames.back());
   Snapshot snapshot;
-  for (const int frame : wanted.frames) {
-    const Key key{keys[size_t(frame - wanted.first)], wanted.simulate.parts};
-    for (const std::string& file : simulated_files(wanted, frame)) {
+  for (const int frame : targets.frames) {
+    const Key key{keys[size_t(frame - targets.first)], targets.simulate.parts};
+    for (const std::string& file : simulated_files(targets, frame)) {
       put(snapshot, file, Step::simulate, frame, key, file);
     }
-    if (wanted.fluid) {
+    if (targets.fluid) {
       put(snapshot, layout::fluid_mesh(frame), Step::mesh, frame,
-          decide_mesh(wanted, frame, in(snapshot))->key, "mesh" + std::to_string(frame));
+          decide(rule_of(Step::mesh), targets, frame, in(snapshot))->key,
+          "mesh" + std::to_string(frame));
     }
-    put(snapshot, layout::image(wanted.shot, frame), Step::render, frame,
-        decide_render(wanted, frame, in(snapshot))->key, "image" + std::to_string(frame));
+    put(snapshot, layout::image(targets.shot, frame), Step::render, frame,
+        decide(rule_of(Step::render), targets, frame, in(snapshot))->key,
+        "image" + std::to_string(frame));
   }
   put(snapshot, std::string(layout::contact_sheet), Step::contact_sheet, 0,
-      decide_dailies(wanted, Step::contact_sheet, in(snapshot))->key, "sheet");
+      decide(rule_of(Step::contact_sheet), targets, 0, in(snapshot))->key, "sheet");
   return snapshot;
 }
 
 void put_checkpoint(Snapshot& snapshot, const ToySettings& settings, int frame,
                     const std::string& file) {
-  const Wanted wanted = toy_wanted(settings);
-  const Key key{simulation_keys(wanted, frame).back(), wanted.simulate.parts};
+  const Targets targets = toy_targets(settings);
+  const Key key{simulation_keys(targets, frame).back(), targets.simulate.parts};
   put(snapshot, file, Step::simulate, frame, key, file);
-  snapshot[file].record.step = "checkpoint";
+  snapshot[file].record.step = checkpoint_record;
 }
 
 std::vector<Task> tasks_of(const Plan& plan, Step step) {
@@ -81,7 +84,7 @@ void expect_all(const Plan& plan, Step step, Action action, const std::string& r
 
 TEST(Plan, RunsEverythingInAnEmptyFolder) {
   const ToySettings settings;
-  const Plan plan = make_plan(toy_wanted(settings), {}, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), {}, settings.last);
   for (const Step step : settings.steps) {
     for (const Task& task : tasks_of(plan, step)) EXPECT_EQ(task.action, Action::run);
   }
@@ -93,7 +96,7 @@ TEST(Plan, RunsEverythingInAnEmptyFolder) {
 
 TEST(Plan, HasNothingToDoWhenEveryKeyIsUnchanged) {
   const ToySettings settings;
-  const Plan plan = make_plan(toy_wanted(settings), complete(settings), settings.last);
+  const Plan plan = make_plan(toy_targets(settings), complete(settings), settings.last);
   EXPECT_TRUE(plan.nothing_to_do());
   for (const Step step : settings.steps) expect_all(plan, step, Action::skip, "key unchanged");
 }
@@ -102,7 +105,7 @@ TEST(Plan, RendersOnlyAfterACameraEdit) {
   ToySettings settings;
   const Snapshot snapshot = complete(settings);
   settings.camera = "right";
-  const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
   expect_all(plan, Step::simulate, Action::skip, "key unchanged");
   expect_all(plan, Step::mesh, Action::skip, "key unchanged");
   expect_all(plan, Step::render, Action::run, "camera changed");
@@ -113,7 +116,7 @@ TEST(Plan, MeshesAgainAfterASurfaceEditAndLetsRenderingDependOnIt) {
   ToySettings settings;
   const Snapshot snapshot = complete(settings);
   settings.mesh_digits = 3;
-  const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
   expect_all(plan, Step::simulate, Action::skip, "key unchanged");
   expect_all(plan, Step::mesh, Action::run, "surface changed");
   expect_all(plan, Step::render, Action::depends, "runs if what it reads changes");
@@ -126,7 +129,7 @@ TEST(Plan, RestartsTheSimulationWhenAnythingOfItsKeyChanges) {
     put_checkpoint(snapshot, settings, 21, layout::checkpoint(21));
     (program ? settings.program : settings.camera) = "2";
     if (!program) settings.growth = 3.8;
-    const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+    const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
     expect_all(plan, Step::simulate, Action::run, program ? "program changed" : "fluid changed");
     EXPECT_EQ(plan.simulation.checkpoint, "") << "a checkpoint of other settings was taken";
     EXPECT_EQ(plan.simulation.from, 1);
@@ -136,7 +139,7 @@ TEST(Plan, RestartsTheSimulationWhenAnythingOfItsKeyChanges) {
 TEST(Plan, SkipsMeshingWithoutFluid) {
   ToySettings settings;
   settings.fluid = false;
-  const Plan plan = make_plan(toy_wanted(settings), {}, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), {}, settings.last);
   expect_all(plan, Step::mesh, Action::skip, "no fluid");
   expect_all(plan, Step::render, Action::run, "not made yet");
 }
@@ -147,7 +150,7 @@ TEST(Plan, ContinuesALongerRangeFromTheLastCheckpoint) {
   put_checkpoint(snapshot, settings, 11, layout::checkpoint(11));
   put_checkpoint(snapshot, settings, 21, layout::checkpoint(21));
   settings.last = 40;
-  const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
   EXPECT_EQ(plan.simulation.checkpoint, layout::checkpoint(21));
   EXPECT_EQ(plan.simulation.last, 40);
   const std::vector<Task> tasks = tasks_of(plan, Step::simulate);
@@ -164,15 +167,15 @@ TEST(Plan, TakesTheStopCheckpointOnlyWhenItsFrameIsThere) {
   put_checkpoint(snapshot, settings, 11, layout::checkpoint(11));
   put_checkpoint(snapshot, settings, 14, stop);
   snapshot.erase(layout::particles(15));
-  const Wanted wanted = toy_wanted(settings);
-  EXPECT_EQ(make_plan(wanted, snapshot, settings.last).simulation.checkpoint, stop);
+  const Targets targets = toy_targets(settings);
+  EXPECT_EQ(make_plan(targets, snapshot, settings.last).simulation.checkpoint, stop);
   snapshot.erase(layout::particles(14));
-  EXPECT_EQ(make_plan(wanted, snapshot, settings.last).simulation.checkpoint,
+  EXPECT_EQ(make_plan(targets, snapshot, settings.last).simulation.checkpoint,
             layout::checkpoint(11));
   snapshot.erase(layout::particles(11));
-  EXPECT_EQ(make_plan(wanted, snapshot, settings.last).simulation.from, 11);
+  EXPECT_EQ(make_plan(targets, snapshot, settings.last).simulation.from, 11);
   snapshot.erase(layout::particles(10));
-  EXPECT_EQ(make_plan(wanted, snapshot, settings.last).simulation.checkpoint, "");
+  EXPECT_EQ(make_plan(targets, snapshot, settings.last).simulation.checkpoint, "");
 }
 
 TEST(Plan, MakesAMissingOrDamagedFileAgainAndNothingElse) {
@@ -180,7 +183,7 @@ TEST(Plan, MakesAMissingOrDamagedFileAgainAndNothingElse) {
   for (const FileState state : {FileState::missing, FileState::changed}) {
     Snapshot snapshot = complete(settings);
     snapshot[layout::image("toy", 7)].state = state;
-    const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+    const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
     EXPECT_FALSE(plan.simulation.needed);
     expect_all(plan, Step::mesh, Action::skip, "key unchanged");
     for (const Task& task : tasks_of(plan, Step::render)) {
@@ -194,16 +197,28 @@ TEST(Plan, MakesAMissingOrDamagedFileAgainAndNothingElse) {
 TEST(Plan, SaysWhatALaterStageAloneIsMissing) {
   ToySettings settings;
   settings.steps = {Step::mesh};
-  const Plan plan = make_plan(toy_wanted(settings), {}, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), {}, settings.last);
   ASSERT_EQ(plan.problems.size(), 1u);
   EXPECT_NE(plan.problems[0].find("drench simulate"), std::string::npos) << plan.problems[0];
+}
+
+TEST(Plan, NamesTheSheetThatMeshingIsMissing) {
+  ToySettings settings;
+  settings.steps = {Step::mesh};
+  Targets targets = toy_targets(settings);
+  const Snapshot snapshot = complete(settings);  // particles of every frame, and no sheet
+  targets.cloth = {"flag"};
+  const Plan plan = make_plan(targets, snapshot, settings.last);
+  ASSERT_EQ(plan.problems.size(), 1u);
+  EXPECT_NE(plan.problems[0].find("25 of the files"), std::string::npos) << plan.problems[0];
+  EXPECT_NE(plan.problems[0].find(layout::cloth("flag", 1)), std::string::npos);
 }
 
 TEST(Plan, ReportsFramesBeyondAShortenedRange) {
   ToySettings settings;
   const Snapshot snapshot = complete(settings);
   settings.last = 20;
-  const Plan plan = make_plan(toy_wanted(settings), snapshot, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), snapshot, settings.last);
   EXPECT_EQ(plan.beyond.size(), 5 * 3u);  // frames 21 to 25: particles, mesh, image
   EXPECT_TRUE(tasks_of(plan, Step::render).size() == 20u);
 }
@@ -216,7 +231,7 @@ std::string json_of(const Plan& plan) {
 
 TEST(Plan, PrintsEveryTaskAsJson) {
   const ToySettings settings;
-  const Plan plan = make_plan(toy_wanted(settings), {}, settings.last);
+  const Plan plan = make_plan(toy_targets(settings), {}, settings.last);
   const nlohmann::json json = nlohmann::json::parse(json_of(plan));
   ASSERT_EQ(json["tasks"].size(), plan.tasks.size());
   EXPECT_EQ(json["tasks"][0]["step"], "simulate");
@@ -229,7 +244,7 @@ TEST(Plan, GroupsFramesOfEqualFateInItsText) {
   const ToySettings settings;
   Snapshot snapshot = complete(settings);
   snapshot[layout::image("toy", 7)].state = FileState::missing;
-  const std::string text = plan_text(make_plan(toy_wanted(settings), snapshot, settings.last));
+  const std::string text = plan_text(make_plan(toy_targets(settings), snapshot, settings.last));
   EXPECT_NE(text.find("1-6"), std::string::npos) << text;
   EXPECT_NE(text.find("8-25"), std::string::npos) << text;
 }

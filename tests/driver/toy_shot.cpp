@@ -29,7 +29,7 @@ class ToySimulation : public Simulation {
   int frame() const override { return frame_; }
   void preroll(const std::function<bool()>&) override {}
   StageReport advance(const std::function<bool()>& keep_going) override {
-    stages_.log(Step::simulate, frame_ + 1, true);
+    stages_.log(Step::simulate, frame_ + 1, Mark::begin);
     if (stages_.hook) stages_.hook(Step::simulate, frame_ + 1);
     constexpr int steps = 100;
     for (; step_ < steps; ++step_) {
@@ -38,7 +38,7 @@ class ToySimulation : public Simulation {
     }
     step_ = 0;
     ++frame_;
-    stages_.log(Step::simulate, frame_, false);
+    stages_.log(Step::simulate, frame_, Mark::end);
     return {};
   }
   std::vector<WrittenFile> write_frame(const fs::path& folder) const override {
@@ -65,30 +65,31 @@ class ToySimulation : public Simulation {
 
 }  // namespace
 
-Wanted toy_wanted(const ToySettings& settings) {
-  Wanted wanted;
-  wanted.shot = "toy";
-  wanted.first = settings.first;
-  wanted.frames =
+Targets toy_targets(const ToySettings& settings) {
+  Targets targets;
+  targets.shot = "toy";
+  targets.first = settings.first;
+  targets.frames =
       settings.frames.empty() ? all_frames({settings.first, settings.last, 24}) : settings.frames;
-  wanted.steps = settings.steps;
-  wanted.fluid = settings.fluid;
-  if (!settings.fluid) wanted.cloth = {"flag"};
-  wanted.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
-  wanted.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
-  wanted.obstacles_move = settings.obstacles_move;
-  wanted.has_foam = settings.foam;
-  if (settings.foam) wanted.steps.push_back(Step::foam);
-  if (settings.foam) wanted.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
-  wanted.render = toy_key("camera", settings.camera, "1");
-  wanted.denoise_frames = settings.denoise_frames;
-  wanted.denoised_later = settings.denoise_frames > 0;
-  if (wanted.denoised_later) {
-    wanted.steps.push_back(Step::denoise);
-    wanted.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
+  targets.steps = settings.steps;
+  targets.fluid = settings.fluid;
+  if (!settings.fluid) targets.cloth = {"flag"};
+  targets.simulate = toy_key("fluid", fmt::format("{:a}", settings.growth), settings.program);
+  targets.mesh = toy_key("surface", std::to_string(settings.mesh_digits), "1");
+  targets.obstacles_move = settings.obstacles_move;
+  targets.has_foam = settings.foam;
+  if (settings.foam) targets.steps.push_back(Step::foam);
+  if (settings.foam) targets.foam = toy_key("foam", std::to_string(settings.foam_rate), "1");
+  targets.render = toy_key("camera", settings.camera, "1");
+  targets.denoise_frames = settings.denoise_frames;
+  targets.denoised_later = settings.denoise_frames > 0;
+  if (targets.denoised_later) {
+    // As the commands have it: what renders denoises.
+    if (targets.includes(Step::render)) targets.steps.push_back(Step::denoise);
+    targets.denoise = toy_key("denoise", std::to_string(settings.denoise_frames), "1");
   }
-  wanted.dailies = toy_key("dailies", "", "1");
-  return wanted;
+  targets.dailies = toy_key("dailies", "", "1");
+  return targets;
 }
 
 std::unique_ptr<Simulation> ToyStages::start_simulation() {
@@ -96,7 +97,7 @@ std::unique_ptr<Simulation> ToyStages::start_simulation() {
 }
 
 StageReport ToyStages::mesh(const fs::path& folder, int frame) {
-  log(Step::mesh, frame, true);
+  log(Step::mesh, frame, Mark::begin);
   if (hook) hook(Step::mesh, frame);
   const double state = std::strtod(text_of(folder / layout::particles(frame)).c_str(), nullptr);
   const double unit = std::pow(10.0, -settings_.mesh_digits);
@@ -104,13 +105,13 @@ StageReport ToyStages::mesh(const fs::path& folder, int frame) {
   report.files.push_back(
       write_file_whole(folder / layout::fluid_mesh(frame),
                        fmt::format("{:.9f}\n", std::round(state / unit) * unit)));
-  log(Step::mesh, frame, false);
+  log(Step::mesh, frame, Mark::end);
   return report;
 }
 
 /// A mean over frames: one wrong frame before shows in all that follow.
 StageReport ToyStages::foam(const fs::path& folder, int frame) {
-  log(Step::foam, frame, true);
+  log(Step::foam, frame, Mark::begin);
   if (hook) hook(Step::foam, frame);
   const auto number = [&](const std::string& file) {
     return std::strtod(text_of(folder / file).c_str(), nullptr);
@@ -125,45 +126,45 @@ StageReport ToyStages::foam(const fs::path& folder, int frame) {
   StageReport report;
   report.files.push_back(
       write_file_whole(folder / layout::foam(frame), fmt::format("{:a}\n", foam)));
-  log(Step::foam, frame, false);
+  log(Step::foam, frame, Mark::end);
   return report;
 }
 
 StageReport ToyStages::render(const fs::path& folder, int frame, const Attributes&,
                               const std::function<void(double)>& progress) {
-  log(Step::render, frame, true);
+  log(Step::render, frame, Mark::begin);
   if (hook) hook(Step::render, frame);
   progress(0.5);
   const std::string input =
       settings_.fluid ? layout::fluid_mesh(frame) : layout::cloth("flag", frame);
   StageReport report;
   const std::string foam = settings_.foam ? text_of(folder / layout::foam(frame)) : "";
-  report.files.push_back(write_file_whole(folder / render_file(toy_wanted(settings_), frame),
+  report.files.push_back(write_file_whole(folder / render_file(toy_targets(settings_), frame),
                                           settings_.camera + " " + text_of(folder / input) + foam));
-  log(Step::render, frame, false);
+  log(Step::render, frame, Mark::end);
   return report;
 }
 
 /// All of what it is given, in order.
 StageReport ToyStages::denoise(const fs::path& folder, int frame, const NoisyFiles& noisy,
                                const Attributes&) {
-  log(Step::denoise, frame, true);
+  log(Step::denoise, frame, Mark::begin);
   if (hook) hook(Step::denoise, frame);
   std::string all;
   for (const std::string& file : noisy.all()) all += file + " " + text_of(folder / file);
   StageReport report;
   report.files.push_back(write_file_whole(folder / layout::image("toy", frame), all));
-  log(Step::denoise, frame, false);
+  log(Step::denoise, frame, Mark::end);
   return report;
 }
 
 StageReport ToyStages::contact_sheet(const fs::path& folder, const std::vector<int>& frames) {
-  log(Step::contact_sheet, 0, true);
+  log(Step::contact_sheet, 0, Mark::begin);
   std::string all;
   for (const int frame : frames) all += text_of(folder / layout::image("toy", frame));
   StageReport report;
   report.files.push_back(write_file_whole(folder / layout::contact_sheet, all));
-  log(Step::contact_sheet, 0, false);
+  log(Step::contact_sheet, 0, Mark::end);
   return report;
 }
 
@@ -172,9 +173,9 @@ StageReport ToyStages::movie(const fs::path&, const std::vector<int>&,
   throw std::logic_error("toys make no movie");
 }
 
-void ToyStages::log(Step step, int frame, bool begin) {
+void ToyStages::log(Step step, int frame, Mark mark) {
   const std::scoped_lock lock(mutex_);
-  events_.push_back({step, frame, begin});
+  events_.push_back({step, frame, mark});
 }
 
 std::vector<Event> ToyStages::events() const {
@@ -187,31 +188,31 @@ int ToyStages::count(Step step) const { return int(frames(step).size()); }
 std::vector<int> ToyStages::frames(Step step) const {
   std::vector<int> result;
   for (const Event& event : events()) {
-    if (event.step == step && event.begin) result.push_back(event.frame);
+    if (event.step == step && event.mark == Mark::begin) result.push_back(event.frame);
   }
   return result;
 }
 
 Plan make_toy(const ToySettings& settings, ToyStages& stages, const fs::path& folder,
               ExecuteOptions options) {
-  const Wanted wanted = toy_wanted(settings);
+  const Targets targets = toy_targets(settings);
   const FolderLock lock(folder);
   Manifest manifest(folder / layout::manifest);
   manifest.open_for_append();
   Progress progress(ProgressStyle::quiet);
   std::optional<Plan> first;
-  Again again(folder, manifest);
+  Retries retries(folder, manifest);
   for (;;) {
-    const Plan plan = make_plan(wanted, take_snapshot(folder, manifest), settings.last);
-    if (again.drops_inputs_of(wanted, plan)) continue;
+    const Plan plan = make_plan(targets, take_snapshot(folder, manifest), settings.last);
+    if (retries.drop_damaged_inputs(targets, plan)) continue;
     if (!first) first = plan;
     if (!plan.problems.empty()) throw Error(plan.problems.front());
     if (plan.nothing_to_do()) return *first;
     try {
-      execute(wanted, plan, folder, manifest, stages, progress, options);
+      execute(targets, plan, folder, manifest, stages, progress, options);
       return *first;
-    } catch (const PlanAgain& found) {
-      again.found(found);
+    } catch (const DamagedInput& found) {
+      retries.count(found);
     }
   }
 }

@@ -30,13 +30,15 @@ struct ToySettings {
   std::vector<Step> steps{Step::simulate, Step::mesh, Step::render, Step::contact_sheet};
 };
 
-Wanted toy_wanted(const ToySettings& settings);
+Targets toy_targets(const ToySettings& settings);
 
-/// What happened, in order: ("simulate", 3, "begin").
+enum class Mark { begin, end };
+
+/// What happened, in order: (simulate, 3, begin).
 struct Event {
   Step step;
   int frame;
-  bool begin;
+  Mark mark;
 };
 
 class ToyStages : public Stages {
@@ -59,7 +61,7 @@ class ToyStages : public Stages {
     return !unreadable.empty() && file.string().ends_with(unreadable) ? "it is torn" : "";
   }
 
-  void log(Step step, int frame, bool begin);
+  void log(Step step, int frame, Mark mark);
   std::vector<Event> events() const;
   int count(Step step) const;  // calls
   std::vector<int> frames(Step step) const;

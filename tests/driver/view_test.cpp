@@ -6,7 +6,7 @@
 
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/contact_sheet.h"
-#include "pipeline/driver/wanted.h"
+#include "pipeline/driver/targets.h"
 #include "tests/driver/folder.h"
 
 namespace drench {
@@ -33,8 +33,8 @@ class View : public testing::Test {
         << view;
     return read_shot(folder_.path() / "ball.toml", {});
   }
-  Wanted wanted(const std::string& view) const {
-    return want(shot(view), {1001}, {Step::render, Step::contact_sheet}, "cpu");
+  Targets targets(const std::string& view) const {
+    return targets_of(shot(view), {1001}, {Step::render, Step::contact_sheet}, "cpu");
   }
   const TemporaryFolder folder_;
 };
@@ -42,12 +42,12 @@ class View : public testing::Test {
 TEST_F(View, AChangedConfigMakesDailiesAgainAndRendersNothing) {
   const std::string section = "[view]\nocio_config = \"a.ocio\"\ndisplay = \"Monitor\"\n";
   write_config(folder_.path() / "a.ocio", "0.5");
-  const Wanted before = wanted(section);
-  EXPECT_EQ(wanted(section + "view = \"Plain\"\n").dailies.digest, before.dailies.digest);
-  const Wanted built_in = wanted("");
+  const Targets before = targets(section);
+  EXPECT_EQ(targets(section + "view = \"Plain\"\n").dailies.digest, before.dailies.digest);
+  const Targets built_in = targets("");
   EXPECT_NE(built_in.dailies.digest, before.dailies.digest);
   write_config(folder_.path() / "a.ocio", "0.25");
-  const Wanted after = wanted(section);
+  const Targets after = targets(section);
   EXPECT_NE(after.dailies.digest, before.dailies.digest);
   EXPECT_NE(after.dailies.parts.at("view"), before.dailies.parts.at("view"));
   EXPECT_EQ(after.render.digest, before.render.digest);
@@ -56,9 +56,9 @@ TEST_F(View, AChangedConfigMakesDailiesAgainAndRendersNothing) {
 
 TEST_F(View, IsThatOfTheContactSheet) {
   write_config(folder_.path() / "a.ocio", "0.5");
-  Film film{64, 36, std::vector<float>(4 * 64 * 36, 0.6f)};
-  write_exr(folder_.path() / "a.exr", film, {});
-  const ViewTransform view(shot("[view]\nocio_config = \"a.ocio\"\n").view);
+  render::Film film{64, 36, std::vector<float>(4 * 64 * 36, 0.6f)};
+  render::write_exr(folder_.path() / "a.exr", film, {});
+  const render::ViewTransform view(shot("[view]\nocio_config = \"a.ocio\"\n").view);
   const Picture sheet = contact_sheet({{1001, folder_.path() / "a.exr"}}, view);
   const size_t middle = size_t(sheet.height / 2) * size_t(sheet.width) + size_t(sheet.width / 2);
   EXPECT_NEAR(sheet.rgb[3 * middle], 0.3 * 255, 1);

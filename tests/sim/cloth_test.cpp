@@ -171,5 +171,72 @@ TEST(Cloth, SpringsKeepTheMomentumOfAFreeSheet) {
             1e-5 * momentum_scale(run.scene, state, 0.1));
 }
 
+/// Period over 2 pi sqrt(l / g) of a square of four vertices that is let go at an angle.
+double swing_period(double degrees) {
+  const double length = 0.5, angle = degrees * M_PI / 180;
+  Shot shot = hanging_sheet(length, 2, 4000);
+  shot.cloth[0].cells = V2i(1, 1);  // the upper edge is held: a pendulum without a mass in its rod
+  shot.cloth[0].v = length * V3d(0, -std::cos(angle), std::sin(angle));
+  shot.cloth[0].damping = 0;
+  Stepper run(shot);
+  std::vector<double> crossings;
+  const float middle = run.solver->save().cloth_position.z.front();
+  for (double before = 1; crossings.size() < 3;) {
+    const double start = run.time;
+    run.step(0.5 * run.stable_dt());
+    const double now = run.solver->save().cloth_position.z.back() - middle;
+    if (now * before < 0) crossings.push_back(start + (run.time - start) * before / (before - now));
+    before = now;
+  }
+  return (crossings[2] - crossings[0]) / (2 * M_PI * std::sqrt(length / 9.81));
+}
+
+// (2 / pi) K(sin^2(angle / 2)). Springs give by 1e-4 under the weight, and up to three times as
+// much at the lowest point of a swing.
+TEST(Cloth, ASquareSwingsAsAPendulum) {
+  for (const auto& row : read_validation("pendulum_period.csv")) {
+    if (row[0] == "theta0_deg" || row[0] == "179") continue;
+    EXPECT_NEAR(swing_period(std::stod(row[0])) / std::stod(row[1]), 1, 3e-4) << row[0];
+  }
+}
+
+/// Sag over span of a strip of `cells` links that is longer than its span.
+double strip_sag(double length_over_span, int cells) {
+  const double span = 0.5, length = length_over_span * span;
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  Cloth strip;
+  strip.corner = V3d(0), strip.u = V3d(length, 0, 0), strip.v = V3d(0, 0, length / cells);
+  strip.cells = V2i(cells, 1);
+  strip.adjacent_stiffness = 4000, strip.diagonal_stiffness = 0, strip.damping = 20;
+  ClothPin ends;
+  ends.vertices = {0, uint32_t(cells), uint32_t(cells + 1), uint32_t(2 * cells + 1)};
+  strip.pin.push_back(ends);
+  shot.cloth.push_back(strip);
+  sim::Scene scene = sim::build_scene(shot);
+  sim::HostVec& x = scene.start.cloth_position;
+  const float left = x.x[0];
+  for (size_t v = 0; v < x.size(); ++v) {  // two straight halves down to the middle
+    const double along = (x.x[v] - left) / length;
+    x.x[v] = float(left + along * span);
+    x.y[v] -= float(std::min(along, 1 - along) * std::sqrt(length * length - span * span));
+  }
+  Stepper run(std::move(scene));
+  run.advance(2);
+  const sim::HostState state = run.solver->save();
+  return (state.cloth_position.y[0] - state.cloth_position.y[size_t(cells / 2)]) / span;
+}
+
+// A chain of links hangs as the catenary but for the square of a link's length: half the links,
+// four times as far off at most.
+TEST(Cloth, AStripHangsInACatenary) {
+  for (const auto& row : read_validation("catenary.csv")) {
+    if (row[0] == "S_over_L" || std::stod(row[0]) < 1.1 || std::stod(row[0]) > 2) continue;
+    const double exact = std::stod(row[2]);
+    EXPECT_NEAR(strip_sag(std::stod(row[0]), 24) / exact, 1, 2e-3) << row[0];
+    EXPECT_NEAR(strip_sag(std::stod(row[0]), 12) / exact, 1, 8e-3) << row[0];
+  }
+}
+
 }  // namespace
 }  // namespace drench::sim_tests

@@ -124,8 +124,10 @@ TEST(Density, NoParticlesAreNoError) {
   EXPECT_EQ(run.limits.max_speed, 0);
 }
 
-// A wall stands in for the fluid beyond it. On the lattice the half-space integral misses by the
-// lattice's own error at support 2 a: 1.3 % of the rest density.
+// A wall stands in for the fluid beyond it: one factor on the half-space integral fits it to a
+// lattice that ends half a spacing before a wall. What it cannot fit at once, the two layers at a
+// wall and edges, where shares of walls are multiplied, is 0.23 % of the rest density; corners are
+// 0.5 % off.
 TEST(Density, IsWholeAgainWhereALatticeMeetsWalls) {
   Shot shot = empty_shot();
   shot.domain.min = V3d(0), shot.domain.max = V3d(0.09);
@@ -133,7 +135,14 @@ TEST(Density, IsWholeAgainWhereALatticeMeetsWalls) {
   add_box(shot, V3d(0), {9, 9, 9});
   Stepper run(shot);
   run.solver->refresh();
-  for (float rho : run.solver->density()) EXPECT_NEAR(rho, 1000, 60);
+  const sim::HostState state = run.solver->save();
+  const std::vector<float> density = run.solver->density();
+  const auto beside = [](float x) { return x < 0.01f || x > 0.08f; };
+  for (size_t i = 0; i < density.size(); ++i) {
+    const bool corner =
+        beside(state.position.x[i]) && beside(state.position.y[i]) && beside(state.position.z[i]);
+    EXPECT_NEAR(density[i], 1000, corner ? 5.5 : 2.6);
+  }
 }
 
 }  // namespace

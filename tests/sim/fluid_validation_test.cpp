@@ -17,11 +17,14 @@ struct CollapseGate {
 };
 class MartinMoyce : public testing::TestWithParam<CollapseGate> {};
 
-// Measured: front 2.0, 2.3, 2.5 %, shift -0.09, -0.19, -0.23, slope 1.46, 1.49, 1.51 (experiment
-// 1.33 to T = 3), height 0.035, 0.023, 0.023, energy across the plane 0.0016, 0.0006, 0.0002.
+// The experiment's own series differ by up to 2.7 %.
+// Measured: front 2.0, 2.3, 2.5 %, of the figures 2.5, 2.9, 3.1 %, shift -0.09, -0.19, -0.23,
+// slope 1.46, 1.49, 1.51 (experiment 1.33 to T = 3), height 0.035, 0.023, 0.023, energy across the
+// plane 0.0016, 0.0006, 0.0002.
 TEST_P(MartinMoyce, FrontAndHeightFollowTheExperiment) {
   const validation::Collapse collapse = validation::martin_moyce(GetParam().across, 1e-4);
-  EXPECT_LT(collapse.front, 0.05);
+  EXPECT_LT(collapse.front, 0.035);
+  EXPECT_LT(collapse.figures, 0.04);
   EXPECT_LT(collapse.slope, 2);  // Ritter's front, which no friction slows
   EXPECT_LT(collapse.height, GetParam().height);
   EXPECT_LT(collapse.thickness, 0.01);
@@ -32,8 +35,9 @@ INSTANTIATE_TEST_SUITE_P(Across, MartinMoyce,
                                          CollapseGate{40, 0.03}),
                          [](const auto& gate) { return std::to_string(gate.param.across); });
 
-// The first peak is a few particles' and falls by chance: the bench has it. Measured: time 1.1 %,
-// impulse 2 %, plateau 3.4 % above the frictionless one, energy across the plane 0.019.
+// The first peak is a few particles' and falls by chance: the bench has it. The impulse holds that
+// peak: 2 % here, 9 and 13 % at 30 and 40. Measured: time 1.1 %, plateau 3.4 % above the
+// frictionless one, energy across the plane 0.019.
 TEST(Lobovsky, TheWallIsHitWhenTheExperimentSays) {
   const validation::Impact impact = validation::lobovsky(20, 1e-4);
   EXPECT_LT(std::abs(impact.time), 0.03);
@@ -62,7 +66,7 @@ TEST_P(Resting, ColumnHasTheLinearPressureAndKeepsItsVolume) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Layers, Resting,
-                         testing::Values(RestGate{10, 0.03, 9e-3, -6e-3},
+                         testing::Values(RestGate{10, 0.03, 11e-3, -6e-3},
                                          RestGate{15, 0.025, 8e-3, -5e-3},
                                          RestGate{20, 0.02, 5e-3, -5e-3}),
                          [](const auto& gate) { return std::to_string(gate.param.layers); });

@@ -74,7 +74,8 @@ double over_line(double t) {
 }
 
 // A square lattice and a row in double: areal density 1 / stretch^2, linear 1 / stretch. The sum
-// over the particles is within 2 % of the integral while they are at most 1.6 spacings apart.
+// over the particles is within 2 % of the integral while they are at most 1.6 spacings apart, the
+// thickness that is read from it within 2.8 %.
 TEST(ThinWater, IsAsThickAsTheColourSays) {
   constexpr double support = 2.5;
   for (const double stretch : {1.0, 1.2, 1.4, 1.6}) {

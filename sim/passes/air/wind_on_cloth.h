@@ -13,21 +13,21 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// The wind at a place, m/s.
+/// The wind at a position, m/s.
 DRENCH_HD Vec3<float> wind_at(const WindNow& wind, Vec3<float> x) {
   Vec3<float> u{wind.velocity[0], wind.velocity[1], wind.velocity[2]};
   for (int k = 0; k < wind.modes; ++k) {
     const float* wave = wind.wave[k];
-    const float* push = wind.push[k];
+    const float* amplitude = wind.amplitude[k];
     const float s = sinf(wave[0] * x.x + wave[1] * x.y + wave[2] * x.z + wind.phase[k]);
-    u = u + Vec3<float>{push[0], push[1], push[2]} * s;
+    u = u + Vec3<float>{amplitude[0], amplitude[1], amplitude[2]} * s;
   }
   return u;
 }
 
 /// B of a vertex, kg/s, and what it makes of a vector.
 struct AirDrag {
-  VecView diagonal, cross;  // xx yy zz, xy yz zx
+  ConstVecView diagonal, cross;  // xx yy zz, xy yz zx
   bool on;
 
   template <class Index, class T>
@@ -56,46 +56,9 @@ inline AirDrag air_drag_of(const State& state) {
 }
 
 /// B of every vertex and what the air pushes it with at its velocity, N.
-inline void blow_at_cloth(State& state, const VecView& position, const VecView& velocity) {
-  ClothState& c = state.cloth;
-  const Parameters& p = state.parameters;
-  const VecView diagonal = c.air_diagonal.view(), cross_terms = c.air_cross.view(),
-                push = c.air_push.view();
-  const int *fan_start = c.fan_start.data(), *fan = c.fan_entry.data(), *corner = c.corner.data();
-  const Corners place = corners_of(c);
-  const float* share = c.air_share.data();
-  const float half = 0.5f * p.air_density, normal_drag = half * p.cloth_drag,
-              tangential_drag = half * p.cloth_friction;
-  const WindNow wind = state.wind;
-  const AirDrag drag = air_drag_of(state);
-  parallel_for(
-      "wind on cloth", c.vertices, DRENCH_LAMBDA(int i) {
-        const Vec3<float> air = wind_at(wind, position[i]);
-        Vec3<float> d{0.f, 0.f, 0.f}, m{0.f, 0.f, 0.f};
-        for (int k = fan_start[i]; k < fan_start[i + 1]; ++k) {
-          const int* v = corner + 3 * (fan[k] / 3);
-          const int first = 3 * (fan[k] / 3);
-          const Vec3<float> a = place.at(position, first);
-          const Vec3<float> twice =
-              cross(place.at(position, first + 1) - a, place.at(position, first + 2) - a);
-          const float size = length(twice);  // twice the area
-          const Vec3<float> n = twice * (1.f / maximum(size, 1e-20f));
-          const Vec3<float> u =
-              air - (velocity[v[0]] + velocity[v[1]] + velocity[v[2]]) * (1.f / 3.f);
-          const float third = share[i] * size * (1.f / 6.f), along = dot(u, n);
-          const float friction = third * tangential_drag * length(u);
-          const float both = third * normal_drag * fabsf(along) - friction;
-          d = d + Vec3<float>{friction + both * n.x * n.x, friction + both * n.y * n.y,
-                              friction + both * n.z * n.z};
-          m = m + Vec3<float>{n.x * n.y, n.y * n.z, n.z * n.x} * both;
-        }
-        diagonal.set(i, d), cross_terms.set(i, m);
-        push.set(i, drag.times(i, air - velocity[i]));
-      });
-}
+void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecView& velocity);
 
-inline void wind_on_cloth(State& state) {
-  blow_at_cloth(state, state.cloth.position.view(), state.cloth.velocity.view());
-}
+/// blow_at_cloth at the start of the step, into ClothState::air_diagonal, air_cross and air_push.
+void wind_on_cloth(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -2,9 +2,10 @@
 // Air drag on the fluid's surface and spray, after Gissler et al. (2017): a particle on its own is
 // a drop, a rigid sphere of its volume, with the drag of Schiller and Naumann (eqs 9, 12 there
 // without the deformation); one among neighbours shows a square of its spacing with a coefficient
-// of 1 (eqs 10, 13). Neighbours and walls upwind shelter it: the share of the area that is left is
-// one less the largest cosine between the wind and the way from one of them (eqs 14, 15). What is
-// full around feels nothing. Implicit in the magnitude held, so that no drop overshoots the wind.
+// of 1 (eqs 10, 13). Neighbours and walls upwind shelter it: the fraction of the area that is left
+// is one less the largest cosine between the wind and the direction from one of them (eqs 14, 15).
+// What is full around feels nothing. Implicit in the magnitude held, so that no drop overshoots the
+// wind.
 
 #include "sim/neighbours/periodic.h"
 #include "sim/passes/air/wind_on_cloth.h"
@@ -15,7 +16,7 @@ namespace drench::sim::DRENCH_BACKEND {
 struct DropDrag {
   float air_density, viscosity;  // kg/m^3, Pa s
   float radius, spacing;         // m, of a drop
-  float alone;                   // share of rest density that a lone particle has of itself
+  float alone;                   // fraction of rest density that a lone particle has of itself
 
   /// Of a rigid sphere.
   DRENCH_HD float sphere(float speed) const {
@@ -39,40 +40,7 @@ inline DropDrag drop_drag_of(const Parameters& p) {
   return {p.air_density, 1.8e-5f, 0.62035f * p.spacing, p.spacing, own};  // (3 / 4 pi)^(1/3)
 }
 
-inline void wind_on_fluid(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  const VecView x = f.position.view(), v = f.velocity.view();
-  const float* density = f.density.data();
-  const Float4* wall = state.pressure.wall.data();
-  const NeighbourView list = view_of(state.pressure.lists);
-  const DropDrag law = drop_drag_of(p);
-  const WindNow wind = state.wind;
-  const Vec3<float> period = periods_of(p);
-  const float rest = 1.f / p.rest_density;
-  const float step = float(state.dt) * 0.5f * p.air_density * p.fluid_drag / p.particle_mass;
-  parallel_for(
-      "wind on fluid", f.count, DRENCH_LAMBDA(int i) {
-        const Vec3<float> u = wind_at(wind, x[i]) - v[i];
-        const float speed = length(u);
-        if (!(speed > 1e-6f)) return;
-        const Vec3<float> way = u * (1.f / speed);
-        float shelter = 0.f;
-        const size_t end = list.end(i);
-        for (size_t k = list.first(i); k < end && shelter < 1.f; ++k) {
-          const int j = list.index(k);
-          if (j == i || !(list.closeness(k) > 0.f)) continue;
-          const Vec3<float> d = nearest(x[i] - x[j], period);
-          const float size = length(d);
-          if (size > 0.f) shelter = maximum(shelter, dot(way, d) / size);
-        }
-        const Vec3<float> in{wall[i].x, wall[i].y, wall[i].z};  // towards walls
-        const float steep = length(in);
-        if (steep > 0.f) shelter = maximum(shelter, -dot(way, in) / steep);
-        shelter = minimum(shelter, 1.f);
-        const float rate = step * speed * law.area(speed, density[i] * rest, shelter);
-        v.set(i, v[i] + u * (rate / (1.f + rate)));
-      });
-}
+/// Adds the drag of a step to the particles' velocities, by their density and neighbours.
+void wind_on_fluid(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -2,8 +2,8 @@
 // Sheets on obstacles. A vertex keeps a distance to every surface; one that forces would take
 // nearer is held in the solve of the sheets (cloth_implicit.h): it may go along the surface, and
 // along its normal goes where the surface does. Who is held is found twice: before the pressures by
-// what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
-// what still comes too near is held. Vertices are held, not triangles: between two of them, e
+// the forces on the vertex alone, and again from the whole solve, where what pulls off is let go
+// and what still comes too near is held. Vertices are held, not triangles: between two of them, e
 // apart, a surface of radius R comes e^2 / 8R nearer. The force that holds a vertex is in the
 // solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one
 // that it cannot feels it as a force. Last comes the guard that particles have: no path passes
@@ -45,7 +45,7 @@ struct ClothHold {
 
   /// Where the first obstacle stops a vertex that would go from x0 to x1, both at home; -1 if none
   /// does.
-  /// @param slack  share of the distance that may be missing
+  /// @param slack  fraction of the distance that may be missing
   DRENCH_HD int stop(int vertex, Vec3<float> x0, Vec3<float> x1, float slack,
                      Vec3<float>& own) const {
     for (int k = 0; k < obstacles.count; ++k) {
@@ -56,7 +56,8 @@ struct ClothHold {
     return -1;
   }
 
-  /// Holds a vertex, straight way `straight`, where an obstacle stops it from going to `to`.
+  /// Holds a vertex, which `straight` is the straight path of, where an obstacle stops it from
+  /// going to `to`.
   DRENCH_HD bool hold(int vertex, Vec3<float> from, Vec3<float> straight, Vec3<float> to,
                       Vec3<float>& w) const {
     Vec3<float> own;
@@ -64,13 +65,13 @@ struct ClothHold {
     const int k = stop(vertex, from + in, to + in, 0.f, own);
     if (k < 0) return false;
     const ObstacleView& o = obstacles.obstacle[k];
-    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), may = along(free[vertex], n);
-    const float size2 = length2(may);
-    if (size2 < 0.01f) return false;  // a wall holds it that way
-    const Vec3<float> way = may * (1.f / sqrtf(size2));
-    w = w + way * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, way));
-    normal.set(vertex, way);
-    free_block.put_free(vertex, block, free[vertex], way, inertia[vertex]);
+    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), open = along(free[vertex], n);
+    const float size2 = length2(open);
+    if (size2 < 0.01f) return false;  // a wall holds it along n
+    const Vec3<float> normal_free = open * (1.f / sqrtf(size2));
+    w = w + normal_free * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, normal_free));
+    normal.set(vertex, normal_free);
+    free_block.put_free(vertex, block, free[vertex], normal_free, inertia[vertex]);
     grip[vertex] = k;
     return true;
   }
@@ -112,57 +113,39 @@ struct ClothHold {
   }
 };
 
-inline ClothHold cloth_hold_of(const State& state) {
+inline ClothHold cloth_hold_of(State& state) {
   const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
+  ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
-  return {state.obstacles.views(),
-          cloth_walls_of(p),
-          c.half_thickness.data(),
-          c.fan_start.data(),
-          c.fan_entry.data(),
-          s.free.view(),
-          s.normal.view(),
-          block_inverse(state),
-          free_block_inverse(state),
-          s.inertia.data(),
-          s.grip.data(),
-          {state.obstacles.stopped.data()},
-          0.15f * p.spacing,
-          float(1 / state.dt),
-          1.f / p.particle_mass,
-          {p.low[0], p.low[1], p.low[2]},
-          periods_of(p)};
+  return {.obstacles = state.obstacles.views(),
+          .walls = cloth_walls_of(p),
+          .half_thickness = c.half_thickness.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .free = s.free.view(),
+          .normal = s.normal.view(),
+          .block = block_inverse(state),
+          .free_block = free_block_inverse(state),
+          .inertia = s.inertia.data(),
+          .grip = s.grip.data(),
+          .stopped = {state.obstacles.stopped.data()},
+          .room = 0.15f * p.spacing,
+          .inverse_dt = float(1 / state.dt),
+          .inverse_mass = 1.f / p.particle_mass,
+          .low = {p.low[0], p.low[1], p.low[2]},
+          .period = periods_of(p)};
 }
 
 /// As hold_at_walls, whose axes it takes into account.
-inline void hold_at_obstacles(State& state) {
-  const ClothState& c = state.cloth;
-  const ClothSystem& s = state.cloth_system;
-  const VecView x = c.position.view(), v = c.velocity.view(), base = s.base.view(),
-                right = s.right.view(), change = s.change.view();
-  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
-  float* slides = s.slides.data();
-  const BlockInverse block = block_inverse(state);
-  const ClothHold hold = cloth_hold_of(state);
-  state.cloth_system.normal.clear();
-  state.cloth_system.rub.clear();  // what is held in a later round would feel the last step's
-  parallel_for(
-      "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
-        hold.grip[i] = -1, slides[i] = 1.f;
-        hold.free_block.copy(i, hold.block);
-        if (inverse_mass[i] == 0.f) return;
-        const Vec3<float> straight = x[i] + v[i] * dt;
-        Vec3<float> w = change[i];
-        const Vec3<float> to = straight + block.times(i, base[i] + right[i]);
-        if (hold.hold(i, x[i], straight, to, w)) change.set(i, w);
-      });
-}
+void hold_at_obstacles(State& state);
 
 /// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
 struct HoldRevision {
   ClothHold hold;
-  VecView position, velocity, change, given, right, reaction, rub;
+  ConstVecView position;
+  VecView velocity, change;
+  ConstVecView given;
+  VecView right, reaction, rub;
   float* slides;
   const float *mass, *inverse_mass;
   float dt;
@@ -228,94 +211,17 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
-/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
-/// the guard stops it.
-inline bool revise_holds(State& state, const VecView& given, int round) {
-  const ClothState& c = state.cloth;
-  ClothSystem& s = state.cloth_system;
-  const ClothMatrix matrix = cloth_matrix(state);
-  const VecView change = s.change.view(), reaction = s.residual.view();
-  // The springs of a vertex reach others, whose ways must not change meanwhile.
-  parallel_for(
-      "cloth: reactions", c.vertices,
-      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
-  const HoldRevision revise{cloth_hold_of(state),
-                            c.position.view(),
-                            c.velocity.view(),
-                            change,
-                            given,
-                            s.answer.view(),
-                            reaction,
-                            s.rub.view(),
-                            s.slides.data(),
-                            c.mass.data(),
-                            c.inverse_mass.data(),
-                            float(state.dt),
-                            round};
-  return parallel_reduce(
-             "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
-             Larger{}) > 0;
-}
-
 /// The solve of the sheets was made: on with friction and with other vertices held, until these are
 /// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
 /// momentum of a sheet that is held.
-inline void settle_at_obstacles(State& state, const VecView& given, int sweeps, float tolerance) {
-  constexpr int most_rounds = 6;
-  ClothSystem& s = state.cloth_system;
-  const VecView change = s.change.view(), right = s.answer.view();
-  parallel_for(
-      "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
-  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
-    sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
-}
+void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
+                         float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.
-inline void finish_at_obstacles(State& state, const VecView& given) {
-  const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
-                velocity = c.next_velocity.view(), predicted = c.predicted.view(),
-                change = state.cloth_system.change.view();
-  const float inverse_dt = 1.f / float(state.dt), *mass = c.mass.data(),
-              *inverse_mass = c.inverse_mass.data();
-  const ClothMatrix matrix = cloth_matrix(state);
-  const ClothHold hold = cloth_hold_of(state);
-  parallel_for(
-      "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
-        if (inverse_mass[i] == 0.f) return;
-        Vec3<float> to = next[i], u = velocity[i];
-        const int k = hold.grip[i];
-        if (k >= 0) {
-          const Vec3<float> n = hold.normal[i], w = change[i];
-          u = v[i] + w * inverse_dt;
-          const ObstacleView& o = hold.obstacles.obstacle[k];
-          const Vec3<float> solid = hold.surface_velocity(o, to + hold.home(x[i]), n);
-          const Vec3<float> kick = n * dot(solid - u, n);
-          const Vec3<float> reaction = along(hold.free[i], matrix.whole(change, i) - given[i]);
-          hold.react(k, reaction * inverse_dt + kick * mass[i]);
-          u = u + kick;
-        }
-        hold.guard(i, mass[i], x[i], to, u);
-        next.set(i, to), velocity.set(i, u), predicted.set(i, u);
-      });
-}
+void finish_at_obstacles(State& state, const ConstVecView& given);
 
 /// The path test has stopped vertices where they were: obstacles carry them on.
-inline void carry_held_vertices(State& state) {
-  const ClothState& c = state.cloth;
-  const VecView x = c.position.view(), next = c.next.view(), velocity = c.next_velocity.view();
-  const float *mass = c.mass.data(), *inverse_mass = c.inverse_mass.data();
-  const int* held = c.held.data();
-  const ClothHold hold = cloth_hold_of(state);
-  parallel_for(
-      "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
-        if (!held[i] || inverse_mass[i] == 0.f) return;
-        Vec3<float> to = next[i], u = velocity[i];
-        hold.guard(i, mass[i], x[i], to, u);
-        next.set(i, to), velocity.set(i, u);
-      });
-}
+void carry_held_vertices(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -9,25 +9,25 @@ namespace drench::sim::DRENCH_BACKEND {
 struct SpringEnds {
   const int *end, *slot_offset;
   int slots, stride;
-  VecView shift;  // m, of the other ends; only where a sheet is joined to itself across a seam
+  ConstVecView shift;  // m, of the other ends; only where a sheet is joined to itself across a seam
   bool joined;
 
   /// From vertex i, which is at x, to the place of the other end of slot s.
   template <class Index, class T>
-  DRENCH_HD Vec3<T> way(const VecView& position, Vec3<T> x, Index i, int s) const {
+  DRENCH_HD Vec3<T> to_end(const ConstVecView& position, Vec3<T> x, Index i, int s) const {
     Vec3<T> d = at_end(position, i, s) - x;
     if (joined) d = d + shift.at(i + s * stride);
     return d;
   }
 
   /// A vector at the other ends of slot s.
-  DRENCH_HD Vec3<float> at_end(const VecView& view, int i, int s) const {
+  DRENCH_HD Vec3<float> at_end(const ConstVecView& view, int i, int s) const {
     return view[end[s * stride + i]];
   }
 #if !defined(__CUDACC__)
   /// Grids have the same offset all over a slot: then the ends are eight consecutive vertices as
   /// well.
-  DRENCH_HD Vec3<Pack> at_end(const VecView& view, Lanes i, int s) const {
+  DRENCH_HD Vec3<Pack> at_end(const ConstVecView& view, Lanes i, int s) const {
     const int other = i.base + slot_offset[s];
     if (slot_offset[s] != 0 && other >= 0 && other + 8 <= stride) return view.at(Lanes{other});
     return view.at(load(end, i + s * stride));
@@ -36,13 +36,17 @@ struct SpringEnds {
 };
 
 inline SpringEnds spring_ends_of(const ClothState& c) {
-  return {c.spring_end.data(),   c.slot_offset.data(),
-          c.spring_slots,        c.padded,
-          c.spring_shift.view(), c.joined};
+  return {.end = c.spring_end.data(),
+          .slot_offset = c.slot_offset.data(),
+          .slots = c.spring_slots,
+          .stride = c.padded,
+          .shift = c.spring_shift.view(),
+          .joined = c.joined};
 }
 
 struct ClothSprings {
-  VecView position, velocity;
+  ConstVecView position;
+  ConstVecView velocity;
   SpringEnds ends;
   const float *rest_length, *stiffness, *damping;
 
@@ -53,7 +57,7 @@ struct ClothSprings {
     Vec3<T> f{T(0.f), T(0.f), T(0.f)};
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
-      const Vec3<T> d = ends.way(position, x, i, s);
+      const Vec3<T> d = ends.to_end(position, x, i, s);
       const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
       const T rate = dot(ends.at_end(velocity, i, s) - v, d) * inverse;
       const T pull = load(stiffness, at) * (l - load(rest_length, at)) + load(damping, at) * rate;
@@ -65,7 +69,8 @@ struct ClothSprings {
 
 /// Where a cloth step reads from and writes to.
 struct ClothBuffers {
-  VecView position, velocity, next, next_velocity;
+  ConstVecView position;
+  VecView velocity, next, next_velocity;
 };
 
 /// Domain walls stop cloth and hold half of its sliding back.
@@ -98,38 +103,7 @@ inline ClothWalls cloth_walls_of(const Parameters& p) {
 
 // One damped Verlet step, eq (3) of the seed with v = (x_t - x_{t-dt}) / dt, which makes a change
 // of dt and the first step right: v' = d v + dt F/m, x' = x + dt v', d = exp(-rate dt).
-inline void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
-  ClothState& c = state.cloth;
-  const Parameters& p = state.parameters;
-  const ClothSprings springs{b.position,           b.velocity,         spring_ends_of(c),
-                             c.rest_length.data(), c.stiffness.data(), c.spring_damping.data()};
-  const VecView fluid_force = c.force.view();
-  const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
-  const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
-  const ClothWalls walls = cloth_walls_of(p);
-  const AirDrag air = air_drag_of(state);
-  const VecView air_push = c.air_push.view();
-  if (air.on) blow_at_cloth(state, b.position, b.velocity);
-  for_each_lane(
-      "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
-        using T = decltype(load(inverse_mass, i));
-        const T w = load(inverse_mass, i);
-        const auto free = w > T(0.f);
-        const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
-        const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
-        Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
-        if (air.on) {  // implicit: v' = v + dt w (push - B (v' - v_start))
-          const T s = w * T(dt);
-          const Vec3<T> push = air_push.at(i) - air.times(i, v - b.velocity.at(i));
-          v = v + air.settle(i, s, push * s);
-        }
-        Vec3<T> x = b.position.at(i) + v * T(dt);
-        walls.stop(x, v);
-        const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-        b.next.put(i, select(free, x, b.position.at(i)));
-        b.next_velocity.put(i, select(free, v, none));
-      });
-}
+void cloth_verlet(State& state, const ClothBuffers& b, float dt);
 
 inline ClothBuffers cloth_buffers(ClothState& c) {
   return {c.position.view(), c.velocity.view(), c.next.view(), c.next_velocity.view()};
@@ -137,23 +111,6 @@ inline ClothBuffers cloth_buffers(ClothState& c) {
 
 // The mean velocity each vertex would have over the step without contact: the substeps themselves,
 // made into spare columns. Whatever the springs do within a step is then in it.
-inline void cloth_predict(State& state) {
-  if (state.contact.near == 0) return;
-  ClothState& c = state.cloth;
-  const float dt = float(state.dt / state.substeps);
-  ClothBuffers b = cloth_buffers(c);
-  const VecView spare[2][2] = {{c.next.view(), c.next_velocity.view()},
-                               {c.start.view(), c.predicted.view()}};
-  for (int s = 0; s < state.substeps; ++s) {
-    b.next = spare[s % 2][0], b.next_velocity = spare[s % 2][1];
-    cloth_verlet(state, b, dt);
-    b.position = b.next, b.velocity = b.next_velocity;
-  }
-  const VecView from = c.position.view(), to = b.position, predicted = c.predicted.view();
-  const float inverse_dt = 1.f / float(state.dt);
-  parallel_for(
-      "cloth: mean velocity", c.vertices,
-      DRENCH_LAMBDA(int i) { predicted.set(i, (to[i] - from[i]) * inverse_dt); });
-}
+void cloth_predict(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -7,10 +7,11 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct SheetTopology {
+/// Triangles with their neighbours across edges and around vertices.
+struct ClothTopology {
   PolygonView polygons;
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
-  VecView rest_centroid;
+  ConstVecView rest_centroid;
   const float* half_thickness;
   Vec3<float> low, high;           // m, half a spacing inside the domain's walls
   const Vec3<float>* rest_period;  // m, by sheet; where one is joined to itself
@@ -41,7 +42,7 @@ struct SheetTopology {
   DRENCH_HD bool on_one_patch(int s, int t, float reach) const {
     if (sheet[s] != sheet[t]) return false;
     Vec3<float> d = rest_centroid[s] - rest_centroid[t];
-    if (polygons.place.joined) d = nearest(d, rest_period[sheet[s]]);
+    if (polygons.corner_positions.joined) d = nearest(d, rest_period[sheet[s]]);
     return length(d) < reach;
   }
   DRENCH_HD static bool beyond(float p, float q, float low, float high) {
@@ -73,134 +74,78 @@ struct SheetTopology {
   }
 };
 
-inline SheetTopology topology_of(const State& state) {
+inline ClothTopology topology_of(const State& state) {
   const ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  SheetTopology sheet{polygons_of(state),
-                      c.neighbour.data(),
-                      c.sheet.data(),
-                      c.fan_start.data(),
-                      c.fan_entry.data(),
-                      c.rim.data(),
-                      c.rest_centroid.view(),
-                      c.half_thickness.data(),
-                      {},
-                      {},
-                      c.rest_period.data()};
   float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
     low[k] = p.wall[k] ? p.low[k] + 0.5f * p.spacing : -1e30f;
     high[k] = p.wall[k] ? p.high[k] - 0.5f * p.spacing : 1e30f;
   }
-  sheet.low = {low[0], low[1], low[2]}, sheet.high = {high[0], high[1], high[2]};
-  return sheet;
+  return {.polygons = polygons_of(state),
+          .neighbour = c.neighbour.data(),
+          .sheet = c.sheet.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .rim = c.rim.data(),
+          .rest_centroid = c.rest_centroid.view(),
+          .half_thickness = c.half_thickness.data(),
+          .low = {low[0], low[1], low[2]},
+          .high = {high[0], high[1], high[2]},
+          .rest_period = c.rest_period.data()};
 }
 
 /// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no
-/// sheet.
+/// cloth.
 struct FootNormal {
   Vec3<float> normal;
   bool free_edge;
 };
 
-DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, float wb, float wc) {
+DRENCH_HD FootNormal foot_normal(const ClothTopology& cloth, int t, float wa, float wb, float wc) {
   constexpr float on_edge = 1e-6f;
   const bool za = wa < on_edge, zb = wb < on_edge, zc = wc < on_edge;
-  const int* corner = sheet.polygons.corner + 3 * t;
-  if (!(za || zb || zc)) return {sheet.unit_normal(t), false};
+  const int* corner = cloth.polygons.corner + 3 * t;
+  if (!(za || zb || zc)) return {cloth.unit_normal(t), false};
   if ((za && zb) || (zb && zc) || (za && zc)) {
     const int vertex = corner[!za ? 0 : !zb ? 1 : 2];
-    return {sheet.vertex_normal(vertex), sheet.rim[vertex] != 0 && !sheet.closed_at(vertex)};
+    return {cloth.vertex_normal(vertex), cloth.rim[vertex] != 0 && !cloth.closed_at(vertex)};
   }
   const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
-  const int other = sheet.neighbour[3 * t + edge];
+  const int other = cloth.neighbour[3 * t + edge];
   if (other < 0) {
-    const Vec3<float> n = sheet.unit_normal(t);
-    return {n, !sheet.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
+    const Vec3<float> n = cloth.unit_normal(t);
+    return {n, !cloth.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
   }
-  return {sheet.unit_normal(t) + sheet.unit_normal(other), false};
+  return {cloth.unit_normal(t) + cloth.unit_normal(other), false};
 }
 
 /// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
-DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc,
-                           float spacing) {
-  const int* neighbour = sheet.neighbour + 3 * t;
+DRENCH_HD float edge_weight(const ClothTopology& cloth, int t, float wa, float wb, float wc,
+                            float spacing) {
+  const int* neighbour = cloth.neighbour + 3 * t;
   if (neighbour[0] >= 0 && neighbour[1] >= 0 && neighbour[2] >= 0) return 1.f;
   float inside = 1.f;
   const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
   Vec3<float> v[3];
-  sheet.polygons.corners(t, v[0], v[1], v[2]);
-  const Vec3<float> area = sheet.area_normal(t);
+  cloth.polygons.corners(t, v[0], v[1], v[2]);
+  const Vec3<float> area = cloth.area_normal(t);
   const float twice_area = length(area);
   for (int e = 0; e < 3; ++e) {
-    const int a = sheet.polygons.corner[3 * t + e], b = sheet.polygons.corner[3 * t + (e + 1) % 3];
-    if (neighbour[e] >= 0 || sheet.closed_by_wall(area, a, b)) continue;
+    const int a = cloth.polygons.corner[3 * t + e], b = cloth.polygons.corner[3 * t + (e + 1) % 3];
+    if (neighbour[e] >= 0 || cloth.closed_by_wall(area, a, b)) continue;
     const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
     inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
   }
   return max0(inside);
 }
 
-// Side, normal, signed distance and wall density of every particle near a sheet. The side is taken
-// from the geometry when a particle comes within reach and remembered while its nearest triangle
-// stays on the same patch (rest centroids within two supports); memory ends beyond the support and
-// at free edges.
-inline void find_sheet_sides(State& state, const VecView& position) {
-  FluidState& f = state.fluid;
-  const SheetTopology sheet = topology_of(state);
-  const VecView normal = f.normal.view();
-  int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
-      *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
-  const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
-  float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(),
-        *share = f.cloth_share.data();
-  const float h = state.parameters.support_radius, spacing = state.parameters.spacing,
-              scale = state.parameters.wall_scale;
-  const float patch = 2.f * h + 2.f * state.cloth.largest_radius;
-  // No path crosses a sheet, so that the side is where a particle is seen to be. Layers do go
-  // through each other: a particle between two may then have its nearest triangle behind the other
-  // layer, on one patch with the last one and with its other side to it. By the memory that is a
-  // particle deep in the sheet, which pressure would push through it and the path test holds back,
-  // for ever: in the folds over a small ball 0.2 J a step.
-  const bool by_memory = !state.parameters.incompressible;
-  parallel_for(
-      "sheet side", f.count, DRENCH_LAMBDA(int i) {
-        const int t = triangle[i];
-        normal.set(i, {0.f, 0.f, 0.f});
-        distance[i] = 1e30f, edge[i] = 0.f, share[i] = 0.f, shaded[i] = t >= 0;
-        plane[i] = t >= 0 ? 1e29f : 1e30f;
-        if (t < 0) {
-          memory_triangle[i] = -1;
-          return;
-        }
-        const float wb = weight_b[i], wc = weight_c[i], wa = 1.f - wb - wc;
-        const FootNormal foot = foot_normal(sheet, t, wa, wb, wc);
-        if (foot.free_edge) {
-          memory_triangle[i] = -1;
-          return;
-        }
-        Vec3<float> a, b, c;
-        sheet.polygons.corners(t, a, b, c);
-        Vec3<float> to_particle = position[i] - (a * wa + b * wb + c * wc);
-        if (sheet.polygons.periodic) to_particle = nearest(to_particle, sheet.polygons.period);
-        const float d = length(to_particle);
-        const int seen = dot(to_particle, foot.normal) >= 0.f ? 1 : -1;
-        const int old = memory_triangle[i];
-        const bool clear = d > 1e-4f * h;  // closer than that the direction is rounding
-        const bool remembered =
-            (by_memory || !clear) && old >= 0 && sheet.on_one_patch(old, t, patch);
-        const int side = remembered ? memory_side[i] : seen;
-        memory_triangle[i] = t, memory_side[i] = side;
-        const Vec3<float> pseudo =
-            foot.normal * (float(side) / maximum(length(foot.normal), 1e-20f));
-        const float flip = side == seen ? 1.f : -1.f;
-        normal.set(i, clear ? to_particle * (flip / d) : pseudo);
-        distance[i] = flip * d;
-        plane[i] = distance[i] - dot(normal[i], position[i]);
-        edge[i] = edge_share(sheet, t, wa, wb, wc, spacing);
-        share[i] = scale * edge[i] *
-                   spiky_halfspace(minimum(max0(distance[i] - sheet.half_thickness[t]) / h, 1.f));
-      });
-}
+/// Side, normal, signed distance, m, and fraction of density of every particle near cloth, from its
+/// nearest triangle (find_nearest_triangles). The side is taken from the geometry when a particle
+/// comes within reach; the weakly compressible fluid remembers it while its nearest triangle stays
+/// on the same patch (rest centroids within two supports); memory ends beyond the support and at
+/// free edges.
+/// @param position  m, of the particles
+void find_cloth_sides(State& state, const ConstVecView& position);
 
 }  // namespace drench::sim::DRENCH_BACKEND

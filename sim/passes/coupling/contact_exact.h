@@ -12,11 +12,10 @@
 // all contacts on vertex k), the reduced mass shared among simultaneous contacts, so that it cannot
 // overshoot. beta = (S + 1) / 2S is the mean velocity that a steady force gives a free vertex over
 // S substeps, in parts of its last one: exact where the sheet moves as a whole, a bound where
-// springs hold a vertex back. Starting from the impulses of the step before was tried and dropped:
-// light taut cloth answers them late and flutters (vertex speeds 10 m/s in place of 2 m/s under
-// 0.12 m of water on 0.4 kg/m^2). A contact too far off to be reached within the step (the second
-// layer of particles) has a soft pressure alone: it is solved once, implicitly, before the first
-// iteration.
+// springs hold a vertex back. Impulses start at zero
+// (docs/decisions/0020-impulses-start-at-zero.md). A contact too far off to be reached within the
+// step (the second layer of particles) has a soft pressure alone: it is solved once, implicitly,
+// before the first iteration.
 
 #include "sim/backend/parallel.h"
 #include "sim/neighbours/kernels.h"
@@ -35,7 +34,7 @@ struct NearView {
     return k == 1 ? weight_b[i] : k == 2 ? weight_c[i] : 1.f - weight_b[i] - weight_c[i];
   }
   /// Sum over the corners that meet in a vertex, in a fixed order.
-  DRENCH_HD Vec3<float> sum_on_vertex(const VecView& of_corner, int vertex) const {
+  DRENCH_HD Vec3<float> sum_on_vertex(const ConstVecView& of_corner, int vertex) const {
     Vec3<float> sum{0.f, 0.f, 0.f};
     for (int s = fan_start[vertex]; s < fan_start[vertex + 1]; ++s)
       sum = sum + of_corner[fan_entry[s]];
@@ -52,9 +51,15 @@ struct NearView {
 inline NearView near_list(const State& state) {
   const FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
-  return {f.triangle.data(),          c.corner.data(),    f.weight_b.data(),
-          f.weight_c.data(),          f.edge.data(),      state.contact.order.data(),
-          state.contact.start.data(), c.fan_start.data(), c.fan_entry.data()};
+  return {.triangle = f.triangle.data(),
+          .corner = c.corner.data(),
+          .weight_b = f.weight_b.data(),
+          .weight_c = f.weight_c.data(),
+          .edge = f.edge.data(),
+          .order = state.contact.order.data(),
+          .start = state.contact.start.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data()};
 }
 
 /// m, the gap to the sheet's surface that contact keeps.
@@ -63,72 +68,64 @@ inline float contact_distance_of(const Parameters& p) { return 0.5f * p.spacing;
 /// Sorts the particles in reach of a sheet by triangle: the near list, all that coupling works on.
 /// With `reach`, those farther than that from the contact distance stand behind the others, by
 /// triangle as well.
-inline void sort_contacts(State& state, float reach) {
-  const int triangles = state.cloth.triangles;
-  const int* triangle = state.fluid.triangle.data();
-  const float *distance = state.fluid.sheet_distance.data(),
-              *half_thickness = state.cloth.half_thickness.data();
-  const float contact_distance = contact_distance_of(state.parameters);
-  int* key = state.contact.key.data();
-  parallel_for(
-      "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const int t = triangle[i];
-        if (t < 0) {
-          key[i] = 2 * triangles;
-          return;
-        }
-        key[i] = distance[i] - half_thickness[t] - contact_distance > reach ? triangles + t : t;
-      });
-  stable_sort_keys(state.contact.key, state.fluid.count, 2 * triangles, state.contact.order,
-                   state.contact.start, state.scratch);
-  state.contact.near = value_at(state.contact.start, 2 * triangles);
-  state.contact.close = value_at(state.contact.start, triangles);
-}
+void sort_contacts(State& state, float reach);
 
-inline void sort_exact_contacts(State& state) {
-  // Faster than a quarter of the speed of sound nothing should come near.
-  sort_contacts(state, 0.25f * state.parameters.sound_speed * float(state.dt));
-}
+/// sort_contacts with the reach of a weakly compressible step, a quarter of the speed of sound.
+void sort_exact_contacts(State& state);
 
 /// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the
 /// near list.
-struct ContactView {
-  int *particle, *vertex[3];
-  float* weight[3];
-  VecView normal, velocity, drag, change;
-  float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
-      *drag_scale, *lambda;
+struct ContactRows {
+  const int *particle, *vertex[3];  // -1: empty
+  const float* weight[3];
   int close, soft_begin, rows;  // rows 0..close-1 and soft_begin..rows-1 are contacts
 
-  DRENCH_HD int place_in_list(int row) const {  // -1: empty
+  DRENCH_HD int index_in_list(int row) const {  // -1: empty
     return row < close ? row : row < soft_begin || row >= rows ? -1 : row - soft_begin + close;
+  }
+  /// The weighted mean of the vertices.
+  DRENCH_HD Vec3<float> at_foot(int row, const ConstVecView& of_vertex) const {
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    for (int k = 0; k < 3; ++k) sum = sum + of_vertex[vertex[k][row]] * weight[k][row];
+    return sum;
   }
 };
 
-inline ContactView contact_rows(const State& state) {
+inline ContactRows contact_rows(const State& state) {
   const ContactState& c = state.contact;
-  const auto ints = [&](int k) { return c.index.data() + k * c.stride; };
-  const auto floats = [&](int k) { return c.field.data() + size_t(k) * c.stride; };
-  const auto vectors = [&](int k) { return VecView{floats(k), floats(k + 1), floats(k + 2)}; };
-  const int soft_begin = (c.close + 7) / 8 * 8;
-  return {ints(0),
-          {ints(1), ints(2), ints(3)},
-          {floats(0), floats(1), floats(2)},
-          vectors(3),
-          vectors(6),
-          vectors(9),
-          vectors(12),
-          floats(15),
-          floats(16),
-          floats(17),
-          floats(18),
-          floats(19),
-          floats(20),
-          floats(21),
-          floats(22),
-          c.close,
-          soft_begin,
-          soft_begin + c.near - c.close};
+  const int *vertex = c.vertex.data(), soft_begin = (c.close + 7) / 8 * 8;
+  const float* weight = c.weight.data();
+  return {.particle = c.particle.data(),
+          .vertex = {vertex, vertex + c.stride, vertex + 2 * c.stride},
+          .weight = {weight, weight + c.stride, weight + 2 * c.stride},
+          .close = c.close,
+          .soft_begin = soft_begin,
+          .rows = soft_begin + c.near - c.close};
+}
+
+/// What the solve of the exact coupling keeps of every row.
+struct ExactContacts {
+  ContactRows list;
+  VecView normal, velocity, drag, change;
+  float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
+      *drag_scale, *lambda;
+};
+
+inline ExactContacts exact_contacts(State& state) {
+  ContactState& c = state.contact;
+  return {.list = contact_rows(state),
+          .normal = c.normal.view(),
+          .velocity = c.velocity.view(),
+          .drag = c.drag.view(),
+          .change = c.change.view(),
+          .inverse_row = c.inverse_row.data(),
+          .pressure_target = c.pressure_target.data(),
+          .pressure_rate = c.pressure_rate.data(),
+          .pressure_scale = c.pressure_scale.data(),
+          .least = c.least.data(),
+          .drag_rate = c.drag_rate.data(),
+          .drag_scale = c.drag_scale.data(),
+          .lambda = c.lambda.data()};
 }
 
 /// What the solve reads of the particles and the sheet to set contacts up.
@@ -136,25 +133,25 @@ struct ContactSetup {
   NearView near;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass,
-      *vertex_share;
+      *contact_weight;
   float beta, dt, mass, rest_density, sound_speed, support_radius, contact_distance, viscosity,
       push_speed, wall_scale;
 
   template <class Index>
-  DRENCH_HD void prepare(const ContactView& c, Index row) const {
-    const auto member = load(c.particle, row);
+  DRENCH_HD void prepare(const ExactContacts& c, Index row) const {
+    const auto member = load(c.list.particle, row);
     const auto valid = is_index(member);
     const auto i = select(valid, member, same_index(0, member));
     const auto t = load(near.triangle, i);
     using T = decltype(load(distance, i));
     T sum(1.f / mass);
     for (int k = 0; k < 3; ++k) {
-      const auto vertex = load(c.vertex[k], row);
-      sum = sum + load(c.weight[k], row) * load(vertex_share, vertex) * T(beta) *
+      const auto vertex = load(c.list.vertex[k], row);
+      sum = sum + load(c.list.weight[k], row) * load(contact_weight, vertex) * T(beta) *
                       load(inverse_mass, vertex);
     }
     const T none(0.f), edge = select(valid, load(near.edge, i), none);
-    // No force at and beyond a free edge, where the edge's share is 0.
+    // No force at and beyond a free edge, where the edge's weight is 0.
     store(c.inverse_row, row, select(edge > none, T(1.f) / sum, none));
     c.normal.put(row, normal.at(i));
     c.velocity.put(row, velocity.at(i));
@@ -169,17 +166,17 @@ struct ContactSetup {
     const T pressure = load(pressure_term, i), inverse_rho = load(inverse_density, i),
             plane = spiky_plane(q);
     const T layer = edge * T(rest_density), push_term = layer * pressure;
-    const T share = layer * inverse_rho * inverse_rho;
+    const T drag_term = layer * inverse_rho * inverse_rho;
     const T slope = select(pressure > none,
                            T(wall_scale * sound_speed * sound_speed * rest_density) * plane, none);
     const T kappa =
-        inverse_h * inverse_h * (share * slope * plane + push_term * spiky_plane_slope(q));
+        inverse_h * inverse_h * (drag_term * slope * plane + push_term * spiky_plane_slope(q));
     const T rate = T(dt * dt * mass) * kappa;
     store(c.pressure_target, row, T(dt * mass) * push_term * plane * inverse_h);
     store(c.pressure_rate, row, rate);
     store(c.pressure_scale, row, T(1.f) / (T(1.f) + rate * sum));
     const T drag_rate =
-        T(dt * mass * viscosity) * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+        T(dt * mass * viscosity) * drag_term * viscosity_halfspace(q) * inverse_h * inverse_h;
     store(c.drag_rate, row, drag_rate);
     store(c.drag_scale, row, T(1.f) / (T(1.f) + drag_rate * sum));
   }
@@ -187,14 +184,14 @@ struct ContactSetup {
 
 /// One Jacobi update of a contact against the predicted vertices; they take theirs afterwards.
 template <class Index>
-DRENCH_HD void update_contact(const ContactView& c, Index row, const VecView& predicted,
+DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecView& predicted,
                               float inverse_mass, float relaxation) {
   using T = decltype(load(c.lambda, row));
   const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);
-  const Vec3<T> sheet = predicted.at(load(c.vertex[0], row)) * load(c.weight[0], row) +
-                        predicted.at(load(c.vertex[1], row)) * load(c.weight[1], row) +
-                        predicted.at(load(c.vertex[2], row)) * load(c.weight[2], row);
-  const Vec3<T> relative = velocity - sheet;
+  const Vec3<T> foot = predicted.at(load(c.list.vertex[0], row)) * load(c.list.weight[0], row) +
+                       predicted.at(load(c.list.vertex[1], row)) * load(c.list.weight[1], row) +
+                       predicted.at(load(c.list.vertex[2], row)) * load(c.list.weight[2], row);
+  const Vec3<T> relative = velocity - foot;
   const T approach = dot(normal, relative), old = load(c.lambda, row), none(0.f);
   const Vec3<T> slip = relative - normal * approach;
   const T by_pressure =
@@ -214,138 +211,25 @@ DRENCH_HD void update_contact(const ContactView& c, Index row, const VecView& pr
 }
 
 /// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly
-/// twice as far. A pool of 0.3 m on 0.4 kg/m^2: 4 plain iterations left 18,413 particles to the
-/// path test in half a second, 12 plain ones 2, these 6 left 3.
+/// twice as far, which halves their number (docs/decisions/0021-over-relaxed-contacts.md).
 constexpr int contact_iterations = 6;
 constexpr float over_relaxation = 1.8f;
 
-inline ContactSetup contact_setup(State& state) {
-  FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
-  const Parameters& p = state.parameters;
-  const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {near_list(state),
-          f.velocity.view(),
-          f.normal.view(),
-          f.sheet_distance.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          c.half_thickness.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          beta,
-          float(state.dt),
-          p.particle_mass,
-          p.rest_density,
-          p.sound_speed,
-          p.support_radius,
-          contact_distance_of(p),
-          p.dynamic_viscosity,
-          0.01f * p.sound_speed,
-          p.wall_scale};
-}
-
+/// Rows of contacts: those in reach within the step, or the soft ones, too.
 enum class Rows { close, all };
 
+/// What the corners of a triangle without contacts hold: anything, or the zeros of a sum before.
+enum class IdleCorners { unset, zero };
+
 /// Adds up what the contacts of each triangle give to its corners, in their order.
-/// @param again  the same rows were the last to be added: where there are none zeros stand already
-inline void sum_by_triangle(State& state, Rows which, bool again = false) {
-  const ContactView c = contact_rows(state);
-  const int triangles = state.cloth.triangles, *start = state.contact.start.data();
-  const VecView impulse = state.contact.impulse.view();
-  const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
-  parallel_for(
-      "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
-        if (again && start[t] == start[t + 1] && last == 0) return;
-        Vec3<float> sum[3] = {};
-        for (int soft = 0; soft <= last; ++soft) {
-          const int k = t + soft * triangles;
-          for (int row = start[k] + soft * gap; row < start[k + 1] + soft * gap; ++row) {
-            const Vec3<float> change = c.change[row];
-            for (int e = 0; e < 3; ++e) sum[e] = sum[e] + change * c.weight[e][row];
-          }
-        }
-        for (int e = 0; e < 3; ++e) impulse.set(3 * t + e, sum[e]);
-      });
-}
+void sum_by_triangle(State& state, Rows which, IdleCorners idle = IdleCorners::unset);
 
-/// Rows of the near list; the vertices receive what the path test took from particles.
-inline void start_contacts(State& state) {
-  ClothState& cloth = state.cloth;
-  const ContactView c = contact_rows(state);
-  const NearView near = near_list(state);
-  const VecView owed = state.fluid.owed.view(), force = cloth.force.view();
-  const bool owes = state.owes;
-  parallel_for(
-      "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
-        const int place = c.place_in_list(row), i = place < 0 ? -1 : near.order[place];
-        c.particle[row] = i;
-        for (int k = 0; k < 3; ++k) {
-          c.vertex[k][row] = i < 0 ? 0 : near.corner[3 * near.triangle[i] + k];
-          c.weight[k][row] = i < 0 ? 0.f : near.weight(i, k);
-        }
-        if (owes) c.change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : owed[i]);
-      });
-  const VecView impulse = state.contact.impulse.view();
-  if (owes) {
-    sum_by_triangle(state, Rows::all);
-    state.fluid.owed.clear();
-    state.owes = false;
-  }
-  float* share = cloth.share.data();
-  const float inverse_dt = 1.f / float(state.dt);
-  const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
-  parallel_for(
-      "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
-        float weights = 0.f;
-        near.for_each_corner(v, [&](int t, int e) {
-          for (int row = near.start[t]; row < near.start[t + 1]; ++row) weights += c.weight[e][row];
-          const int k = t + triangles;
-          for (int row = near.start[k] + gap; row < near.start[k + 1] + gap; ++row)
-            weights += c.weight[e][row];
-        });
-        force.set(v,
-                  owes ? near.sum_on_vertex(impulse, v) * -inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
-        share[v] = weights;
-      });
-}
+/// Fills the rows of the near list and the weights of contacts by vertex (ClothState::share). The
+/// vertices receive what particles owe them (FluidState::owed, kg m/s) as ClothState::force, N.
+void start_contacts(State& state);
 
-inline void solve_contacts(State& state) {
-  if (state.contact.near == 0) return;
-  ClothState& cloth = state.cloth;
-  const ContactSetup setup = contact_setup(state);
-  const ContactView c = contact_rows(state);
-  const NearView near = setup.near;
-  const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
-                velocity = state.fluid.velocity.view(), impulse = state.contact.impulse.view();
-  const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
-  const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
-  for_each_lane(
-      "contact: prepare", c.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
-  for_each_lane(
-      "contact: soft", c.rows - c.soft_begin, DRENCH_LAMBDA(auto row) {
-        update_contact(c, row + c.soft_begin, predicted, inverse_particle_mass, 1.f);
-      });
-  for (int iteration = 0; iteration < contact_iterations; ++iteration) {
-    const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
-    for_each_lane(
-        "contact: particles", c.close, DRENCH_LAMBDA(auto row) {
-          update_contact(c, row, predicted, inverse_particle_mass, relaxation);
-        });
-    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
-    // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
-    parallel_for(
-        "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
-          if (share[v] == 0.f) return;
-          const Vec3<float> sum = near.sum_on_vertex(impulse, v);
-          predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
-          force.set(v, force[v] - sum * inverse_dt);
-        });
-  }
-  parallel_for(
-      "contact: velocities", c.rows, DRENCH_LAMBDA(int row) {
-        if (c.particle[row] >= 0) velocity.set(c.particle[row], c.velocity[row]);
-      });
-}
+/// Solves for the impulses of the rows, N s: leaves the particles' velocities after contact, and in
+/// ClothState::predicted and ClothState::force what the vertices received.
+void solve_contacts(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

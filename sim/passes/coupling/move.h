@@ -1,44 +1,23 @@
 #pragma once
-// The end of a step: particles and cloth move to their new places.
+// The end of a step: particles and cloth move to their new positions.
 
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/coupling/continuous_collision.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-inline void move_particles(State& state) {
-  FluidState& f = state.fluid;
-  const VecView x = f.position.view(), v = f.velocity.view();
-  const Mover mover = mover_of(state.parameters, float(state.dt));
-  for_each_lane(
-      "move particles", f.count, DRENCH_LAMBDA(auto i) {
-        auto velocity = v.at(i);
-        x.put(i, mover(x.at(i), velocity));
-        v.put(i, velocity);
-      });
-}
+/// Fluid alone: a step of symplectic Euler within the domain's walls.
+void move_particles(State& state);
 
-inline void finish_substep(ClothState& c) {
-  c.position.swap(c.next);
-  c.velocity.swap(c.next_velocity);
-}
+/// Cloth takes on what a substep has left in ClothState::next and next_velocity.
+void finish_substep(ClothState& c);
 
-inline void move_cloth(State& state) {
-  const float dt = float(state.dt / state.substeps);
-  for (int s = 0; s < state.substeps; ++s) {
-    cloth_verlet(state, cloth_buffers(state.cloth), dt);
-    finish_substep(state.cloth);
-  }
-}
-
-inline void copy_vectors(const char* name, VecView to, VecView from, int n) {
-  parallel_for(
-      name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
-}
+/// Cloth alone: explicit substeps over a step.
+void move_cloth(State& state);
 
 /// What a particle's path has beside dt times its velocity.
 struct Drift {
-  VecView drift;
+  ConstVecView drift;  // m
   bool any;
   template <class Index>
   DRENCH_HD auto at(Index i) const {
@@ -46,291 +25,34 @@ struct Drift {
     return any ? drift.at(i) : none;
   }
 };
-inline Drift drift_of(const State& state) {
-  return {state.fluid.drift.view(), state.fluid.drift.x.size() > 0};
-}
+Drift drift_of(const State& state);
 
+/// Particles whose path was changed, and those that need another round.
 struct GuardCount {
   int hits = 0, unresolved = 0;
-};
-struct AddGuardCounts {
-  DRENCH_HD GuardCount operator()(GuardCount a, GuardCount b) const {
-    return {a.hits + b.hits, a.unresolved + b.unresolved};
+  DRENCH_HD GuardCount operator+(GuardCount other) const {
+    return {hits + other.hits, unresolved + other.unresolved};
   }
 };
 
+/// The collision test of a substep, from the start of it to ClothState::next.
 /// @param moved  how far cloth came in the substeps before, m: a triangle that springs back starts
 /// there.
-inline PathTest path_test_of(State& state, float moved) {
-  FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
-  const VecView next = c.next.view(), start = c.start.view();
-  const float moved2 = parallel_reduce(
-      "path test: cloth motion", c.vertices, 0.f,
-      DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
-  const Parameters& p = state.parameters;
-  const ClothWalls walls = cloth_walls_of(p);
-  return {polygons_of(state),
-          c.position.view(),
-          next,
-          c.next_velocity.view(),
-          f.velocity.view(),
-          f.normal.view(),
-          f.start.view(),
-          f.position.view(),
-          f.owed.view(),
-          c.held.data(),
-          c.stop_sum.data(),
-          f.stopped.data(),
-          f.triangle.data(),
-          f.edge.data(),
-          f.sheet_distance.data(),
-          c.mass.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          p.particle_mass,
-          path_clearance * p.spacing,
-          std::max(std::sqrt(moved2), moved),
-          4,
-          {free_ways(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
-}
+ContinuousCollision continuous_collision_of(State& state, float moved);
 
 /// The particles that are tested: the guarded ones, or all once cloth has come farther than they
 /// were chosen for.
 struct Tested {
-  const int *order, *guarded;  // the near list, places in it
+  const int *order, *guarded;  // the near list, indices in it
   int count;
   bool all;
   DRENCH_HD int operator[](int k) const { return all ? k : order[guarded[k]]; }
 };
 
-inline Tested tested_of(const State& state, float cloth_moved) {
-  const bool all = cloth_moved > state.contact.cloth_reach;
-  return {state.contact.order.data(), state.contact.guarded.data(),
-          all ? state.fluid.count : state.contact.guard_count, all};
-}
-
+/// To the bit.
 DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-/// One round: where each particle ends, into f.impulse. In the first of an incompressible step it
-/// is there, as the pressure solve found it.
-inline GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt,
-                             int round) {
-  FluidState& f = state.fluid;
-  const VecView x = f.position.view(), v = f.velocity.view(), end = f.impulse.view();
-  const Drift drift = drift_of(state);
-  const bool found = drift.any && round == 0;
-  const Mover mover = path_mover_of(state.parameters, dt);
-  const ObstacleGuard guard = obstacle_guard_of(state, 0);
-  const int *triangle = f.triangle.data(), *moved = f.moved.data();
-  int* held = f.held.data();
-  return parallel_reduce(
-      "path test", tested.count, GuardCount{},
-      DRENCH_LAMBDA(int k) {
-        const int i = tested[k];
-        const bool still = held[i] || moved[i];
-        Vec3<float> velocity = still ? Vec3<float>{0.f, 0.f, 0.f} : v[i];
-        Vec3<float> to = still ? x[i] : found ? end[i] : mover(x[i] + drift.at(i), velocity);
-        if (!still) v.set(i, velocity);
-        GuardCount result;
-        if (triangle[i] < 0 || test.in_reach(i, to)) {
-          const Vec3<float> wanted = to;
-          bool clear = test.resolve(i, x[i], to);
-          // What the sheet has turned aside may now meet an obstacle, and the other way round.
-          for (int turn = 0; guard.obstacles.count > 0 && turn < 4; ++turn) {
-            if (!clear || (!held[i] && same(to, wanted))) break;
-            Vec3<float> u = v[i];
-            const Vec3<float> out = guard(x[i], to, u);
-            if (same(out, to)) break;
-            v.set(i, u);
-            to = out;
-            clear = test.resolve(i, x[i], to);
-          }
-          if (!clear) {
-            result.unresolved = 1;
-            held[i] = held[i] || test.stopped[i] < 0;  // nothing left to stop but itself
-          }
-          result.hits = result.unresolved || !same(to, wanted);
-        }
-        end.set(i, to);
-        return result;
-      },
-      AddGuardCounts{});
-}
-
-/// Takes back the substep of the vertices that particles stopped in this round, or of all. A
-/// stopped vertex takes on its common velocity with those particles; what that changes of its
-/// momentum they share.
-inline void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
-  ClothState& c = state.cloth;
-  FluidState& f = state.fluid;
-  const VecView next = c.next.view(), next_v = c.next_velocity.view(), x = c.position.view(),
-                velocity = f.velocity.view();
-  const int* corner = c.corner.data();
-  int* hold = c.held.data();
-  const float* mass = c.mass.data();
-  const float inverse_mass = 1.f / state.parameters.particle_mass;
-  parallel_for(
-      "path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
-        const int i = tested[k], t = test.stopped[i];
-        if (t < 0) return;
-        Vec3<float> gain{0.f, 0.f, 0.f};
-        for (int e = 0; e < 3; ++e) {
-          const int v = corner[3 * t + e];
-          if (hold[v] || test.inverse_mass[v] == 0.f) continue;
-          const Vec3<float> lost = next_v[v] - test.stop_velocity(v, next_v[v]);
-          gain = gain + lost * (mass[v] / float(test.stop_count(v)));
-        }
-        velocity.set(i, velocity[i] + gain * inverse_mass);
-      });
-  parallel_for(
-      "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
-        const bool stopped = test.stop_count(v) > 0;
-        if (!everywhere && !stopped) return;
-        if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
-          next_v.set(v, test.stop_velocity(v, next_v[v]));
-        for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
-        hold[v] = 1;
-        next.set(v, x[v]);
-      });
-  if (state.parameters.obstacles > 0) carry_held_vertices(state);
-}
-
-/// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice
-/// as far as the contact solve predicts. All others make their whole step now: nothing to test. No
-/// step of the solvers' own choice takes a particle that is not near as far as a sheet; should one,
-/// all paths are tested. They count as a support away, not as far_by says: no checkpoint has that.
-inline void move_unguarded_particles(State& state) {
-  FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
-  const float dt = float(state.dt), spacing = state.parameters.spacing;
-  const VecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
-  const bool solved = state.contact.near > 0;  // else nothing was predicted
-  const float speed2 = parallel_reduce(
-      "guard: cloth speed", c.vertices, 0.f,
-      DRENCH_LAMBDA(int v) {
-        return maximum(length2(cloth_velocity[v]), solved ? length2(predicted[v]) : 0.f);
-      },
-      Larger{});
-  const float reach = 2.f * dt * std::sqrt(speed2) + 0.05f * spacing;
-  // Others than the near ones are only known to be a support away, and may have come nearer since.
-  state.contact.cloth_reach = std::min(reach, 0.4f * state.parameters.support_radius);
-  const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view(),
-                normal = f.normal.view(), end = f.impulse.view();
-  const float* distance = f.sheet_distance.data();
-  const int *triangle = f.triangle.data(), *order = state.contact.order.data();
-  int *moved = f.moved.data(), *key = state.contact.key.data();
-  const Mover mover = path_mover_of(state.parameters, dt);
-  const Drift drift = drift_of(state);
-  const float room = reach + 2.f * path_clearance * spacing,
-              support = state.parameters.support_radius;
-  const float every_path = state.parameters.every_path ? 1.f : 0.f;
-  const bool far_ones = any_lane(
-      "guard: move", f.count, DRENCH_LAMBDA(auto i) {
-        const auto from = x.at(i);
-        auto velocity = v.at(i);
-        using T = decltype(from.x);
-        start.put(i, from);
-        const auto near = is_index(load(triangle, i));
-        const T d = load(distance, i), least = select(near, maximum(d, -d), T(support)),
-                path = T(dt) * square_root(length2(velocity)) + square_root(length2(drift.at(i)));
-        // Beyond a free edge the distance is not kept.
-        const auto on_edge = near & (length2(normal.at(i)) <= T(0.f)),
-                   guard = on_edge | (least <= path + T(room)) | (T(every_path) > T(0.f));
-        const Vec3<T> old = velocity, to = drift.any ? end.at(i) : mover(from, velocity);
-        x.put(i, select(guard, from, to));  // to the bit, as without sheets
-        v.put(i, select(guard, old, velocity));
-        store(moved, i, !guard);
-        return guard & (!near);
-      });
-  if (far_ones) state.contact.cloth_reach = -1.f;  // see Tested
-  parallel_for(
-      "guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
-  stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded,
-                   state.contact.guard_start, state.scratch);
-  state.contact.guard_count = value_at(state.contact.guard_start, 1);
-}
-
-/// Others have made their step already; should cloth come as far as them they stand still for it.
-inline void accept_paths(State& state, const Tested& tested) {
-  const VecView x = state.fluid.position.view(), end = state.fluid.impulse.view();
-  parallel_for(
-      "path test: accept", tested.count,
-      DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
-}
-
-/// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex
-/// has come from its place at the start of the step so far, m, before it was held.
-/// @param moved  the same of the substep before.
-inline float guard_substep(State& state, float dt, float moved) {
-  FluidState& f = state.fluid;
-  ClothState& c = state.cloth;
-  PathTest test = path_test_of(state, moved);
-  moved = test.cloth_moved;
-  const Tested tested = tested_of(state, moved);
-  if (tested.count == 0) return moved;
-  f.held.clear_bytes(0);
-  f.stopped.clear_bytes(0xff);
-  c.held.clear_bytes(0);
-  c.stop_sum.clear_bytes(0);
-  for (int round = 0;; ++round) {
-    const GuardCount count = test_paths(state, test, tested, dt, round);
-    state.guard_hits += count.hits;
-    state.owes |= count.hits > 0;
-    if (count.unresolved == 0) break;
-    ++state.guard_holds;
-    const bool everywhere = round >= 24;
-    hold_cloth(state, test, tested, everywhere);
-    test = path_test_of(state, moved);
-    if (!everywhere) continue;
-    f.held.clear_bytes(1);
-    test_paths(state, test, tested, dt, round + 1);
-    break;
-  }
-  accept_paths(state, tested);
-  return moved;
-}
-
-/// Far particles come nearer to the sheets by what they moved beside them: no more than beside any
-/// motion in the box that holds those of all vertices, and so of all triangles.
-inline void bring_far_particles_nearer(State& state) {
-  const FluidState& f = state.fluid;
-  const ClothState& c = state.cloth;
-  const VecView to = c.position.view(), from = c.start.view();
-  const Bounds of_cloth = parallel_reduce(
-      "cloth: motions", c.vertices, Bounds{},
-      DRENCH_LAMBDA(int v) { return bounds_of(to[v] - from[v]); }, JoinBounds{});
-  const VecView x = f.position.view(), start = f.start.view();
-  float* far_by = f.far_by.data();
-  for_each_lane(
-      "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {
-        const auto moved = x.at(i) - start.at(i);
-        using T = decltype(moved.x);
-        const auto most = [](T m, float low, float high) {
-          return maximum(m - T(low), T(high) - m);
-        };
-        const Vec3<T> beside{most(moved.x, of_cloth.low.x, of_cloth.high.x),
-                             most(moved.y, of_cloth.low.y, of_cloth.high.y),
-                             most(moved.z, of_cloth.low.z, of_cloth.high.z)};
-        store(far_by, i, load(far_by, i) - square_root(length2(beside)));
-      });
-}
-
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.
-inline void move_coupled(State& state) {
-  const float dt = float(state.dt / state.substeps);
-  copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(),
-               state.cloth.vertices);
-  move_unguarded_particles(state);
-  float moved = 0.f;
-  for (int s = 0; s < state.substeps; ++s) {
-    if (!state.parameters.incompressible) cloth_verlet(state, cloth_buffers(state.cloth), dt);
-    moved = guard_substep(state, dt, moved);
-    finish_substep(state.cloth);
-    if (state.after_substep) state.after_substep();
-  }
-  bring_far_particles_nearer(state);
-  if (any_periodic(state.parameters)) wrap_positions(state);
-}
+void move_coupled(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

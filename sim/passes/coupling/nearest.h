@@ -1,8 +1,8 @@
 #pragma once
-// Nearest triangle of every particle within reach (eq 5 of the seed with the exact distance in
-// place of the centroid's). The triangle that was nearest a step ago bounds the search, and a
-// particle that was found far off is left out until it or the cloth has moved as far. On a CPU core
-// eight neighbours walk the polygon grid together, on the GPU every thread its own.
+// Nearest triangle of every particle within reach (eq 5 of Harada et al. 2007 with the exact
+// distance in place of the centroid's). The triangle that was nearest a step ago bounds the search,
+// and a particle that was found far off is left out until it or the cloth has moved as far. On a
+// CPU core eight neighbours traverse the polygon grid together, on the GPU every thread its own.
 
 #include "sim/passes/coupling/geometry.h"
 #include "sim/passes/coupling/polygon_grid.h"
@@ -16,49 +16,7 @@ struct NearestOutput {
   float reach, search;  // m: triangles within reach count, those within search are looked at
 };
 
-inline NearestOutput nearest_output(State& state, float reach) {
-  FluidState& f = state.fluid;
-  return {f.triangle.data(), f.weight_b.data(), f.weight_c.data(), f.far_by.data(), reach,
-          1.5f * reach};
-}
-
-#if defined(__CUDACC__)
-
-inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
-  FluidState& f = state.fluid;
-  const PolygonView polygons = polygons_of(state);
-  const NearestOutput out = nearest_output(state, reach);
-  const int* before = f.memory_triangle.data();
-  parallel_for(
-      "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
-        out.triangle[i] = -1;
-        if (out.far_by[i] > 0.f) return;
-        Vec3<float> p = position[i];
-        float best = out.search * out.search;
-        int nearest = -1;
-        const auto test = [&](const PreparedTriangle<float>& triangle, int t) {
-          const ClosestPoint<float> foot = closest_point(plane_foot(p, triangle), triangle);
-          if (foot.distance2 < best) {
-            best = foot.distance2, nearest = t;
-            out.weight_b[i] = foot.wb, out.weight_c[i] = foot.wc;
-          }
-        };
-        if (before[i] >= 0) {
-          Vec3<float> a, b, c;
-          polygons.corners(before[i], a, b, c);
-          p = polygons.beside(before[i], position[i]);
-          test(prepare_triangle(a, b, c), before[i]);
-          p = position[i];
-        }
-        polygons.for_each_near_box(p, p, sqrtf(best),
-                                   [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
-        const bool found = best < out.reach * out.reach;
-        if (found) out.triangle[i] = nearest;
-        out.far_by[i] = sqrtf(best) - out.reach;
-      });
-}
-
-#else
+#if !defined(__CUDACC__)
 
 /// Nearest triangles of eight particles as they are known so far.
 struct NearestOfPack {
@@ -70,9 +28,16 @@ struct NearestOfPack {
   DRENCH_HD void test(const PolygonView& polygons, int k) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
-    const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
-                                   one.d12,        one.d22,     one.inverse_ab, one.inverse_ac,
-                                   one.inverse_bc, one.inverse};
+    const PreparedTriangle<Pack> t{.a = all(one.a),
+                                   .ab = all(one.ab),
+                                   .ac = all(one.ac),
+                                   .d11 = one.d11,
+                                   .d12 = one.d12,
+                                   .d22 = one.d22,
+                                   .inverse_ab = one.inverse_ab,
+                                   .inverse_ac = one.inverse_ac,
+                                   .inverse_bc = one.inverse_bc,
+                                   .inverse = one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
     Mask may = distance2_bound(plane, t) < best;
@@ -83,7 +48,9 @@ struct NearestOfPack {
   DRENCH_HD void test_each(const PolygonView& polygons, LaneIndex triangle) {
     const Mask valid = is_index(triangle);
     const LaneIndex t = select(valid, triangle, same_index(0)), first = t + t + t;
-    const auto corner = [&](int c) { return polygons.place.at(polygons.position, first + c); };
+    const auto corner = [&](int c) {
+      return polygons.corner_positions.at(polygons.position, first + c);
+    };
     const Vec3<Pack> from = polygons.periodic ? beside(polygons, t) : p;
     take(closest_point<Pack>(from, corner(0), corner(1), corner(2)), triangle, valid);
   }
@@ -105,10 +72,10 @@ struct NearestOfPack {
   }
 };
 
-/// Up to eight particles that lie close together. Those of a row of cells are handed in one by one.
+/// Up to eight particles that lie close together. Those of a row of cells are added one by one.
 class PackOfNeighbours {
  public:
-  PackOfNeighbours(const PolygonView& polygons, const VecView& position, const int* before,
+  PackOfNeighbours(const PolygonView& polygons, const ConstVecView& position, const int* before,
                    const NearestOutput& out)
       : polygons_(polygons), position_(position), before_(before), out_(out) {}
   ~PackOfNeighbours() { flush(); }
@@ -158,33 +125,16 @@ class PackOfNeighbours {
   }
 
   const PolygonView& polygons_;
-  const VecView position_;
+  const ConstVecView position_;
   const int* before_;
   const NearestOutput& out_;
   int member_[8], count_ = 0;
 };
 
-inline void find_nearest_triangles(State& state, const VecView& position, float reach) {
-  FluidState& f = state.fluid;
-  const PolygonView polygons = polygons_of(state);
-  const NearestOutput out = nearest_output(state, reach);
-  const int *cell_start = f.cell_start.data(), *before = f.memory_triangle.data();
-  const GridShape g = f.grid;
-  ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
-    for (int row = range.begin(); row < range.end(); ++row) {
-      PackOfNeighbours close(polygons, position, before, out),
-          near(polygons, position, before, out), unknown(polygons, position, before, out);
-      for (int i = cell_start[row * g.nx]; i < cell_start[(row + 1) * g.nx]; ++i) {
-        out.triangle[i] = -1;
-        if (before[i] >= 0)  // the farthest of eight says how far to look for all of them
-          (out.far_by[i] < -0.5f * reach ? close : near).add(i, 2.f * reach);
-        else if (out.far_by[i] <= 0.f)
-          unknown.add(i, 2.f * reach);
-      }
-    }
-  });
-}
-
 #endif
+
+/// Into FluidState::triangle, the weights of its foot and far_by.
+/// @param position  m, of the particles. @param reach  m.
+void find_nearest_triangles(State& state, const ConstVecView& position, float reach);
 
 }  // namespace drench::sim::DRENCH_BACKEND

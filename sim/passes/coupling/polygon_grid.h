@@ -1,10 +1,10 @@
 #pragma once
-// The second grid of the seed: polygons by centroid (section 5.1).
+// The second grid of Harada et al. 2007: polygons by centroid (section 5.1).
 //
 // Where an axis is periodic vertices stay in coordinates of their own, however far a sheet drifts,
 // and the grid holds every image of a triangle that comes within two supports of the domain: who
 // looks through it in the neighbourhood of a particle finds the images that are there. A triangle
-// is known by its index, an image by its place in the grid's order. Sheets that are joined to
+// is known by its index, an image by its index in the grid's order. Sheets that are joined to
 // themselves across a seam have triangles and springs whose ends stand a period off their vertices.
 
 #include "sim/backend/parallel.h"
@@ -28,13 +28,6 @@ struct JoinBounds {
   }
 };
 
-struct Larger {
-  template <class T>
-  DRENCH_HD T operator()(T a, T b) const {
-    return a > b ? a : b;
-  }
-};
-
 /// A float of its own, or eight of them one after the other: how a pass over packs fills an array
 /// of structs.
 DRENCH_HD void put_triangle(PreparedTriangle<float>* out, int k, const PreparedTriangle<float>& t) {
@@ -53,20 +46,17 @@ DRENCH_HD void put_triangle(PreparedTriangle<float>* out, Lanes k,
 #endif
 
 /// Bounds of points 0..n-1.
-inline Bounds bounds_of_points(const char* name, VecView points, int n) {
-  return parallel_reduce(
-      name, n, Bounds{}, DRENCH_LAMBDA(int i) { return bounds_of(points[i]); }, JoinBounds{});
-}
+Bounds bounds_of_points(const char* name, ConstVecView points, int n);
 
 /// Corners of triangles, each triangle in one piece.
 struct Corners {
-  const int* vertex;  // 3 a triangle
-  VecView shift;      // m
-  bool joined;        // there are shifts
+  const int* vertex;   // 3 a triangle
+  ConstVecView shift;  // m
+  bool joined;         // there are shifts
 
   /// @param k  3 triangle + corner
   template <class Index>
-  DRENCH_HD auto at(const VecView& x, Index k) const {
+  DRENCH_HD auto at(const ConstVecView& x, Index k) const {
     auto p = x.at(load(vertex, k));
     if (joined) p = p + shift.at(k);
     return p;
@@ -108,8 +98,13 @@ inline TriangleImages triangle_images_of(const State& state) {
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   const float margin = 2.f * p.support_radius;
-  TriangleImages images{periods_of(p), c.low,     c.high,     c.largest_radius,
-                        {0, 0, 0},     {1, 1, 1}, c.triangles};
+  TriangleImages images{.period = periods_of(p),
+                        .low = c.low,
+                        .high = c.high,
+                        .radius = c.largest_radius,
+                        .first = {0, 0, 0},
+                        .count = {1, 1, 1},
+                        .triangles = c.triangles};
   const auto span = [&](int k, float period, float& low, float& high) {
     if (!(period > 0.f)) return;
     low = p.low[k] - margin, high = p.high[k] + margin;
@@ -122,108 +117,31 @@ inline TriangleImages triangle_images_of(const State& state) {
   return images;
 }
 
-/// Sorts the images of all triangles that the grid holds. Returns how many.
-inline int sort_images(State& state, const TriangleImages& images) {
-  ClothState& c = state.cloth;
-  const int items = images.items(), triangles = c.triangles;
-  const GridShape grid = c.grid;
-  const VecView centroid = c.centroid.view();
-  c.cell.resize(items);
-  int* cell = c.cell.data();
-  parallel_for(
-      "cloth: cells of images", items, DRENCH_LAMBDA(int k) {
-        const Vec3<float> m = centroid[k % triangles], at = m + images.shift(k, m);
-        cell[k] = images.holds(at) ? grid.cell(at) : grid.cells();
-      });
-  stable_sort_keys(c.cell, items, grid.cells(), c.order, c.cell_start, state.scratch);
-  const int held = value_at(c.cell_start, grid.cells());
-  for (VecColumn* v : {&c.sorted_low, &c.sorted_high, &c.sorted_shift}) v->resize(held + 8);
-  c.sorted_triangle.resize(held + 8);
-  int* order = c.order.data();
-  const VecView shift = c.sorted_shift.view();
-  parallel_for(
-      "cloth: images", items, DRENCH_LAMBDA(int k) {
-        const int item = order[k];
-        order[k] = item % triangles;
-        if (k < held) shift.set(k, images.shift(item, centroid[item % triangles]));
-      });
-  return held;
-}
-
 /// Centroids, boxes and the sorted grid, its cells at least as wide as the largest
 /// centroid-to-corner distance plus `room`.
-inline void build_polygon_grid(State& state, float room) {
-  ClothState& c = state.cloth;
-  const VecView x = c.position.view(), centroid = c.centroid.view();
-  const Corners corner = corners_of(c);
-  const float largest = parallel_reduce(
-      "cloth: centroids", c.triangles, 0.f,
-      DRENCH_LAMBDA(int t) {
-        const Vec3<float> a = corner.at(x, 3 * t), b = corner.at(x, 3 * t + 1),
-                          d = corner.at(x, 3 * t + 2);
-        const Vec3<float> m = (a + b + d) * (1.f / 3.f);
-        centroid.set(t, m);
-        return maximum(length2(a - m), maximum(length2(b - m), length2(d - m)));
-      },
-      Larger{});
-  c.largest_radius = std::sqrt(largest);
-  const Bounds bounds = bounds_of_points("cloth: bounds", x, c.vertices);
-  c.low = bounds.low, c.high = bounds.high;
-  const bool periodic = any_periodic(state.parameters);
-  const TriangleImages images = triangle_images_of(state);
-  c.grid = make_grid_shape(images.low, images.high, room + c.largest_radius);
-  int sorted_count = c.triangles;
-  if (periodic) {
-    sorted_count = sort_images(state, images);
-  } else {
-    const GridShape grid = c.grid;
-    int* cell = c.cell.data();
-    parallel_for(
-        "cloth: cells", c.triangles, DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
-    stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
-  }
-  const int* order = c.order.data();
-  const VecView shift = c.sorted_shift.view();
-  const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
-  PreparedTriangle<float>* sorted = c.sorted_triangle.data();
-  for_each_lane(
-      "cloth: sorted triangles", sorted_count, DRENCH_LAMBDA(auto k) {
-        const auto t = load(order, k);
-        const auto at = [&](int e) {
-          auto p = corner.at(x, t + t + t + e);
-          if (periodic) p = p + shift.at(k);
-          return p;
-        };
-        const auto a = at(0), b = at(1), d = at(2);
-        using Vec = decltype(at(0));
-        low.put(k, Vec{minimum(a.x, minimum(b.x, d.x)), minimum(a.y, minimum(b.y, d.y)),
-                       minimum(a.z, minimum(b.z, d.z))});
-        high.put(k, Vec{maximum(a.x, maximum(b.x, d.x)), maximum(a.y, maximum(b.y, d.y)),
-                        maximum(a.z, maximum(b.z, d.z))});
-        put_triangle(sorted, k, prepare_triangle(a, b, d));
-      });
-}
+void build_polygon_grid(State& state, float room);
 
 /// Read-only view for passes that look triangles up.
 struct PolygonView {
   GridShape grid;
   const int *cell_start, *order, *corner;
-  VecView position, centroid;
+  ConstVecView position;
+  ConstVecView centroid;
   float largest_radius;
-  VecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
+  ConstVecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
   const PreparedTriangle<float>* sorted;
-  Corners place;         // of the corners
-  VecView sorted_shift;  // m, of the images in that order; where an axis is periodic
-  Vec3<float> period;    // m
+  Corners corner_positions;
+  ConstVecView sorted_shift;  // m, of the images in that order; where an axis is periodic
+  Vec3<float> period;         // m
   bool periodic;
 
   DRENCH_HD void corners(int t, Vec3<float>& a, Vec3<float>& b, Vec3<float>& c) const {
-    a = place.at(position, 3 * t), b = place.at(position, 3 * t + 1),
-    c = place.at(position, 3 * t + 2);
+    a = corner_positions.at(position, 3 * t), b = corner_positions.at(position, 3 * t + 1),
+    c = corner_positions.at(position, 3 * t + 2);
   }
-  /// The corner of what stands in a place of the order, with the vertices at x.
-  DRENCH_HD Vec3<float> corner_in(int k, int e, const VecView& x) const {
-    const Vec3<float> p = place.at(x, 3 * order[k] + e);
+  /// The corner of the image at index k of the order, with the vertices at x.
+  DRENCH_HD Vec3<float> corner_in(int k, int e, const ConstVecView& x) const {
+    const Vec3<float> p = corner_positions.at(x, 3 * order[k] + e);
     return periodic ? p + sorted_shift[k] : p;
   }
   /// The image of p that a triangle is to be seen from. (Not always the nearest to a large one.)
@@ -244,16 +162,6 @@ struct PolygonView {
       }
     }
   }
-  /// Calls f(place in order) for each of those whose own box comes within `extra` of the box.
-  template <class F>
-  DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra,
-                                   const F& f) const {
-    for_each_range(low, high, extra, [&](int begin, int end) {
-      for (int k = begin; k < end; ++k) {
-        if (box_near(k, low, high, extra)) f(k);
-      }
-    });
-  }
   template <class Index>
   DRENCH_HD auto box_near(Index k, Vec3<float> low, Vec3<float> high, float extra) const {
     using T = decltype(load(sorted_low.x, k));
@@ -263,24 +171,34 @@ struct PolygonView {
                       max0(maximum(T(low.z) - h.z, l.z - T(high.z)))};
     return length2(gap) <= T(extra * extra);
   }
+  /// Calls f(index in order) for each of those whose own box comes within `extra` of the box.
+  template <class F>
+  DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra,
+                                   const F& f) const {
+    for_each_range(low, high, extra, [&](int begin, int end) {
+      for (int k = begin; k < end; ++k) {
+        if (box_near(k, low, high, extra)) f(k);
+      }
+    });
+  }
 };
 
 inline PolygonView polygons_of(const State& state) {
   const ClothState& c = state.cloth;
-  return {c.grid,
-          c.cell_start.data(),
-          c.order.data(),
-          c.corner.data(),
-          c.position.view(),
-          c.centroid.view(),
-          c.largest_radius,
-          c.sorted_low.view(),
-          c.sorted_high.view(),
-          c.sorted_triangle.data(),
-          corners_of(c),
-          c.sorted_shift.view(),
-          periods_of(state.parameters),
-          any_periodic(state.parameters)};
+  return {.grid = c.grid,
+          .cell_start = c.cell_start.data(),
+          .order = c.order.data(),
+          .corner = c.corner.data(),
+          .position = c.position.view(),
+          .centroid = c.centroid.view(),
+          .largest_radius = c.largest_radius,
+          .sorted_low = c.sorted_low.view(),
+          .sorted_high = c.sorted_high.view(),
+          .sorted = c.sorted_triangle.data(),
+          .corner_positions = corners_of(c),
+          .sorted_shift = c.sorted_shift.view(),
+          .period = periods_of(state.parameters),
+          .periodic = any_periodic(state.parameters)};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

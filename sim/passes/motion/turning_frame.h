@@ -3,7 +3,8 @@
 //   du/dt = -dw/dt x r - w x (w x r) - 2 w x u,      r from a point of the axis,
 // the forces of Euler, of the centrifuge and of Coriolis (Landau and Lifshitz, Mechanics, section
 // 39). Coriolis' turns velocities and does no work: the trapezoidal rule, solved in closed form,
-// keeps their length to rounding. It goes before gravity, at the places that the step starts with.
+// keeps their length to rounding. It goes before gravity, at the positions that the step starts
+// with.
 
 #include "sim/backend/parallel.h"
 #include "sim/state.h"
@@ -29,17 +30,7 @@ inline TurningFrame turning_frame_of(const State& state) {
           float(state.dt)};
 }
 
-inline void turn_frame(State& state) {
-  const TurningFrame turn = turning_frame_of(state);
-  const VecView x = state.fluid.position.view(), v = state.fluid.velocity.view(),
-                cloth = state.cloth.position.view(), speed = state.cloth.velocity.view();
-  const float* inverse_mass = state.cloth.inverse_mass.data();
-  parallel_for(
-      "turning frame", state.fluid.count, DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });
-  parallel_for(
-      "turning frame: cloth", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (inverse_mass[i] > 0.f) speed.set(i, turn(cloth[i], speed[i]));
-      });
-}
+/// What the turning of the domain does to the velocities of fluid and free vertices in a step.
+void turn_frame(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -1,40 +1,13 @@
 #pragma once
 // Particles that sinks take, and those that have left the domain: both sort behind all cells.
 
-#include "sim/backend/parallel.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 /// Gives particles in a sink the key first_key + its index; the first sink takes what lies in two.
-inline void mark_drained(State& state, int first_key) {
-  const ObstacleViews sinks = state.sinks.views();
-  const VecView x = state.fluid.position.view();
-  int* cell = state.fluid.cell.data();
-  parallel_for(
-      "fluid in sinks", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Vec3<float> q = x[i];
-        for (int k = sinks.count - 1; k >= 0; --k) {
-          const ObstacleView& sink = sinks.obstacle[k];
-          if (!sink.near_path(q, q, 0.f)) continue;
-          if (sink.distance(sink.to_own(1, q), sink.blend[1]) < 0.f) cell[i] = first_key + k;
-        }
-      });
-}
-
+void mark_drained(State& state, int first_key);
 /// Drops what has sorted behind all cells, and counts it.
-inline void drop_removed(State& state) {
-  FluidState& f = state.fluid;
-  const int cells = f.grid.cells(), sinks = state.sinks.count, before = f.count;
-  f.count = value_at(f.cell_start, cells);
-  if (f.count == before) return;
-  int begin = f.count;
-  for (int k = 0; k < sinks; ++k) {
-    const int end = value_at(f.cell_start, cells + k + 1);
-    state.removed[k] += uint64_t(end - begin);
-    begin = end;
-  }
-  state.removed.back() += uint64_t(before - begin);
-}
+void drop_removed(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

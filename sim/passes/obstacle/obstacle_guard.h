@@ -8,13 +8,9 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 /// predict_particles with obstacles that move at the same time.
-inline void predict_around_obstacles(State& state) {
-  predict_with(state, obstacle_guard_of(state, 0));
-}
+void predict_around_obstacles(State& state);
 
 /// project_density with obstacles where the step ends.
-inline void project_around_obstacles(State& state) {
-  project_with(state, obstacle_guard_of(state, 1));
-}
+void project_around_obstacles(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

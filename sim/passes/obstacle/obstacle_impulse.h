@@ -8,8 +8,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct Impulse {
   double x = 0, y = 0, z = 0;
-  DRENCH_HD Impulse operator()(const Impulse& a, const Impulse& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  DRENCH_HD Impulse operator+(const Impulse& other) const {
+    return {x + other.x, y + other.y, z + other.z};
   }
 };
 
@@ -17,87 +17,12 @@ DRENCH_HD Impulse times(Vec3<float> v, double push) { return {push * v.x, push *
 
 /// What pressure gave to one obstacle, all images of it, in the step that was made, kg m/s: the
 /// reaction to its part of -D^T q (pressure_rows.h). Of particles that are not in the near list.
-inline Impulse pressure_impulse(const State& state, int which) {
-  const Parameters& p = state.parameters;
-  const ObstacleShare law = obstacle_share_of(p);
-  const ImageWalls walls = image_walls_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const Float4* place = state.pressure.place.data();
-  const int* triangle = state.cloth.vertices > 0 ? state.fluid.triangle.data() : nullptr;
-  const double factor = double(p.particle_mass) * p.rest_density / state.dt;
-  return parallel_reduce(
-      "obstacle: impulse", state.fluid.count, Impulse{},
-      DRENCH_LAMBDA(int i) {
-        const Float4 at = place[i];
-        const Vec3<float> x{at.x, at.y, at.z};
-        if (triangle && triangle[i] >= 0) return Impulse{};
-        Impulse sum;
-        for (int image = 0; image < obstacles.count && at.w != 0.f; ++image) {
-          if (obstacles.obstacle[image].of != which) continue;
-          const WallShare own = law.of(obstacles.obstacle[image], x);
-          if (own.value == 0.f) continue;
-          WallShare others = walls.share(x);
-          for (int k = 0; k < obstacles.count; ++k)
-            if (k != image) others = law.both(others, law.of(obstacles.obstacle[k], x));
-          sum = sum(sum, times(own.gradient, factor * at.w * (1.f - others.value)));
-        }
-        return sum;
-      },
-      Impulse{});
-}
+Impulse pressure_impulse(const State& state, int which);
 
 /// The same of those that are.
-inline Impulse pressure_impulse_near_sheets(const State& state, int which) {
-  const Parameters& p = state.parameters;
-  const ObstacleShare law = obstacle_share_of(p);
-  const ImageWalls walls = image_walls_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const SheetRows c = sheet_rows(state);
-  const VecView normal = state.fluid.normal.view();
-  const Float4* place = state.pressure.place.data();
-  const double factor = double(p.particle_mass) * p.rest_density / state.dt;
-  return parallel_reduce(
-      "obstacle: impulse near sheets", c.rows, Impulse{},
-      DRENCH_LAMBDA(int row) {
-        const int i = c.particle[row];
-        if (i < 0 || place[i].w == 0.f) return Impulse{};
-        const Vec3<float> x{place[i].x, place[i].y, place[i].z}, n = normal[i];
-        const float gap = c.gap[row];
-        Impulse sum;
-        for (int image = 0; image < obstacles.count; ++image) {
-          if (obstacles.obstacle[image].of != which) continue;
-          const WallShare own = law.seen(obstacles.obstacle[image], x, n, gap, walls);
-          if (own.value == 0.f) continue;
-          WallShare others = walls.share(x, n, gap);
-          for (int k = 0; k < obstacles.count; ++k)
-            if (k != image)
-              others = law.both(others, law.seen(obstacles.obstacle[k], x, n, gap, walls));
-          sum = sum(sum,
-                    times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value)));
-        }
-        return sum;
-      },
-      Impulse{});
-}
+Impulse pressure_impulse_near_cloth(const State& state, int which);
 
 /// What surface tension gave to one obstacle in the step that was made, kg m/s.
-inline Impulse tension_impulse(const State& state, int which) {
-  MirrorImages images = mirror_images_of(state);
-  images.sheets.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
-  const auto force = tension_force(state, nullptr, Straight{});
-  const double factor = double(force.scale) * state.parameters.particle_mass;
-  return parallel_reduce(
-      "obstacle: tension", state.fluid.count, Impulse{},
-      DRENCH_LAMBDA(int i) {
-        Impulse impulse;
-        const Mirrors mirrors = images.of(i);
-        for (int k = 0; k < mirrors.count; ++k) {
-          if (mirrors.mirror[k].of != which) continue;
-          impulse = impulse(impulse, times(images.sum(i, mirrors, force).by[k], factor));
-        }
-        return impulse;
-      },
-      Impulse{});
-}
+Impulse tension_impulse(const State& state, int which);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -69,7 +69,7 @@ struct ObstacleShare {
   }
 
   /// Share of density that one obstacle, where it ends the step, replaces at x.
-  DRENCH_HD WallShare of(const ObstacleView& o, Vec3<float> x) const {
+  DRENCH_HD_CALL WallShare of(const ObstacleView& o, Vec3<float> x) const {
     if (!o.near_path(x, x, reach())) return {0.f, {0.f, 0.f, 0.f}};
     const Vec3<float> own = o.to_own(1, x);
     WallShare share{};
@@ -86,12 +86,12 @@ struct ObstacleShare {
 
   /// The same beside a sheet at `distance` m against its normal, as ImageWalls::share: not seen
   /// through it.
-  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> sheet_normal,
+  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> cloth_normal,
                            float distance, const ImageWalls& walls) const {
     const WallShare share = of(o, x);
     if (share.value == 0.f) return share;
     const Vec3<float> own = o.to_own(1, x), n = o.turn(1, o.normal(own, o.blend[1]));
-    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, sheet_normal) - distance);
+    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, cloth_normal) - distance);
     return {share.value * shown, share.gradient * shown};
   }
 
@@ -100,6 +100,7 @@ struct ObstacleShare {
     return {1.f - (1.f - a.value) * (1.f - b.value),
             a.gradient * (1.f - b.value) + b.gradient * (1.f - a.value)};
   }
+  /// Walls and all obstacles together at x.
   DRENCH_HD WallShare with(WallShare walls, const ObstacleViews& obstacles, Vec3<float> x) const {
     for (int k = 0; k < obstacles.count; ++k) {
       const WallShare share = of(obstacles.obstacle[k], x);
@@ -114,24 +115,6 @@ inline ObstacleShare obstacle_share_of(const Parameters& p) {
 }
 
 /// Adds obstacles to what find_neighbours has of the walls.
-inline void add_obstacle_shares(State& state) {
-  const Parameters& p = state.parameters;
-  const VecView x = state.fluid.position.view();
-  const ObstacleShare law = obstacle_share_of(p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  const float rest = p.rest_density;
-  Float4* wall = state.pressure.wall.data();
-  parallel_for(
-      "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
-        for (int k = 0; k < obstacles.count; ++k) {
-          const WallShare share = law.of(obstacles.obstacle[k], x[i]);
-          if (share.value == 0.f) continue;
-          const Float4 w = wall[i];
-          const WallShare all = law.both({w.w / rest, {w.x / rest, w.y / rest, w.z / rest}}, share);
-          wall[i] = {rest * all.gradient.x, rest * all.gradient.y, rest * all.gradient.z,
-                     rest * all.value};
-        }
-      });
-}
+void add_obstacle_shares(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

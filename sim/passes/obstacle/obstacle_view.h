@@ -39,7 +39,13 @@ struct FieldView {
 
 /// Without pointers.
 inline FieldView field_view(const LevelSet& set) {
-  FieldView view{nullptr, nullptr, 1.f / set.voxel, set.voxel, set.band, {}, {}};
+  FieldView view{.block = nullptr,
+                 .value = nullptr,
+                 .inverse_voxel = 1.f / set.voxel,
+                 .voxel = set.voxel,
+                 .band = set.band,
+                 .low = {},
+                 .blocks = {}};
   for (int k = 0; k < 3; ++k) view.low[k] = set.low[k], view.blocks[k] = set.blocks[k];
   return view;
 }
@@ -89,7 +95,7 @@ struct ObstacleView : ObstaclePlacement {
   }
 
   /// m, negative inside. @param mix  0 the first level set .. 1 the second.
-  DRENCH_HD float distance(Vec3<float> own, float mix) const {
+  DRENCH_HD_CALL float distance(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return own.y;
     if (shape == ObstacleShape::sphere) return length(own) - half[0];
     if (shape == ObstacleShape::box) return BoxDistance(own, half).distance;
@@ -115,7 +121,7 @@ struct ObstacleView : ObstaclePlacement {
   }
 
   /// Unit, away from the solid; zero deep inside a level set, where nothing is known.
-  DRENCH_HD Vec3<float> normal(Vec3<float> own, float mix) const {
+  DRENCH_HD_CALL Vec3<float> normal(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return {0.f, 1.f, 0.f};
     if (shape == ObstacleShape::box) return BoxDistance(own, half).normal;
     if (shape == ObstacleShape::field) {

@@ -4,13 +4,13 @@
 //   L_i = M_i^-1 tr M_i / 3,   M_i = sum_j m / rho_0 (x_j - x_i) (grad W_ij)^T.
 // The factor leaves an even expansion to count as the kernel's sum counts it, so that a solve still
 // finds the density it is asked for. Without L a flow that shears the arrangement of neighbours
-// without changing any volume changes the sum all the same, and pressures resist it: waves died and
-// vortices slowed.
+// without changing any volume changes the sum all the same, and pressures resist it: waves die and
+// vortices slow.
 //
 // M is averaged over the neighbours. Its own value, one particle at a time, keeps more of a wave
-// but makes packings under weight boil (rms 0.02 to 0.05 sqrt(g H) for ever, with averages as
-// without any correction): rows are then far from the gradient of the density that is taken back to
-// rest, and what differs does work round closed paths. What a packing has in common with its
+// but makes packings under weight boil (docs/decisions/0003-averaged-gradient-correction.md): rows
+// are then far from the gradient of the density that is taken back to rest, and what differs does
+// work round closed paths. What a packing has in common with its
 // neighbourhood resists shear; what a particle has of its own averages to nothing.
 // Beside walls, sheets and obstacles and at free surfaces, where half of the neighbours are
 // missing, L is that of the particles farther in, or 1.
@@ -109,33 +109,8 @@ struct GradientCorrection {
   }
 };
 
-/// L of each M by itself, where nothing boils: the domain is full (closed_domain.h).
-inline void correct_alone(State& state) {
-  PressureState& s = state.pressure;
-  const Float4 *moment = s.vector.data(), *cross = s.push.data();
-  Float4 *own = s.correction.data(), *own_cross = s.correction_cross.data();
-  parallel_for(
-      "neighbours: own correction", state.fluid.count,
-      DRENCH_LAMBDA(int i) { invert_moments(moment[i], cross[i], own[i], own_cross[i]); });
-}
-
-/// L of every particle, from positions, walls and densities. Uses PressureState::vector and push.
-inline void correct_gradients(State& state) {
-  PressureState& s = state.pressure;
-  const Parameters& p = state.parameters;
-  const float h = p.support_radius;
-  const float scale = p.particle_mass / p.rest_density / p.lattice_sum / (h * h * h * h * h);
-  with_separation(p, [&](auto separation) {
-    for_each_neighbour("neighbours: moments", s.lists, state.fluid.count,
-                       GradientMoments<decltype(separation)>{s.place.data(), s.wall.data(),
-                                                             state.fluid.density.data(),
-                                                             s.vector.data(), s.push.data(), scale,
-                                                             0.95f * p.rest_density, separation});
-  });
-  if (p.full) return correct_alone(state);
-  for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
-                     GradientCorrection{s.vector.data(), s.push.data(), s.wall.data(),
-                                        s.correction.data(), s.correction_cross.data()});
-}
+/// L of every particle, from positions, walls and densities. Uses PressureState::scratch_a and
+/// scratch_b.
+void correct_gradients(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

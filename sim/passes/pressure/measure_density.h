@@ -10,9 +10,9 @@ namespace drench::sim::DRENCH_BACKEND {
 struct MeasuredDensity {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
-  VecView position;  // sorted by cell
-  const int* order;  // where each stands in the state
-  float* density;    // kg/m^3, in the order of the state
+  ConstVecView position;  // sorted by cell
+  const int* order;       // where each stands in the state
+  float* density;         // kg/m^3, in the order of the state
   float support_radius, scale, rest_density;
   ImageWalls walls;
   ObstacleShare law;
@@ -37,23 +37,6 @@ struct MeasuredDensity {
   }
 };
 
-inline void measure_density(State& state) {
-  FluidState& f = state.fluid;
-  const Parameters& p = state.parameters;
-  sort_by_cell(state);
-  f.density.clear_bytes(0);  // lost particles have none
-  const VecView x = f.position.view(),
-                sorted{state.pressure.before.data(), state.pressure.next.data(),
-                       state.pressure.product.data()};
-  const int* order = f.order.data();
-  parallel_for(
-      "measure: sort", f.count, DRENCH_LAMBDA(int i) { sorted.set(i, x[order[i]]); });
-  for_each_pair(
-      "measure: density", {f.grid, f.cell_start.data()}, f.count,
-      MeasuredDensity{sorted, order, f.density.data(), p.support_radius,
-                      p.particle_mass / p.lattice_sum * WendlandC2::factor(p.support_radius),
-                      p.rest_density, image_walls_of(p), obstacle_share_of(p),
-                      state.obstacles.views()});
-}
+void measure_density(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

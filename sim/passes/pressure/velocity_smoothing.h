@@ -1,5 +1,6 @@
 #pragma once
-// XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
+// XSPH (Monaghan 1989): every step a particle takes on a fraction c of its neighbours' mean
+// velocity,
 //   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
 // antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h;
 // where it does less than a hundredth of what this does, as water's does at spacings of a
@@ -39,20 +40,6 @@ struct VelocitySmoothing {
   }
 };
 
-inline void smooth_velocities(State& state) {
-  const Parameters& p = state.parameters;
-  PressureState& s = state.pressure;
-  const VecView v = state.fluid.velocity.view();
-  Float4* vector = s.vector.data();
-  parallel_for(
-      "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
-        vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
-      });
-  const float share =
-      p.xsph + (smoothing_takes_viscosity(p, state.dt) ? smoothing_of_viscosity(p, state.dt) : 0.f);
-  const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
-  for_each_neighbour("smoothing", s.lists, state.fluid.count,
-                     VelocitySmoothing{vector, v, share * volume * h * h});
-}
+void smooth_velocities(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -30,7 +30,7 @@ struct AddLineSamples {
 };
 
 struct LineDensity {
-  VecView position;
+  ConstVecView position;
   float x, z, from, step;  // m
   float h, scale;          // m; kg/m^3, m / h^3
   Vec3<float> period;      // m; 0 where an axis is not periodic
@@ -52,7 +52,7 @@ struct LineDensity {
   }
 };
 
-/// Half of rest density, less the share that lies behind walls.
+/// Half of rest density, less the fraction that lies behind walls.
 struct HalfDensity {
   float half;  // kg/m^3, of what the walls beside the line leave open
   float low, high, h;
@@ -64,51 +64,5 @@ struct HalfDensity {
                    WendlandC2::halfspace(minimum((high - y) / h, 1.f)));
   }
 };
-
-inline HalfDensity half_density(const Parameters& p, const ProbeQuery& query) {
-  const float h = p.support_radius;
-  float half = 0.5f * p.rest_density;
-  for (const int k : {0, 2}) {
-    const float below = (query.place[k] - p.low[k]) / h, above = (p.high[k] - query.place[k]) / h;
-    if (p.wall[k]) {
-      half *= 1.f - WendlandC2::halfspace(minimum(max0(below), 1.f)) -
-              WendlandC2::halfspace(minimum(max0(above), 1.f));
-    }
-  }
-  return {half, p.low[1], p.high[1], h, p.wall[1]};
-}
-
-/// m local; NaN where no fluid reaches half of rest density over the line. From the top down in
-/// steps of a quarter support, then once more in fifteenths of the step that crosses it.
-inline double surface_height(const State& state, const ProbeQuery& query) {
-  const Parameters& p = state.parameters;
-  const HalfDensity enough = half_density(p, query);
-  const float h = p.support_radius;
-  LineDensity line{
-      state.fluid.position.view(),   query.place[0], query.place[2], 1e30f, 0.25f * h, h,
-      p.particle_mass / (h * h * h), periods_of(p)};
-  bool fine = false;
-  while (true) {
-    const LineSamples s =
-        parallel_reduce("probe: height", state.fluid.count, LineSamples{}, line, AddLineSamples{});
-    int k = 0;
-    while (k < height_samples && s.density[k] < enough(line.from - float(k) * line.step)) ++k;
-    if (k < height_samples && fine) {
-      if (k == 0) return line.from;
-      const float y = line.from - float(k) * line.step;
-      const float above = enough(y + line.step) - s.density[k - 1], at = s.density[k] - enough(y);
-      return double(y) + double(line.step) * at / (at + above);
-    }
-    if (k < height_samples) {
-      line.from -= float(std::max(k - 1, 0)) * line.step;
-      line.step /= float(height_samples - 1);
-      fine = true;
-    } else if (!fine && s.next > -1e30f) {
-      line.from = s.next;
-    } else {
-      return std::numeric_limits<double>::quiet_NaN();
-    }
-  }
-}
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -3,8 +3,8 @@
 // over its area; a disc elsewhere the stress in the fluid. Both are of the forces that moved the
 // particles, so that discs side by side sum to the force on what they cover.
 //
-// Inside the fluid a pair's force is what one particle hands to the other along the line between
-// them, and a body's along the perpendicular to its surface; the stress is that handed through
+// Inside the fluid a pair's force is what one particle exerts on the other along the line between
+// them, and a body's along the perpendicular to its surface; the stress is that transferred through
 // planes, the mean over planes with the disc's weight (bond functions: Hardy 1982; Murdoch 1983).
 // At rest it balances the weight above every plane, between the last particles and a wall, too,
 // where a sum over particles has only their layers (14 % off half a spacing before a wall).
@@ -25,13 +25,13 @@ struct SoftDisc {
     const Vec3<float> flat = d - normal * dot(d, normal);
     return minimum(max0((radius + rim - length(flat)) / (2.f * rim)), 1.f);
   }
-  /// The mean weight along the line from d to d + way: the integral of the tent along the normal is
-  /// exact, the place across is the line's middle.
-  DRENCH_HD float bond(Vec3<float> d, Vec3<float> way) const {
-    const float from = dot(d, normal) / rim, to = from + dot(way, normal) / rim;
+  /// The mean weight along the line from d to d + along: the integral of the tent along the normal
+  /// is exact, the position across is the line's middle.
+  DRENCH_HD float bond(Vec3<float> d, Vec3<float> along) const {
+    const float from = dot(d, normal) / rim, to = from + dot(along, normal) / rim;
     const float mean = fabsf(to - from) > 0.02f ? (below(to) - below(from)) / (to - from)
                                                 : max0(1.f - fabsf(0.5f * (from + to)));
-    return mean > 0.f ? mean * across(d + way * 0.5f) : 0.f;
+    return mean > 0.f ? mean * across(d + along * 0.5f) : 0.f;
   }
   /// Integral of the tent up to t.
   static DRENCH_HD float below(float t) {
@@ -45,14 +45,6 @@ struct SoftDisc {
   }
 };
 
-inline SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
-  return {{q.place[0], q.place[1], q.place[2]},
-          {q.normal[0], q.normal[1], q.normal[2]},
-          q.radius,
-          q.rim,
-          periods_of(p)};
-}
-
 /// Points of a disc, or of layers of it, at the middles of equal cells.
 struct DiscPoints {
   SoftDisc disc;
@@ -65,7 +57,7 @@ struct DiscPoints {
     const float ring = (disc.radius + disc.rim) / float(rings);
     return layers > 1 ? maximum(ring, 2.f * disc.rim / float(layers)) : ring;
   }
-  DRENCH_HD Vec3<float> place(int k, float& weight) const {
+  DRENCH_HD Vec3<float> point(int k, float& weight) const {
     const int spoke = k % spokes, ring = k / spokes % rings, layer = k / (spokes * rings);
     const float edge = (disc.radius + disc.rim) / float(rings), r = edge * (float(ring) + 0.5f),
                 angle = 2.f * pi * (float(spoke) + 0.5f) / float(spokes);
@@ -78,14 +70,6 @@ struct DiscPoints {
   }
 };
 
-inline DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) {
-  const Vec3<float> n = disc.normal,
-                    other =
-                        fabsf(n.x) < 0.6f ? Vec3<float>{1.f, 0.f, 0.f} : Vec3<float>{0.f, 1.f, 0.f},
-                    across = cross(n, other), u = across * (1.f / length(across));
-  return {disc, u, cross(n, u), layers, rings, spokes};
-}
-
 /// What a disc lies on.
 struct SensorBody {
   enum Kind : int { none, wall, obstacle, sheet } kind = none;
@@ -94,6 +78,8 @@ struct SensorBody {
   Vec3<float> facing{0.f, 0.f, 0.f};  // unit, to the fluid that is measured
   Vec3<float> foot{0.f, 0.f, 0.f};    // m, on a sheet
   float distance = 1e30f;             // m, of the disc's centre from its surface
+};
+struct NearerBody {
   DRENCH_HD SensorBody operator()(const SensorBody& a, const SensorBody& b) const {
     return fabsf(b.distance) < fabsf(a.distance) ? b : a;
   }
@@ -101,13 +87,13 @@ struct SensorBody {
 
 struct ObstacleAt {
   ObstacleViews obstacles;
-  Vec3<float> place;
+  Vec3<float> centre;
   int only;  // -1: any
   DRENCH_HD SensorBody operator()(int k) const {
     const ObstacleView& o = obstacles.obstacle[k];
     SensorBody body;
     if (only >= 0 && o.of != only) return body;
-    const Vec3<float> own = o.to_own(1, place);
+    const Vec3<float> own = o.to_own(1, centre);
     body.kind = SensorBody::obstacle, body.of = o.of;
     body.distance = o.distance(own, o.blend[1]);
     body.facing = o.turn(1, o.normal(own, o.blend[1]));
@@ -115,15 +101,15 @@ struct ObstacleAt {
   }
 };
 
-struct SheetAt {
+struct ClothAt {
   Corners corners;
-  VecView position;
+  ConstVecView position;
   const float* half_thickness;
   const int* sheet;
-  Vec3<float> place, period;
+  Vec3<float> centre, period;
   DRENCH_HD SensorBody operator()(int t) const {
     const Vec3<float> a = corners.at(position, 3 * t), b = corners.at(position, 3 * t + 1),
-                      c = corners.at(position, 3 * t + 2), d = nearest(place - a, period),
+                      c = corners.at(position, 3 * t + 2), d = nearest(centre - a, period),
                       none{0.f, 0.f, 0.f}, n = cross(b - a, c - a);
     const auto foot = closest_point(d, none, b - a, c - a);
     const float size = length(n);
@@ -131,50 +117,10 @@ struct SheetAt {
     body.kind = SensorBody::sheet, body.of = sheet[t];
     body.distance = sqrtf(foot.distance2) - half_thickness[t];
     body.facing = n * (size > 0.f ? 1.f / size : 0.f);
-    body.foot = place - d + (b - a) * foot.wb + (c - a) * foot.wc;
+    body.foot = centre - d + (b - a) * foot.wb + (c - a) * foot.wc;
     return body;
   }
 };
-
-/// The nearest sheet; none in a shot without any.
-inline SensorBody sheet_at(const State& state, Vec3<float> place) {
-  const ClothState& c = state.cloth;
-  if (!state.parameters.incompressible) return {};
-  return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
-                         SheetAt{corners_of(c), c.position.view(), c.half_thickness.data(),
-                                 c.sheet.data(), place, periods_of(state.parameters)},
-                         SensorBody{});
-}
-
-/// What a disc lies on: within half a spacing and 25 degrees of its surface. On obstacles either
-/// sign of its normal is right, on sheets it points to the side that is measured.
-inline SensorBody sensor_body(const State& state, const ProbeQuery& q) {
-  SensorBody body;
-  if (q.kind == ProbeKind::wall_pressure) {
-    body.kind = SensorBody::wall, body.axis = q.axis, body.side = q.side;
-    body.facing = along_axis(q.axis, q.side == 0 ? 1.f : -1.f);
-    return body;
-  }
-  const Vec3<float> place{q.place[0], q.place[1], q.place[2]},
-      n{q.normal[0], q.normal[1], q.normal[2]};
-  const float reach = 0.5f * state.parameters.spacing * 1.001f;
-  const auto lies_on = [&](const SensorBody& b) {
-    return fabsf(b.distance) <= reach && fabsf(dot(b.facing, n)) > 0.9f;
-  };
-  const ObstacleViews obstacles = state.obstacles.views();
-  body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
-                         ObstacleAt{obstacles, place, q.on}, SensorBody{});
-  if (lies_on(body)) {
-    body.facing = dot(body.facing, n) < 0.f ? -n : n;
-    return body;
-  }
-  body = sheet_at(state, place);
-  if (lies_on(body)) {
-    body.facing = n;
-    return body;
-  }
-  return {};
-}
 
 /// What the fluid pushes onto a body through a disc on it, N.
 struct SurfaceSensor {
@@ -186,7 +132,7 @@ struct SurfaceSensor {
 
   DRENCH_HD double push(const BodyPart& part, Vec3<float> from, int i) const {
     const float inward = -dot(part.gradient, body.facing);
-    const Vec3<float> d = from + part.way;
+    const Vec3<float> d = from + part.to_surface;
     if (!(inward > 0.f) || fabsf(dot(d, disc.normal)) > reach) return 0;
     return double(disc.across(d)) * parts.step.mass * parts.step.term[i] * inward;
   }
@@ -214,12 +160,12 @@ struct SurfaceSensor {
 struct OpenSpace {
   ImageWalls walls;
   ObstacleViews obstacles;
-  Vec3<float> sheet_normal, sheet_foot;  // a zero normal: no sheet
-  float cell;                            // m, over which the share of a point falls
+  Vec3<float> cloth_normal, cloth_foot;  // a zero normal: no sheet
+  float cell;                            // m, over which the open fraction of a point falls
 
   DRENCH_HD float step(float distance) const { return minimum(max0(0.5f + distance / cell), 1.f); }
-  /// The share of a point's cell that is open. @param but  an axis, or an obstacle, left out.
-  DRENCH_HD float share(Vec3<float> x, int but_axis, int but_obstacle) const {
+  /// The fraction of a point's cell that is open. @param but  an axis, or an obstacle, left out.
+  DRENCH_HD float open_fraction(Vec3<float> x, int but_axis, int but_obstacle) const {
     float open = 1.f;
     for (int k = 0; k < 3; ++k)
       if (walls.on[k] && k != but_axis)
@@ -229,7 +175,7 @@ struct OpenSpace {
       if (o.of == but_obstacle || !o.near_path(x, x, cell)) continue;
       open *= step(o.distance(o.to_own(1, x), o.blend[1]));
     }
-    if (length2(sheet_normal) > 0.f) open *= step(dot(x - sheet_foot, sheet_normal));
+    if (length2(cloth_normal) > 0.f) open *= step(dot(x - cloth_foot, cloth_normal));
     return open;
   }
 };
@@ -266,19 +212,19 @@ struct SurfaceExtent {
   }
   DRENCH_HD Totals<1> operator()(int k) const {
     float weight, height = 0.f;
-    const Vec3<float> x = points.place(k, weight);
+    const Vec3<float> x = points.point(k, weight);
     const bool on_obstacle = body.kind == SensorBody::obstacle;
     if (on_obstacle && !surface(x, height)) return {};
     const Vec3<float> before = x + body.facing * (height + 0.25f * spacing);
-    return {{double(weight) *
-             space.share(before, on_obstacle ? -1 : body.axis, on_obstacle ? body.of : -1)}};
+    return {{double(weight) * space.open_fraction(before, on_obstacle ? -1 : body.axis,
+                                                  on_obstacle ? body.of : -1)}};
   }
 };
 
 /// Area of a sheet over a disc, seen along its normal, m^2: triangles in 64 parts each.
-struct SheetExtent {
+struct ClothExtent {
   Corners corners;
-  VecView position;
+  ConstVecView position;
   const int* sheet;
   SoftDisc disc;
   int of;
@@ -304,44 +250,6 @@ struct SheetExtent {
   }
 };
 
-inline double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& disc,
-                             const SensorBody& body, float reach) {
-  const Parameters& p = state.parameters;
-  const ClothState& c = state.cloth;
-  if (body.kind == SensorBody::sheet) {
-    return parallel_reduce(
-               "probe: sheet's area", c.triangles, Totals<1>{},
-               SheetExtent{corners_of(c), c.position.view(), c.sheet.data(), disc, body.of, reach},
-               AddTotals<1>{})
-        .value[0];
-  }
-  const ObstacleViews obstacles = state.obstacles.views();
-  if (obstacles.count == 0) return q.extent;
-  const DiscPoints points = disc_points(disc, 1, 48, 96);
-  const Vec3<float> none{0.f, 0.f, 0.f};
-  return parallel_reduce("probe: area", points.count(), Totals<1>{},
-                         SurfaceExtent{points,
-                                       {image_walls_of(p), obstacles, none, none, points.cell()},
-                                       body,
-                                       p.spacing,
-                                       reach},
-                         AddTotals<1>{})
-      .value[0];
-}
-
-/// Force of the fluid through a disc on a body, over its area, Pa; 0 where nothing is left of it.
-inline double surface_pressure(const State& state, const ProbeQuery& q, const SensorBody& body) {
-  const SoftDisc disc = soft_disc_of(q, state.parameters);
-  const float reach = disc.radius + disc.rim;
-  const double extent = surface_extent(state, q, disc, body, reach);
-  if (!(extent > 1e-3 * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>(
-      "probe: pressure on a surface", state,
-      SurfaceSensor{body_parts_of(state), disc, body, state.fluid.triangle.data(),
-                    state.cloth.sheet.data(), reach});
-  return sum.value[0] / extent;
-}
-
 /// The stress along the disc's normal n times volumes, N m: of particle i, by virtual work,
 /// p_i (m / rho_0) sum_j m / rho_0 (-W'/r) (x_ij . L n) (x_ij . n) b_ij, b the mean weight along
 /// the pair, and what bodies have of it.
@@ -350,7 +258,7 @@ struct InnerSensor {
   SoftDisc disc;
   GridView grid;
   NeighbourView list;
-  Vec3<float> sheet_normal, sheet_foot;  // particles behind it do not count; zero: none
+  Vec3<float> cloth_normal, cloth_foot;  // particles behind it do not count; zero: none
 
   DRENCH_HD float pair(Vec3<float> from, Vec3<float> d, Vec3<float> corrected) const {
     const float bond = disc.bond(from, d);
@@ -361,7 +269,7 @@ struct InnerSensor {
     const StepPressure& step = parts.step;
     const Vec3<float> corrected = step.corrected(i, disc.normal);
     float sum = 0.f;
-    if (step.place) {
+    if (step.predicted) {
       for (size_t k = list.first(i); k < list.end(i); ++k)
         if (list.closeness(k) > 0.f)
           sum += pair(from, nearest(step.at(list.index(k)) - x, disc.period), corrected);
@@ -377,8 +285,9 @@ struct InnerSensor {
     return sum;
   }
   DRENCH_HD float body(const BodyPart& part, Vec3<float> from) const {
-    const float across = dot(part.gradient, disc.normal) * dot(part.way, disc.normal);
-    return across == 0.f ? 0.f : across / parts.step.rest_density * disc.bond(from, part.way);
+    const float across = dot(part.gradient, disc.normal) * dot(part.to_surface, disc.normal);
+    return across == 0.f ? 0.f
+                         : across / parts.step.rest_density * disc.bond(from, part.to_surface);
   }
   DRENCH_HD float bodies(int i, const Beside& b, int row, Vec3<float> from) const {
     float sum = body(parts.sheet(b, row), from);
@@ -392,7 +301,7 @@ struct InnerSensor {
     const Beside b = parts.beside(i, row);
     const Vec3<float> from = disc.from_centre(b.x);
     if (step.term[i] == 0.f || !disc.near(from, step.h)) return {};
-    if (dot(disc.centre + from - sheet_foot, sheet_normal) < 0.f) return {};
+    if (dot(disc.centre + from - cloth_foot, cloth_normal) < 0.f) return {};
     return {{double(step.mass) * step.rest_density * step.term[i] *
              (pairs(i, b.x, from) + bodies(i, b, row, from))}};
   }
@@ -403,50 +312,9 @@ struct InnerExtent {
   OpenSpace space;
   DRENCH_HD Totals<1> operator()(int k) const {
     float weight;
-    const Vec3<float> x = points.place(k, weight);
-    return {{double(weight) * space.share(x, -1, -1)}};
+    const Vec3<float> x = points.point(k, weight);
+    return {{double(weight) * space.open_fraction(x, -1, -1)}};
   }
 };
-
-/// Mean of the pressure in a disc inside the fluid, Pa; where there is no fluid it counts as none.
-inline double inner_pressure(const State& state, const ProbeQuery& q) {
-  const Parameters& p = state.parameters;
-  const FluidState& f = state.fluid;
-  const SoftDisc disc = soft_disc_of(q, p);
-  const ObstacleViews obstacles = state.obstacles.views();
-  // Fluid on the disc's side of the nearest sheet alone, if that is in reach.
-  const SensorBody sheet = sheet_at(state, disc.centre);
-  Vec3<float> normal{0.f, 0.f, 0.f};
-  if (sheet.distance < disc.rim) {
-    const Vec3<float> up = disc.from_centre(sheet.foot) * -1.f;
-    normal = dot(up, sheet.facing) < 0.f ? -sheet.facing : sheet.facing;
-  }
-  double extent = q.extent;
-  if (obstacles.count > 0 || length2(normal) > 0.f) {
-    const DiscPoints points = disc_points(disc, 32, 16, 32);
-    extent =
-        parallel_reduce(
-            "probe: volume of a disc", points.count(), Totals<1>{},
-            InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
-            AddTotals<1>{})
-            .value[0];
-  }
-  if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>("probe: pressure", state,
-                                           InnerSensor{body_parts_of(state),
-                                                       disc,
-                                                       {f.grid, f.cell_start.data()},
-                                                       view_of(state.pressure.lists),
-                                                       normal,
-                                                       sheet.foot});
-  return sum.value[0] / extent;
-}
-
-/// Pressure of a disc, Pa, of a surface that it lies on or of the fluid around it.
-inline double disc_pressure(const State& state, const ProbeQuery& q) {
-  const SensorBody body = sensor_body(state, q);
-  return body.kind == SensorBody::none ? inner_pressure(state, q)
-                                       : surface_pressure(state, q, body);
-}
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -24,16 +24,16 @@ namespace drench::sim::DRENCH_BACKEND {
 template <class Separation>
 struct ColourGradient {
   static constexpr int columns = 1;
-  const Float4* place;
+  const Float4* position;
   Float4* gradient;
   float scale;  // 1/m^2, of the sum
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<1> inputs() const { return {{place}}; }
+  DRENCH_HD Columns<1> inputs() const { return {{position}}; }
   template <class Q>
   struct Particle {
-    Q place;
+    Q position;
   };
   template <class Q>
   struct Sum {
@@ -45,7 +45,7 @@ struct ColourGradient {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.outwards = multiply_add(separation(i.place, j.place), weight, sum.outwards);
+    sum.outwards = multiply_add(separation(i.position, j.position), weight, sum.outwards);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 s = sum.outwards;
@@ -97,17 +97,17 @@ constexpr float tension_constant = 32.f;  // k
 template <class Separation>
 struct TensionForce {
   static constexpr int columns = 2;
-  const Float4 *place, *normal;  // normal: unit; w: s
-  Float4* kick;                  // m/s
-  float scale;                   // 1/(m^2 s), of the sum
-  float spacing;                 // over h
+  const Float4 *position, *normal;  // normal: unit; w: s
+  Float4* kick;                     // m/s
+  float scale;                      // 1/(m^2 s), of the sum
+  float spacing;                    // over h
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<2> inputs() const { return {{place, normal}}; }
+  DRENCH_HD Columns<2> inputs() const { return {{position, normal}}; }
   template <class Q>
   struct Particle {
-    Q place, normal;
+    Q position, normal;
   };
   template <class Q>
   struct Sum {
@@ -121,7 +121,7 @@ struct TensionForce {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q x = separation(i.place, j.place), square = splat_sum(x * x);
+    const Q x = separation(i.position, j.position), square = splat_sum(x * x);
     const Q a = splat_sum(i.normal * x), b = splat_sum(j.normal * x);
     const Q along = splat_w(i.normal) * (square - a * a) + splat_w(j.normal) * (square - b * b);
     sum.pull = multiply_add(x, weight * along, sum.pull);
@@ -170,93 +170,22 @@ struct SmoothKick {
   }
 };
 
-/// Normals, from the means of gradients.
-inline void make_unit(State& state) {
-  Float4* normal = state.tension.normal.data();
-  const float h = state.parameters.support_radius;
-  parallel_for(
-      "tension: unit normals", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Float4 n = normal[i];
-        const float size = square_root(n.x * n.x + n.y * n.y + n.z * n.z);
-        const float s = size > 0.f ? 1.f / size : 0.f;
-        normal[i] = {s * n.x, s * n.y, s * n.z, h * size};
-      });
-}
-
-/// Adds the images' share to a column of vectors.
-template <class Term>
-void add_images(const char* name, const State& state, Float4* vector, const Term& term) {
-  const MirrorImages images = mirror_images_of(state);
-  if (!images.any) return;
-  parallel_for(
-      name, state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Mirrors mirrors = images.of(i);
-        if (mirrors.count == 0) return;
-        const Vec3<float> s = images.sum(i, mirrors, term).total();
-        const Float4 v = vector[i];
-        vector[i] = {v.x + s.x, v.y + s.y, v.z + s.z, 0.f};
-      });
-}
-
 template <class Separation>
 TensionForce<Separation> tension_force(const State& state, Float4* kick, Separation separation) {
   const Parameters& p = state.parameters;
   const float a = p.spacing, h = p.support_radius;
   const float strength = float(state.dt) * tension_constant * p.surface_tension;
-  return {state.pressure.place.data(),
-          state.tension.normal.data(),
-          kick,
-          strength / (p.rest_density * a * a * h * h * h),
-          a / h,
-          separation};
+  return {.position = state.pressure.place.data(),
+          .normal = state.tension.normal.data(),
+          .kick = kick,
+          .scale = strength / (p.rest_density * a * a * h * h * h),
+          .spacing = a / h,
+          .separation = separation};
 }
 
-/// Adds what images do to kicks. A sheet owes its part until the next step, as in
-/// continuous_collision.h.
-template <class Separation>
-void pull_on_walls(State& state, const TensionForce<Separation>& force) {
-  const MirrorImages images = mirror_images_of(state);
-  if (!images.any) return;
-  const VecView owed = state.fluid.owed.view();
-  Float4* kick = force.kick;
-  const float mass = state.parameters.particle_mass;
-  parallel_for(
-      "tension: force of walls", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Mirrors mirrors = images.of(i);
-        if (mirrors.count == 0) return;
-        const ImageSums sums = images.sum(i, mirrors, force);
-        const Vec3<float> all = sums.total() * force.scale;
-        kick[i] = {kick[i].x - all.x, kick[i].y - all.y, kick[i].z - all.z, 0.f};
-        for (int k = 0; k < mirrors.count; ++k)
-          if (mirrors.mirror[k].of == nearest_sheet)
-            owed.set(i, owed[i] - sums.by[k] * (force.scale * mass));
-      });
-  state.owes |= images.any_sheet;
-}
-
-/// Uses PressureState::vector.
-inline void apply_surface_tension(State& state) {
-  const Parameters& p = state.parameters;
-  PressureState& s = state.pressure;
-  const int n = state.fluid.count;
-  const float h = p.support_radius;
-  Float4 *gradient = s.vector.data(), *normal = state.tension.normal.data(), *kick = gradient;
-  with_separation(p, [&](auto separation) {
-    using Separation = decltype(separation);
-    const float scale = gradient_scale(p) / p.rest_density;
-    const ColourGradient<Separation> colour{s.place.data(), gradient, scale, separation};
-    for_each_neighbour("tension: gradients", s.lists, n, colour);
-    add_images("tension: gradients beyond walls", state, gradient, colour);
-    const SmoothNormal smooth{gradient, normal, scale * h * h};
-    for_each_neighbour("tension: normals", s.lists, n, smooth);
-    add_images("tension: normals beyond walls", state, normal, smooth);
-    make_unit(state);
-    const TensionForce<Separation> force = tension_force(state, kick, separation);
-    for_each_neighbour("tension: force", s.lists, n, force);
-    pull_on_walls(state, force);
-    for_each_neighbour("tension: velocities", s.lists, n,
-                       SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
-  });
-}
+/// Adds the step's kicks to the velocities; leaves unit normals in TensionState::normal, for
+/// contact angles and the impulses of obstacles, and in FluidState::owed what sheets receive.
+/// Overwrites PressureState::scratch_a.
+void apply_surface_tension(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,60 +8,35 @@
 // kernel's integral over the plane; as neighbours end at the wall, the stress over all depths is
 // sigma cos(theta) times the integral of D H, H = 1 - WendlandC2::halfspace, which the factor 8 / 3
 // makes 1: nothing is fitted. Forces are equal and opposite between particles, and averaged over
-// neighbourhoods as in surface_tension.h. What holds a drop at a wall is the mirrors' share of
+// neighbourhoods as in surface_tension.h. What holds a drop at a wall is the mirrors' part of
 // surface tension.
 
 #include "sim/passes/tension/surface_tension.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Share of a wetting stress beside this surface (unit normal; w: s, surface_tension.h): none where
-/// the fluid is one layer thick, s = 0.5 along the wall's normal, which no tension holds together.
-DRENCH_HD float backed_share(const Float4& surface, Vec3<float> wall_normal) {
+/// Fraction of a wetting stress beside this surface (unit normal; w: s, surface_tension.h): none
+/// where the fluid is one layer thick, s = 0.5 along the wall's normal, which no tension holds
+/// together.
+DRENCH_HD float backed_fraction(const Float4& surface, Vec3<float> wall_normal) {
   const Vec3<float> n{surface.x, surface.y, surface.z};
   return max0(1.f - 2.f * max0(surface.w * dot(n, wall_normal)));
-}
-
-/// Faces of the fluid at walls: of those that a particle is near the one with the largest stress.
-inline void find_faces(State& state) {
-  const MirrorImages images = mirror_images_of(state);
-  const ObstacleViews obstacles = images.obstacles;
-  const float *of_triangle = state.cloth.wetting.data(), at_walls = state.parameters.wetting,
-              inverse_h = 1.f / state.parameters.support_radius;
-  const int* triangle = images.any_sheet ? state.fluid.triangle.data() : nullptr;
-  const Float4* surface = state.tension.normal.data();
-  Float4* face = state.tension.wetting.data();
-  parallel_for(
-      "contact angles: faces", state.fluid.count, DRENCH_LAMBDA(int i) {
-        const Mirrors mirrors = images.of(i);
-        Float4 largest{0.f, 0.f, 0.f, 0.f};
-        for (int k = 0; k < mirrors.count; ++k) {
-          const Mirror& m = mirrors.mirror[k];
-          const float wetting = m.of == domain_wall     ? at_walls
-                                : m.of == nearest_sheet ? of_triangle[triangle[i]]
-                                                        : obstacles.obstacle[m.of].wetting;
-          float s = wetting * m.share * (8.f / 3) * WendlandC2::plane(m.distance * inverse_h);
-          if (s > 0.f) s *= backed_share(surface[i], m.normal);
-          if (fabsf(s) > fabsf(largest.w)) largest = {m.normal.x, m.normal.y, m.normal.z, s};
-        }
-        face[i] = largest;
-      });
 }
 
 /// kick = dt times the sum above over m.
 template <class Separation>
 struct FaceForce {
   static constexpr int columns = 2;
-  const Float4 *place, *face;  // face: unit normal of the wall; w: P h / sigma
-  Float4* kick;                // m/s
-  float scale;                 // 1/s, of the sum
+  const Float4 *position, *face;  // face: unit normal of the wall; w: P h / sigma
+  Float4* kick;                   // m/s
+  float scale;                    // 1/s, of the sum
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<2> inputs() const { return {{place, face}}; }
+  DRENCH_HD Columns<2> inputs() const { return {{position, face}}; }
   template <class Q>
   struct Particle {
-    Q place, face;
+    Q position, face;
   };
   template <class Q>
   struct Sum {
@@ -73,7 +48,7 @@ struct FaceForce {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q x = separation(i.place, j.place);
+    const Q x = separation(i.position, j.position);
     const Q along_i = x - i.face * splat_sum(i.face * x);
     const Q along_j = x - j.face * splat_sum(j.face * x);
     const Q stress = splat_w(i.face) * along_i + splat_w(j.face) * along_j;
@@ -85,22 +60,8 @@ struct FaceForce {
   }
 };
 
-/// Uses PressureState::vector.
-inline void apply_contact_angles(State& state) {
-  const Parameters& p = state.parameters;
-  PressureState& s = state.pressure;
-  Float4* kick = s.vector.data();
-  find_faces(state);
-  with_separation(p, [&](auto separation) {
-    using Separation = decltype(separation);
-    const float h = p.support_radius, scale = gradient_scale(p) / p.rest_density;
-    const float strength = float(state.dt) * p.surface_tension / (p.rest_density * h);
-    const FaceForce<Separation> force{s.place.data(), state.tension.wetting.data(), kick,
-                                      scale * strength, separation};
-    for_each_neighbour("contact angles: force", s.lists, state.fluid.count, force);
-    for_each_neighbour("contact angles: velocities", s.lists, state.fluid.count,
-                       SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
-  });
-}
+/// Adds the step's kicks to the velocities, by the normals of apply_surface_tension. Overwrites
+/// PressureState::scratch_a.
+void apply_contact_angles(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

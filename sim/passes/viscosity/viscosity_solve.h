@@ -11,8 +11,8 @@
 // at rest. What is about to be added is known where gravity and pressure nearly balance, and is
 // never longer than dt g there; after an impact it is not, so that it is cut to this length.
 // Without the cut the pressure of an impact would keep itself up: as friction undoes what it does,
-// the next step finds it again. In a full box a is that of its second solve, which velocities do
-// not feel; with that of the first, or none, sheared packings stir more (docs/benchmarks.md).
+// the next step finds it again. In a closed domain a is that of its second solve, which velocities
+// do not feel; with that of the first, or none, sheared packings stir more.
 //
 // What a solve leaves, r = b - (1 + K) u, is added to u: v = b - K u is what forces between pairs
 // make of b, so that momentum and angular momentum are kept to rounding, and since 0 <= K the error
@@ -27,8 +27,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct ViscousSums {
   double square = 0, product = 0, size = 0;  // r . r, r . B r, b . b
-  DRENCH_HD ViscousSums operator()(const ViscousSums& a, const ViscousSums& b) const {
-    return {a.square + b.square, a.product + b.product, a.size + b.size};
+  DRENCH_HD ViscousSums operator+(const ViscousSums& other) const {
+    return {square + other.square, product + other.product, size + other.size};
   }
 };
 
@@ -51,13 +51,13 @@ struct ViscousIteration {
   /// f, no longer than dt g.
   DRENCH_HD Vec3<float> coming(int i) const {
     const Float4 d = displacement[i];
-    Vec3<float> push = kick;
+    Vec3<float> expected = kick;
     if (turns) {
       const Vec3<float> u = velocity[i], x{place[i].x, place[i].y, place[i].z};
-      push = push + (frame(x, u) - u);
+      expected = expected + (frame(x, u) - u);
     }
-    const Vec3<float> f = push + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
-    const float longest2 = length2(push), length2_f = length2(f);
+    const Vec3<float> f = expected + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
+    const float longest2 = length2(expected), length2_f = length2(f);
     return length2_f > longest2 ? f * sqrtf(longest2 / length2_f) : f;
   }
   DRENCH_HD Float4 preconditioned(const Float4& r, int i) const {
@@ -137,110 +137,7 @@ struct ViscousIteration {
   }
 };
 
-inline bool viscous_solve_ended(const ViscosityState& s, int iteration) {
-#if defined(__CUDACC__)
-  constexpr int patience = 8;
-  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
-#else
-  (void)iteration;
-  return s.control.data()->done;
-#endif
-}
-
-inline ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
-  const Parameters& p = state.parameters;
-  ViscosityState& s = state.viscosity;
-  const float dt = float(state.dt);
-  const double unseen = 1e-6 * p.spacing / state.dt;  // m/s
-  return {state.fluid.velocity.view(),
-          state.pressure.place.data(),
-          state.pressure.vector.data(),
-          s.product.data(),
-          s.diagonal.data(),
-          s.cross.data(),
-          s.solution.data(),
-          s.residual.data(),
-          s.direction.data(),
-          s.control.data(),
-          walls,
-          {dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]},
-          turning_frame_of(state),
-          p.turns,
-          float(1 / state.dt),
-          p.viscous_tolerance,
-          unseen * unseen * state.fluid.count,
-          p.most_viscous_iterations};
-}
-
-template <class Separation>
-void solve_viscosity(State& state, const Separation& separation) {
-  ViscosityState& s = state.viscosity;
-  const int n = state.fluid.count;
-  for (Column<Float4>* c :
-       {&s.solution, &s.residual, &s.direction, &s.product, &s.diagonal, &s.cross})
-    c->resize(size_t(n));
-  s.control.resize(1);
-  const ViscousPairs<Separation> pairs = viscous_pairs_of(state, separation);
-  const ViscousIteration iteration = viscous_iteration_of(state, pairs.walls);
-  const ViscousProduct<Separation> product{pairs, s.direction.data(), s.product.data(),
-                                           &s.control.data()->done};
-  const NeighbourLists& lists = state.pressure.lists;
-  for_each_neighbour("viscosity: blocks", lists, n,
-                     ViscousBlocks<Separation>{pairs, s.diagonal.data(), s.cross.data()});
-  ViscousControl* control = s.control.data();
-  parallel_for(
-      "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
-  parallel_for(
-      "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
-  const bool sheets = drags_sheets(state);
-  for_each_neighbour("viscosity: product", lists, n, product);
-  if (sheets) start_sheet_drag(state);
-  reduce_then(
-      "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
-      ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
-  for (int k = 0; k < state.parameters.most_viscous_iterations && !viscous_solve_ended(s, k - 1);
-       ++k) {
-    for_each_neighbour("viscosity: product", lists, n, product);
-    if (sheets) multiply_sheet_drag(state);
-    reduce_then(
-        "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
-        AddDoubles{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
-    if (sheets) step_sheet_drag(state);
-    reduce_then(
-        "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
-    parallel_for(
-        "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
-    if (sheets) turn_sheet_drag(state);
-  }
-  parallel_for(
-      "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
-  if (sheets) give_back_sheet_drag(state);
-}
-
-template <class Separation>
-void step_viscosity(State& state, const Separation& separation) {
-  const VecView v = state.fluid.velocity.view();
-  Float4* vector = state.pressure.vector.data();
-  parallel_for(
-      "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
-        vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
-      });
-  const ViscousProduct<Separation> product{viscous_pairs_of(state, separation), vector, nullptr,
-                                           nullptr};
-  for_each_neighbour("viscosity", state.pressure.lists, state.fluid.count,
-                     ExplicitViscosity<Separation>{product, v});
-}
-
 /// Viscosity over the step's dt, for the velocities that the pressures left.
-inline void apply_viscosity(State& state) {
-  if (state.fluid.count == 0 || smoothing_takes_viscosity(state.parameters, state.dt)) return;
-  with_separation(state.parameters, [&](const auto& separation) {
-    if (viscosity_is_implicit(state.parameters, state.dt))
-      solve_viscosity(state, separation);
-    else
-      step_viscosity(state, separation);
-  });
-}
+void apply_viscosity(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

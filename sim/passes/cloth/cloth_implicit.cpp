@@ -1,0 +1,306 @@
+#include "sim/passes/cloth/cloth_implicit.h"
+
+#include "sim/passes/cloth/cloth_obstacles.h"
+#include "sim/passes/cloth/cloth_springs.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
+  const ClothState& c = state.cloth;
+  const Parameters& p = state.parameters;
+  const ClothSprings springs{.position = b.position,
+                             .velocity = b.velocity,
+                             .ends = spring_ends_of(c),
+                             .rest_length = c.rest_length.data(),
+                             .stiffness = c.stiffness.data(),
+                             .damping = c.spring_damping.data()};
+  const ConstVecView fluid_force = c.force.view();
+  const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
+  const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
+  const ClothWalls walls = cloth_walls_of(p);
+  const AirDrag air = air_drag_of(state);
+  const ConstVecView air_push = c.air_push.view();
+  if (air.on) blow_at_cloth(state, b.position, b.velocity);
+  for_each_lane(
+      "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
+        using T = decltype(load(inverse_mass, i));
+        const T w = load(inverse_mass, i);
+        const auto free = w > T(0.f);
+        const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
+        const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
+        Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
+        if (air.on) {  // implicit: v' = v + dt w (force - B (v' - v_start))
+          const T s = w * T(dt);
+          const Vec3<T> force = air_push.at(i) - air.times(i, v - b.velocity.at(i));
+          v = v + air.settle(i, s, force * s);
+        }
+        Vec3<T> x = b.position.at(i) + v * T(dt);
+        walls.stop(x, v);
+        const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
+        b.next.put(i, select(free, x, b.position.at(i)));
+        b.next_velocity.put(i, select(free, v, none));
+      });
+}
+
+void cloth_predict(State& state) {
+  if (state.contact.near == 0) return;
+  ClothState& c = state.cloth;
+  const float dt = float(state.dt / state.substeps);
+  ClothBuffers b = cloth_buffers(c);
+  const VecView spare[2][2] = {{c.next.view(), c.next_velocity.view()},
+                               {c.start.view(), c.predicted.view()}};
+  for (int s = 0; s < state.substeps; ++s) {
+    b.next = spare[s % 2][0], b.next_velocity = spare[s % 2][1];
+    cloth_verlet(state, b, dt);
+    b.position = b.next, b.velocity = b.next_velocity;
+  }
+  const ConstVecView from = c.position.view(), to = b.position;
+  const VecView predicted = c.predicted.view();
+  const float inverse_dt = 1.f / float(state.dt);
+  parallel_for(
+      "cloth: mean velocity", c.vertices,
+      DRENCH_LAMBDA(int i) { predicted.set(i, (to[i] - from[i]) * inverse_dt); });
+}
+
+void linearise_cloth(State& state) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const Parameters& p = state.parameters;
+  const float dt = float(state.dt);
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const VecView axis = s.axis.view(), base = s.base.view(), free = s.free.view(),
+                change = s.change.view();
+  const ConstVecView owed = c.force.view();
+  const SpringEnds ends = spring_ends_of(c);
+  const float *rest = c.rest_length.data(), *stiffness = c.stiffness.data(),
+              *damping = c.spring_damping.data(), *mass = c.mass.data(),
+              *rate = c.damping_rate.data(), *inverse_mass = c.inverse_mass.data();
+  float *tension = s.tension.data(), *inertia = s.inertia.data();
+  const BlockInverse block = block_inverse(state);
+  const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
+  const AirDrag air = air_drag_of(state);
+  const ConstVecView air_push = c.air_push.view();
+  ClothControl* control = s.control.data();
+  parallel_for(
+      "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+  for_each_lane(
+      "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
+        using T = decltype(load(mass, i));
+        const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
+        const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
+        Vec3<T> force =
+            Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
+        T b[6] = {heavy, T(0.f), T(0.f), heavy, T(0.f), heavy};
+        Vec3<T> held = none;
+        for (int k = 0; k < ends.slots; ++k) {
+          const auto at = i + k * ends.stride;
+          const Vec3<T> d = ends.to_end(x, here, i, k);
+          const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
+          const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
+          const T t = stiff * max0(excess * inverse);
+          const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
+          const Vec3<T> away = speed - ends.at_end(v, i, k);
+          force = force + n * (load(stiffness, at) * excess);
+          held = held + away * t + e * dot(e, away);
+          store(tension, at, t), axis.put(at, e);
+          b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
+          b[3] = b[3] + t + e.y * e.y, b[4] = b[4] + e.y * e.z, b[5] = b[5] + t + e.z * e.z;
+        }
+        if (air.on) {
+          const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);
+          force = force + air_push.at(i);
+          b[0] = b[0] + d.x, b[1] = b[1] + m.x, b[2] = b[2] + m.z;
+          b[3] = b[3] + d.y, b[4] = b[4] + m.y, b[5] = b[5] + d.z;
+        }
+        store(inertia, i, heavy);
+        block.put(i, b, maximum(heavy, T(1e-20f)));
+        const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
+        free.put(i, Vec3<T>{moves, moves, moves});
+        base.put(i, force * T(dt * dt) - held * T(dt));
+        change.put(i, none);
+      });
+}
+
+void hold_at_walls(State& state) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView base = s.base.view(), right = s.right.view();
+  const VecView free = s.free.view(), change = s.change.view();
+  const float dt = float(state.dt);
+  const BlockInverse block = block_inverse(state);
+  const ClothWalls walls = cloth_walls_of(state.parameters);
+  const float reach = state.parameters.spacing;  // a step is not to end farther off
+  const float* inertia = s.inertia.data();
+  parallel_for(
+      "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
+        const Vec3<float> straight = x[i] + v[i] * dt,
+                          to = straight + block.times(i, base[i] + right[i]);
+        Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, axes = free[i], w = change[i];
+        walls.stop(stop, unused);
+        const auto hold = [reach](float stop, float to, float from, float straight, float& axis,
+                                  float& w) {
+          if (stop == to || axis == 0.f || fabsf(stop - from) > reach) return;
+          axis = 0.f, w = stop - straight;
+        };
+        hold(stop.x, to.x, x.x[i], straight.x, axes.x, w.x);
+        hold(stop.y, to.y, x.y[i], straight.y, axes.y, w.y);
+        hold(stop.z, to.z, x.z[i], straight.z, axes.z, w.z);
+        const Vec3<float> before = free[i];
+        if (axes.x == before.x && axes.y == before.y && axes.z == before.z) return;
+        free.set(i, axes), change.set(i, w);
+        block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+      });
+}
+
+void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,
+                 float tolerance) {
+  solve_cloth_matrix(state, scaled_cloth_matrix(state), w, right, most_iterations, tolerance);
+}
+
+void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& right) {
+  const ConstraintProjection constraints = constraint_projection(state);
+  const ClothMatrix matrix = cloth_matrix(state);
+  ClothControl* control = state.cloth_system.control.data();
+  for (const VertexRange& sheet : state.cloth.loose) {
+    const int first = sheet.first;
+    reduce_then(
+        "cloth: lack", sheet.count, ClothImbalance{},
+        DRENCH_LAMBDA(int k) {
+          const int i = first + k;
+          const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
+          const double gripped =
+              constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
+          return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
+                                3. - free.x - free.y - free.z + gripped};
+        },
+        Plus{},
+        DRENCH_LAMBDA(const ClothImbalance& lack) {
+          const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
+          control->shift = {float(lack.x * inverse), float(lack.y * inverse),
+                            float(lack.z * inverse)};
+        });
+    parallel_for(
+        "cloth: balance", sheet.count,
+        DRENCH_LAMBDA(int k) { w.set(first + k, w[first + k] + control->shift); });
+  }
+}
+
+void hold_at_obstacles(State& state) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView base = s.base.view(), right = s.right.view();
+  const VecView change = s.change.view();
+  const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
+  float* slides = s.slides.data();
+  const BlockInverse block = block_inverse(state);
+  const ClothHold hold = cloth_hold_of(state);
+  state.cloth_system.normal.clear();
+  state.cloth_system.rub.clear();  // what is held in a later round would feel the last step's
+  parallel_for(
+      "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        hold.grip[i] = -1, slides[i] = 1.f;
+        hold.free_block.copy(i, hold.block);
+        if (inverse_mass[i] == 0.f) return;
+        const Vec3<float> straight = x[i] + v[i] * dt;
+        Vec3<float> w = change[i];
+        const Vec3<float> to = straight + block.times(i, base[i] + right[i]);
+        if (hold.hold(i, x[i], straight, to, w)) change.set(i, w);
+      });
+}
+
+namespace {
+
+/// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
+/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
+/// the guard stops it.
+bool revise_holds(State& state, const ConstVecView& given, int round) {
+  ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const ClothMatrix matrix = cloth_matrix(state);
+  const VecView change = s.change.view();
+  const VecView reaction = s.residual.view();
+  // The springs of a vertex reach others, whose constraints must not change meanwhile.
+  parallel_for(
+      "cloth: reactions", c.vertices,
+      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
+  const HoldRevision revise{.hold = cloth_hold_of(state),
+                            .position = c.position.view(),
+                            .velocity = c.velocity.view(),
+                            .change = change,
+                            .given = given,
+                            .right = s.answer.view(),
+                            .reaction = reaction,
+                            .rub = s.rub.view(),
+                            .slides = s.slides.data(),
+                            .mass = c.mass.data(),
+                            .inverse_mass = c.inverse_mass.data(),
+                            .dt = float(state.dt),
+                            .round = round};
+  return parallel_reduce(
+             "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
+             Larger{}) > 0;
+}
+
+}  // namespace
+
+void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
+                         float tolerance) {
+  constexpr int most_rounds = 6;
+  ClothSystem& s = state.cloth_system;
+  const VecView change = s.change.view();
+  const VecView right = s.answer.view();
+  parallel_for(
+      "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
+  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
+    solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
+}
+
+void finish_at_obstacles(State& state, const ConstVecView& given) {
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const VecView next = c.next.view(), velocity = c.next_velocity.view(),
+                predicted = c.predicted.view();
+  const ConstVecView change = state.cloth_system.change.view();
+  const float inverse_dt = 1.f / float(state.dt), *mass = c.mass.data(),
+              *inverse_mass = c.inverse_mass.data();
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        const int k = hold.grip[i];
+        if (k >= 0) {
+          const Vec3<float> n = hold.normal[i], w = change[i];
+          u = v[i] + w * inverse_dt;
+          const ObstacleView& o = hold.obstacles.obstacle[k];
+          const Vec3<float> solid = hold.surface_velocity(o, to + hold.home(x[i]), n);
+          const Vec3<float> kick = n * dot(solid - u, n);
+          const Vec3<float> reaction = along(hold.free[i], matrix.whole(change, i) - given[i]);
+          hold.react(k, reaction * inverse_dt + kick * mass[i]);
+          u = u + kick;
+        }
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u), predicted.set(i, u);
+      });
+}
+
+void carry_held_vertices(State& state) {
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view();
+  const VecView next = c.next.view(), velocity = c.next_velocity.view();
+  const float *mass = c.mass.data(), *inverse_mass = c.inverse_mass.data();
+  const int* held = c.held.data();
+  const ClothHold hold = cloth_hold_of(state);
+  parallel_for(
+      "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
+        if (!held[i] || inverse_mass[i] == 0.f) return;
+        Vec3<float> to = next[i], u = velocity[i];
+        hold.guard(i, mass[i], x[i], to, u);
+        next.set(i, to), velocity.set(i, u);
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

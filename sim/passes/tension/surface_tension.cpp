@@ -1,0 +1,133 @@
+#include "sim/passes/tension/surface_tension.h"
+
+#include "sim/passes/tension/wetting.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+/// Normals, from the means of gradients.
+void make_unit(State& state) {
+  Float4* normal = state.tension.normal.data();
+  const float h = state.parameters.support_radius;
+  parallel_for(
+      "tension: unit normals", state.fluid.count, DRENCH_LAMBDA(int i) {
+        const Float4 n = normal[i];
+        const float size = square_root(n.x * n.x + n.y * n.y + n.z * n.z);
+        const float s = size > 0.f ? 1.f / size : 0.f;
+        normal[i] = {s * n.x, s * n.y, s * n.z, h * size};
+      });
+}
+
+/// Adds the images' part to a column of vectors.
+template <class Term>
+void add_images(const char* name, const State& state, Float4* vector, const Term& term) {
+  const MirrorImages images = mirror_images_of(state);
+  if (!images.any) return;
+  parallel_for(
+      name, state.fluid.count, DRENCH_LAMBDA(int i) {
+        const Mirrors mirrors = images.of(i);
+        if (mirrors.count == 0) return;
+        const Vec3<float> s = images.sum(i, mirrors, term).total();
+        const Float4 v = vector[i];
+        vector[i] = {v.x + s.x, v.y + s.y, v.z + s.z, 0.f};
+      });
+}
+
+/// Adds what images do to kicks. A sheet owes its part until the next step, as in
+/// continuous_collision.h.
+template <class Separation>
+void pull_on_walls(State& state, const TensionForce<Separation>& force) {
+  const MirrorImages images = mirror_images_of(state);
+  if (!images.any) return;
+  const VecView owed = state.fluid.owed.view();
+  Float4* kick = force.kick;
+  const float mass = state.parameters.particle_mass;
+  parallel_for(
+      "tension: force of walls", state.fluid.count, DRENCH_LAMBDA(int i) {
+        const Mirrors mirrors = images.of(i);
+        if (mirrors.count == 0) return;
+        const ImageSums sums = images.sum(i, mirrors, force);
+        const Vec3<float> all = sums.total() * force.scale;
+        kick[i] = {kick[i].x - all.x, kick[i].y - all.y, kick[i].z - all.z, 0.f};
+        for (int k = 0; k < mirrors.count; ++k)
+          if (mirrors.mirror[k].of == nearest_cloth)
+            owed.set(i, owed[i] - sums.by[k] * (force.scale * mass));
+      });
+  state.owes |= images.any_cloth;
+}
+
+}  // namespace
+
+void apply_surface_tension(State& state) {
+  const Parameters& p = state.parameters;
+  PressureState& s = state.pressure;
+  const int n = state.fluid.count;
+  const float h = p.support_radius;
+  Float4 *gradient = s.scratch_a.data(), *normal = state.tension.normal.data(), *kick = gradient;
+  with_separation(p, [&](auto separation) {
+    using Separation = decltype(separation);
+    const float scale = gradient_scale(p) / p.rest_density;
+    const ColourGradient<Separation> colour{s.place.data(), gradient, scale, separation};
+    for_each_neighbour("tension: gradients", s.lists, n, colour);
+    add_images("tension: gradients beyond walls", state, gradient, colour);
+    const SmoothNormal smooth{gradient, normal, scale * h * h};
+    for_each_neighbour("tension: normals", s.lists, n, smooth);
+    add_images("tension: normals beyond walls", state, normal, smooth);
+    make_unit(state);
+    const TensionForce<Separation> force = tension_force(state, kick, separation);
+    for_each_neighbour("tension: force", s.lists, n, force);
+    pull_on_walls(state, force);
+    for_each_neighbour("tension: velocities", s.lists, n,
+                       SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
+  });
+}
+
+namespace {
+
+/// Faces of the fluid at walls: of those that a particle is near the one with the largest stress.
+void find_faces(State& state) {
+  const MirrorImages images = mirror_images_of(state);
+  const ObstacleViews obstacles = images.obstacles;
+  const float *of_triangle = state.cloth.wetting.data(), at_walls = state.parameters.wetting,
+              inverse_h = 1.f / state.parameters.support_radius;
+  const int* triangle = images.any_cloth ? state.fluid.triangle.data() : nullptr;
+  const Float4* surface = state.tension.normal.data();
+  Float4* face = state.tension.wetting.data();
+  parallel_for(
+      "contact angles: faces", state.fluid.count, DRENCH_LAMBDA(int i) {
+        const Mirrors mirrors = images.of(i);
+        Float4 largest{0.f, 0.f, 0.f, 0.f};
+        for (int k = 0; k < mirrors.count; ++k) {
+          const Mirror& m = mirrors.mirror[k];
+          const float wetting = m.of == domain_wall     ? at_walls
+                                : m.of == nearest_cloth ? of_triangle[triangle[i]]
+                                                        : obstacles.obstacle[m.of].wetting;
+          float s = wetting * m.weight * (8.f / 3) * WendlandC2::plane(m.distance * inverse_h);
+          if (s > 0.f) s *= backed_fraction(surface[i], m.normal);
+          if (fabsf(s) > fabsf(largest.w)) largest = {m.normal.x, m.normal.y, m.normal.z, s};
+        }
+        face[i] = largest;
+      });
+}
+
+}  // namespace
+
+void apply_contact_angles(State& state) {
+  const Parameters& p = state.parameters;
+  PressureState& s = state.pressure;
+  Float4* kick = s.scratch_a.data();
+  find_faces(state);
+  with_separation(p, [&](auto separation) {
+    using Separation = decltype(separation);
+    const float h = p.support_radius, scale = gradient_scale(p) / p.rest_density;
+    const float strength = float(state.dt) * p.surface_tension / (p.rest_density * h);
+    const FaceForce<Separation> force{s.place.data(), state.tension.wetting.data(), kick,
+                                      scale * strength, separation};
+    for_each_neighbour("contact angles: force", s.lists, state.fluid.count, force);
+    for_each_neighbour("contact angles: velocities", s.lists, state.fluid.count,
+                       SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
+  });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
