@@ -7,10 +7,8 @@
 // have the surface that their volume asks for (squeeze_film, squeeze_thread), so that nothing is
 // fitted to a scene.
 //
-// Only what is missing on two sides is squeezed. At the surface of a body round kernels are better:
-// squeezed ones give each particle's own height more say (relaxed ball of 24,000, 10 passes:
-// scatter 0.019 -> 0.024 spacings with a short axis of 0.65; 0.021 with round ones, their centres
-// smoothed).
+// Only what misses neighbours on two sides is squeezed: at the surface of a body round kernels
+// scatter less (docs/decisions/0200-round-kernels-at-bodies.md).
 
 #include <vector>
 

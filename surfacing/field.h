@@ -27,14 +27,12 @@ struct ColourKernel {
   /// In the bulk it is constant. Where neighbours are missing it grows as c falls, which evens out
   /// the noise of their number:
   /// * missing on one side (a large offset), the particle lies at a surface of the bulk: as 1 / c,
-  /// a
-  ///   little, so that the field there is what it is where the particles lie evenly;
+  ///   a little, so that the field there is what it is where the particles lie evenly;
   /// * missing all around, it is a drop or part of a film: from 1 in a film one particle thick up
-  /// to
-  ///   the weight that gives a lone particle the volume spacing^3, and between them so that a film
-  ///   stretched to 1.5 spacings does not tear.
-  /// The constants were fitted at support 2.5 and iso value 0.45. Relaxed sphere of 65 thousand
-  /// particles, against equal weights: scatter 0.026 -> 0.017, bias 0.020 -> 0.003 spacings.
+  ///   to the weight that gives a lone particle the volume spacing^3, and between them so that a
+  ///   film stretched to 1.5 spacings does not tear.
+  /// The constants are fitted at support 2.5 and iso value 0.45, where they take a third off the
+  /// scatter of equal weights.
   float weight(float c, float offset) const;
   float bulk_weight() const;
 };

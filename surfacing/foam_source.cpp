@@ -12,12 +12,12 @@ namespace {
 
 constexpr float full_at = 5;  // times the threshold: from here on all air is caught
 /// Kinetic energy over that at the breaking speed: none below the first, all above the second.
-constexpr float calm = 1, wild = 10;
+constexpr float energy_low = 1, energy_high = 10;
 constexpr float crest_low = 0.1f, crest_high = 0.4f;  // curvature of crests
 /// Weighted sums over a full neighbourhood: the integral of 1 - r / h over its ball.
 constexpr float full_weight = 3.14159265f / 3 * foam_support * foam_support * foam_support;
 /// Who has fewer neighbours than this fraction sees air; who has a smaller offset has no normal.
-constexpr float airy = 0.85f, least_offset = 0.2f;
+constexpr float airy_fullness = 0.85f, least_offset = 0.2f;
 
 float ramp(float value, float low, float high) {
   return std::clamp((value - low) / (high - low), 0.f, 1.f);
@@ -121,8 +121,8 @@ std::pair<std::vector<uint8_t>, std::vector<uint8_t>> fast_blocks(const FluidMom
   std::vector<uint8_t> fast(bins.block.size(), 0), around(bins.block.size(), 0);
   for (size_t b = 0; b < bins.block.size(); ++b)
     for (uint32_t k = bins.first[b]; k < bins.first[b + 1] && !fast[b]; ++k)
-      fast[b] =
-          bins.source[k] < fluid.real && energy(fluid.velocity[bins.source[k]], breaking) > calm;
+      fast[b] = bins.source[k] < fluid.real &&
+                energy(fluid.velocity[bins.source[k]], breaking) > energy_low;
   for (size_t b = 0; b < bins.block.size(); ++b) {
     if (!fast[b]) continue;
     V3i step;
@@ -153,7 +153,7 @@ std::vector<Potential> potentials(const FluidMoment& fluid, float breaking) {
   });
   for_each_particle(fluid, fast, [&](const NearFluid& near, uint32_t i, const Seen& me) {
     Potential& p = result[i];
-    if (p.ahead > 0 && p.fullness < airy)
+    if (p.ahead > 0 && p.fullness < airy_fullness)
       p.curvature = crest_curvature(near, fluid, me, p.offset, result);
   });
   return result;
@@ -167,11 +167,12 @@ std::vector<float> birth_rates(const FluidMoment& fluid, const Shot& shot) {
   std::vector<float> rate(fluid.real);
   for (size_t i = 0; i < fluid.real; ++i) {
     const Potential& p = potential[i];
-    if (!(p.fullness < airy)) continue;
+    if (!(p.fullness < airy_fullness)) continue;
     const float trapped = air * ramp(p.closing, low, high) * p.closing;
     const float thrown =
         crest * ramp(p.curvature, crest_low, crest_high) * ramp(p.ahead, low, high) * p.ahead;
-    rate[i] = ramp(energy(fluid.velocity[i], breaking), calm, wild) * (trapped + thrown) / spacing;
+    rate[i] = ramp(energy(fluid.velocity[i], breaking), energy_low, energy_high) *
+              (trapped + thrown) / spacing;
   }
   return rate;
 }

@@ -1,7 +1,7 @@
 #pragma once
 // Trees that OpenVDB's library holds compiled: it registers their types, so that every function of
 // theirs is in it. Where this is included before they are used they are not compiled again, which
-// takes 7 s a type and unit.
+// takes 7 s a type and unit (docs/decisions/0201-openvdb-compiled-once.md).
 
 #include <openvdb/Grid.h>
 #include <openvdb/openvdb.h>
