@@ -1,11 +1,13 @@
 #pragma once
 // How an image is estimated, for tests and measurements: every choice gives the same mean.
 
-#include "pipeline/contract/hash.h"
-#include "render/integrator/sampler.h"
-#include "render/renderer.h"
+#include <filesystem>
+#include <memory>
 
-namespace drench {
+#include "pipeline/contract/hash.h"
+#include "render/sampler.h"
+
+namespace drench::render {
 
 enum class Estimator {
   mis,         // light and surface sampling, power heuristic
@@ -28,7 +30,7 @@ enum class WaterGuide {
 };
 
 /// Whether lamps are looked for through water from where they shine on (manifold.h).
-enum class Walks {
+enum class ManifoldWalks {
   none,
   some,
   if_calm,  // if walks find most of what photons bring
@@ -47,25 +49,20 @@ struct FrameCheckpoint {
   double every_s = 300;        // wall seconds between two; one is written on a stop, too
 };
 
-class KeptParts;
+class SceneCache;
 
 struct RenderOptions {
   Estimator estimator = Estimator::mis;
   EnvironmentSampling environment = EnvironmentSampling::automatic;
   FirstInterface first_interface = FirstInterface::both;
   WaterGuide water_guide = WaterGuide::on;
-  Walks walks = Walks::if_calm;
+  ManifoldWalks walks = ManifoldWalks::if_calm;
   PixelOrder pixel_order = PixelOrder::morton;
   unsigned force_features = 0;  // features of path.h switched on although the frame has them not
   double most_photons = 1e7;    // of a round, see photon_rounds.h: 1.5 GB while they are sorted
   FrameCheckpoint checkpoint{};
   Denoised denoised = Denoised::alone;
-  std::shared_ptr<KeptParts> parts{};  // of frames of the same shot before; null: none
+  std::shared_ptr<SceneCache> cache{};  // of earlier frames of the shot; null: none
 };
 
-/// render_frame with explicit options.
-Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
-                  const RenderOptions& options, RenderStats* stats = nullptr,
-                  const std::function<void(double)>& progress = {});
-
-}  // namespace drench
+}  // namespace drench::render

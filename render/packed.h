@@ -6,7 +6,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Packed {
   __m128 lanes;  // the fourth means nothing
@@ -47,4 +47,4 @@ inline float largest(const Packed& a) {
   return std::max(a.lanes[0], std::max(a.lanes[1], a.lanes[2]));
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -13,17 +13,17 @@
 #include "pipeline/contract/error.h"
 #include "render/denoise/noisy_frame.h"
 #include "render/film/filter.h"
-#include "render/film/frame_checkpoint.h"
+#include "render/frame_checkpoint.h"
 #include "render/integrator/path.h"
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
 #include "render/options.h"
+#include "render/sampler.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr int kTile = 16;  // pixels a side
+constexpr int tile_size = 16;  // pixels a side
 
 double process_cpu_seconds() {
   timespec t{};
@@ -32,19 +32,19 @@ double process_cpu_seconds() {
 }
 
 void check_settings(const RenderSettings& r) {
-  constexpr int kLargest = 32768, kMostSamples = 1 << 20;
-  if (r.width < 1 || r.height < 1 || r.width > kLargest || r.height > kLargest)
+  constexpr int max_size = 32768, max_samples = 1 << 20;
+  if (r.width < 1 || r.height < 1 || r.width > max_size || r.height > max_size)
     throw Error(fmt::format("render: a picture of {} x {} pixels; each must lie in 1..{}", r.width,
-                            r.height, kLargest));
-  if (r.samples < 1 || r.samples > kMostSamples)
-    throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, kMostSamples));
+                            r.height, max_size));
+  if (r.samples < 1 || r.samples > max_samples)
+    throw Error(fmt::format("render.samples is {}; it must lie in 1..{}", r.samples, max_samples));
   if (r.crop_max != V2i(0, 0) &&
       !(r.crop_min.x >= 0 && r.crop_min.y >= 0 && r.crop_min.x < r.crop_max.x &&
         r.crop_min.y < r.crop_max.y && r.crop_max.x <= r.width && r.crop_max.y <= r.height))
     throw Error("render: crop_min and crop_max give no part of the picture; mend them");
-  if (r.denoise && r.samples < 2 * PixelSum::kBatch)
+  if (r.denoise && r.samples < 2 * PixelSum::smallest_batch)
     throw Error(fmt::format("render.denoise needs at least {} samples, render.samples is {}",
-                            2 * PixelSum::kBatch, r.samples));
+                            2 * PixelSum::smallest_batch, r.samples));
   if (r.depth < 0) throw Error(fmt::format("render.depth is {}; it must not be negative", r.depth));
 }
 
@@ -59,8 +59,8 @@ struct Job {
   FilmWindow window;
   int width, height;  // pixels, of the window
 
-  int columns() const { return (width + kTile - 1) / kTile; }  // of tiles
-  int rows() const { return (height + kTile - 1) / kTile; }
+  int columns() const { return (width + tile_size - 1) / tile_size; }  // of tiles
+  int rows() const { return (height + tile_size - 1) / tile_size; }
 };
 
 /// Where on the film the samples of a pixel lie: known for eight at a time, long before each is
@@ -74,17 +74,17 @@ class FilmPoints {
 
   Sampler sampler(int sample) const { return first_.at(uint32_t(sample)); }
   V2f operator[](int sample) {
-    const int k = sample % kAtOnce;
+    const int k = sample % samples_at_once;
     if (sample - k != from_) fill(sample - k);
     return point_[size_t(k)];
   }
 
  private:
-  static constexpr int kAtOnce = 8;
+  static constexpr int samples_at_once = 8;
 
   void fill(int from) {
     from_ = from;
-    point_ = first_.two_of_eight(uint32_t(from), kFilterDimension);
+    point_ = first_.two_of_eight(uint32_t(from), filter_dimension);
     for (V2f& p : point_) p = center_ + job_.filter.offset(p);
   }
 
@@ -92,10 +92,10 @@ class FilmPoints {
   V2f center_;
   Sampler first_;
   int from_ = -1;
-  std::array<V2f, kAtOnce> point_;
+  std::array<V2f, samples_at_once> point_;
 };
 
-/// Calls back with the finished share of the samples that are expected, one tile at a time.
+/// Calls back with the finished fraction of the samples that are expected, one tile at a time.
 class Progress {
  public:
   explicit Progress(const std::function<void(double)>& report) : report_(report) {}
@@ -108,8 +108,8 @@ class Progress {
     const std::lock_guard lock(mutex_);
     done_ += samples;
     // What is expected may grow; what has been reported does not fall.
-    share_ = std::max(share_, std::min(double(done_) / expected_, 1.));
-    if (report_) report_(share_);
+    fraction_ = std::max(fraction_, std::min(double(done_) / expected_, 1.));
+    if (report_) report_(fraction_);
   }
   uint64_t samples() const { return done_; }
 
@@ -117,7 +117,7 @@ class Progress {
   const std::function<void(double)>& report_;
   std::mutex mutex_;
   uint64_t done_ = 0;
-  double expected_ = 1, share_ = 0;
+  double expected_ = 1, fraction_ = 0;
 };
 
 void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
@@ -133,19 +133,19 @@ void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
 /// @return those added
 uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
-  std::vector<PathRecord> record(kPathsAtOnce, sums.layers.blank());
+  std::vector<PathRecord> record(paths_in_flight, sums.layers.blank());
   const bool records = sums.layers.records();
   std::vector<CameraSample> samples;
   uint64_t added = 0;
-  const int x0 = tile % job.columns() * kTile, y0 = tile / job.columns() * kTile;
-  for (int y = y0; y < std::min(y0 + kTile, job.height); ++y)
-    for (int x = x0; x < std::min(x0 + kTile, job.width); ++x) {
+  const int x0 = tile % job.columns() * tile_size, y0 = tile / job.columns() * tile_size;
+  for (int y = y0; y < std::min(y0 + tile_size, job.height); ++y)
+    for (int x = x0; x < std::min(x0 + tile_size, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
       FilmPoints film(job, x + job.window.x, y + job.window.y);
       const int wanted = sums.wanted(pixel, round);
       for (int s = sums.pixel[pixel].samples(); s < wanted; s = sums.pixel[pixel].samples()) {
         samples.clear();
-        for (size_t k = 0; k < kPathsAtOnce && s + int(k) < wanted; ++k)
+        for (size_t k = 0; k < paths_in_flight && s + int(k) < wanted; ++k)
           samples.push_back(
               {film.sampler(s + int(k)), film[s + int(k)], records ? &record[k] : nullptr, {}});
         job.trace(job.scene, job.path, samples, rays);
@@ -195,7 +195,7 @@ void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& ph
       for (int round = sums.rounds.first(); round < sums.rounds.end(); ++round) {
         const bool last = round + 1 == sums.rounds.end();  // whose photons are told of
         if (!last && sums.is_through(round)) continue;
-        photons.turn_to(round, sums.rounds, rays);
+        photons.trace_round(round, sums.rounds, rays);
         job.path.walks = photons.caustics().walks;
         const auto until = [&] { return keeps ? Clock::now() + every : Clock::time_point::max(); };
         while (!render_tiles(job, round, sums, until(), rays, progress))
@@ -243,15 +243,18 @@ void denoise_plate(const Job& job, Sums& sums) {
   };
   if (sums.plate.has_catchers())
     sums.plate.smooth_shadows(clean(sums.plate.shadows(job.width, job.height)));
-  if (sums.plate.has_shares())
-    sums.plate.smooth_shares(clean(sums.plate.shares(job.width, job.height)),
-                             [&](size_t p) { return sums.layers.saw_something(p); });
+  if (sums.plate.has_coverage())
+    sums.plate.smooth_coverage(clean(sums.plate.coverage(job.width, job.height)),
+                               [&](size_t p) { return sums.layers.saw_something(p); });
   sums.settle();
 }
 
 Film developed(const Job& job, const Sums& sums) {
   const std::vector<PixelSum>& pixels = sums.beauty();
-  Film film{job.width, job.height, std::vector<float>(4 * sums.pixel.size()), job.window};
+  Film film{.width = job.width,
+            .height = job.height,
+            .rgba = std::vector<float>(4 * sums.pixel.size()),
+            .window = job.window};
   for (size_t p = 0; p < pixels.size(); ++p) {
     for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
     const V3f seen = sums.plate.seen(p);
@@ -265,28 +268,11 @@ Film developed(const Job& job, const Sums& sums) {
 
 PlateFilm plate_film(const Shot& shot, const Scene& scene, size_t pixels) {
   const bool see_through = shot.render.refraction_alpha == RefractionAlpha::transparent &&
-                           (scene.features() & kMattes) && !scene.bodies().empty();
+                           (scene.features() & Feature::mattes) && !scene.bodies().empty();
   return {scene.has_catchers() ? pixels : 0, shot.render.denoise && see_through ? pixels : 0};
 }
 
 }  // namespace
-
-PixelFilter::PixelFilter() {
-  constexpr int kSteps = 4096;
-  std::array<double, kSteps + 1> cdf{};
-  for (int k = 0; k < kSteps; ++k) {
-    const double t = 2 * std::numbers::pi * (k + 0.5) / kSteps;
-    cdf[k + 1] = cdf[k] + 0.35875 - 0.48829 * std::cos(t) + 0.14128 * std::cos(2 * t) -
-                 0.01168 * std::cos(3 * t);
-  }
-  int k = 0;
-  for (int q = 0; q <= kSize; ++q) {
-    const double target = cdf[kSteps] * q / kSize;
-    while (k + 1 < kSteps && cdf[k + 1] < target) ++k;
-    const double within = (target - cdf[k]) / (cdf[k + 1] - cdf[k]);
-    inverse_[q] = float(((k + std::clamp(within, 0., 1.)) / kSteps - 0.5) * kWidth);
-  }
-}
 
 Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
                   const RenderOptions& options, RenderStats* stats,
@@ -307,23 +293,23 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   if (photons.any()) path.photons = &photons.caustics().photons;
   const FilmWindow window = window_of(shot.render);
   const bool whole = window.frame_width == 0;
-  Job job{scene,
-          path,
-          path_function(scene.features() | options.force_features),
-          PixelFilter(),
-          options.pixel_order,
-          seed,
-          uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
-          window,
-          whole ? shot.render.width : shot.render.crop_max.x - window.x,
-          whole ? shot.render.height : shot.render.crop_max.y - window.y};
+  Job job{.scene = scene,
+          .path = path,
+          .trace = path_function(scene.features() | options.force_features),
+          .filter = PixelFilter(),
+          .order = options.pixel_order,
+          .seed = seed,
+          .slots_log2 = uint32_t(std::bit_width(uint32_t(shot.render.samples) - 1)),
+          .window = window,
+          .width = whole ? shot.render.width : shot.render.crop_max.x - window.x,
+          .height = whole ? shot.render.height : shot.render.crop_max.y - window.y};
   const size_t pixels = size_t(job.width) * job.height;
-  Sums sums{std::vector<PixelSum>(pixels),
-            LayerFilm(shot, frame, scene, job.width, job.height),
-            plate_film(shot, scene, pixels),
-            SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
-            photons.rounds(shot.render, options.most_photons),
-            std::vector<PixelSum>(photons.any() ? pixels : 0)};
+  Sums sums{.pixel = std::vector<PixelSum>(pixels),
+            .layers = LayerFilm(shot, frame, scene, job.width, job.height),
+            .plate = plate_film(shot, scene, pixels),
+            .plan = SamplePlan(job.width, job.height, shot.render.samples, shot.render.error),
+            .rounds = photons.rounds(shot.render, options.most_photons),
+            .split = std::vector<PixelSum>(photons.any() ? pixels : 0)};
   Progress report(progress);
   uint64_t rays = 0;
   render_passes(job, options.checkpoint, photons, sums, rays, report);
@@ -332,13 +318,13 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);
   if (stats) {
     const double by_photons = photon_error(sums.beauty(), sums.split);
-    *stats = {report.samples(),
-              rays,
-              picture_error(sums.beauty()) + by_photons,
-              by_photons,
-              process_cpu_seconds() - cpu_start,
-              sums.rounds.radius(photons.caustics().photons.radius()),
-              photons.caustics().walked};
+    *stats = {.camera_samples = report.samples(),
+              .rays = rays,
+              .relative_mse = picture_error(sums.beauty()) + by_photons,
+              .photon_error = by_photons,
+              .cpu_s = process_cpu_seconds() - cpu_start,
+              .photon_radius = sums.rounds.radius(photons.caustics().photons.radius()),
+              .walked = photons.caustics().walked};
   }
   return film;
 }
@@ -348,4 +334,4 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry, Re
   return render_frame(shot, frame, geometry, RenderOptions{}, stats, progress);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Sine and cosine of an eighth of a turn at most, to 1e-7: Taylor's sums, without the cases of the
 /// general functions.
@@ -28,7 +28,7 @@ inline V2f sample_disc(const V2f& u) {
   const bool wide = std::abs(other) > std::abs(radius);
   swap_if(wide, radius, other);
   if (radius == 0) return {0, 0};
-  V2f d = sin_cos_of_eighth(kPi / 4 * (other / radius)) * radius;
+  V2f d = sin_cos_of_eighth(pi / 4 * (other / radius)) * radius;
   swap_if(wide, d.x, d.y);
   return d;
 }
@@ -44,7 +44,7 @@ inline V3f sample_cosine(const V2f& u) {
 inline V3f sample_cone(const V2f& u, float one_minus_cos) {
   const float h = u.x * one_minus_cos;
   const float sin = std::sqrt(std::max(0.f, h * (2 - h)));
-  const float phi = 2 * kPi * u.y;
+  const float phi = 2 * pi * u.y;
   return {sin * std::cos(phi), sin * std::sin(phi), 1 - h};
 }
 
@@ -55,4 +55,4 @@ inline float power_heuristic(float a, float b) {
   return 1 / (1 + ratio * ratio);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -9,14 +9,14 @@
 #include <cstdint>
 #include <numbers>
 
-namespace drench {
+namespace drench::render {
 
 using Imath::V2f;
 using Imath::V3f;
 
-inline constexpr float kPi = std::numbers::pi_v<float>;
+inline constexpr float pi = std::numbers::pi_v<float>;
 /// Largest float below 1: random numbers stay in [0, 1).
-inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
+inline constexpr float one_minus_epsilon = 0x1.fffffep-1f;
 
 inline float dot(const V3f& a, const V3f& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline V3f cross(const V3f& a, const V3f& b) {
@@ -50,4 +50,4 @@ struct Basis {
   }
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,12 +3,21 @@
 #include <cstring>
 
 #include "pipeline/contract/error.h"
+#include "sim/columns.h"
 
 namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '6'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '7'};
+
+template <class Archive, class Values>
+void transfer_values(Archive& archive, Values& values) {
+  if constexpr (std::is_same_v<std::remove_const_t<Values>, HostVec>)
+    archive(values.x), archive(values.y), archive(values.z);
+  else
+    archive(values);
+}
 
 /// The same list of members writes and reads: Archive is a Writer or a Reader.
 template <class Archive, class C>
@@ -16,10 +25,10 @@ void transfer(Archive& archive, C& c) {
   archive(c.frame), archive(c.time), archive(c.steps), archive(c.next_id), archive(c.births);
   archive(c.emitted), archive(c.shut);
   auto& s = c.state;
-  for (auto* v : {&s.position, &s.velocity, &s.owed, &s.cloth_position, &s.cloth_velocity}) {
-    archive(v->x), archive(v->y), archive(v->z);
-  }
-  archive(s.id), archive(s.memory_triangle), archive(s.memory_side), archive(s.pressure_term);
+  cpu::State columns;
+  columns.parameters.incompressible = true;  // which keeps more
+  cpu::for_each_kept_column(
+      columns, [&](const auto&, const auto&, auto member) { transfer_values(archive, s.*member); });
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
   archive(s.removed);
   archive(c.probes);

@@ -36,7 +36,7 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
       consider(1.25 * limits.step, "growth");
       // The solve takes the places of neighbours as they are; moved by what pressures push, they
       // answer like springs of frequency sqrt(p / rho) / a and more, which long steps excite: 40
-      // layers at rest boiled at 0.51, 30 did not at 0.44.
+      // layers at rest boil at 0.51, 30 do not at 0.44.
       if (limits.pressure > 0)
         consider(std::max(0.43 * a / std::sqrt(limits.pressure), 0.1 * ruling.dt), "pressure");
     }

@@ -16,6 +16,7 @@
 #include "sim/setup/inlet_report.h"
 #include "sim/setup/room.h"
 #include "sim/setup/scene.h"
+#include "sim/stepper.h"
 
 namespace drench {
 
@@ -44,27 +45,29 @@ std::unique_ptr<sim::Solver> make_solver(const sim::Scene& scene, Device device,
   return sim::cpu::make_solver(scene.parameters, scene.cloth);
 }
 
+sim::Stepper make_stepper(const Shot& shot, const SimulatorOptions& options, std::string& device) {
+  sim::Scene scene = sim::build_scene(shot, options.level_set);
+  std::unique_ptr<sim::Solver> solver = make_solver(scene, options.device, device);
+  return {std::move(scene), std::move(solver), 0 - shot.preroll};  // no -0
+}
+
 }  // namespace
 
 struct Simulator::Implementation {
   Shot shot;
   SimulatorOptions options;
-  sim::Scene scene;
   std::string device;
-  std::unique_ptr<sim::Solver> solver;
+  sim::Stepper run;
   std::vector<sim::EmitterLayer> layer;
   Digest layout;
 
   int frame = 0;
-  double time = 0;  // s since the first frame; negative in the pre-roll
-  uint64_t steps = 0;
   int next_id = 0;
   sim::Births births;
   std::vector<uint64_t> emitted, shut;  // as Checkpoint
   std::vector<uint64_t> reported;       // HostState::removed of the last report
   int reported_id = 0;                  // next_id of the last report
   sim::ProbeSeries probes;
-  sim::Limits limits;
   std::optional<double> room;   // sim::room_of, once it is asked for
   std::vector<bool> told_full;  // emitters whose warning was given
   std::filesystem::path last_checkpoint;
@@ -72,9 +75,8 @@ struct Simulator::Implementation {
   Implementation(const Shot& shot_, const SimulatorOptions& options_)
       : shot(shot_),
         options(options_),
-        scene(sim::build_scene(shot, options.level_set)),
-        solver(make_solver(scene, options.device, device)),
-        probes(shot, scene) {
+        run(make_stepper(shot, options, device)),
+        probes(shot, run.scene) {
     for (const FluidEmitter& e : shot.fluid.emitter)
       layer.push_back(sim::emitter_layer(e, shot.fluid.spacing));
     emitted.assign(layer.size(), 0), shut.assign(layer.size(), 0);
@@ -83,25 +85,21 @@ struct Simulator::Implementation {
     Hasher hasher;
     layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 6").finish();
     frame = shot.timeline.first;
-    next_id = reported_id = int(scene.start.id.size());
-    births = scene.births;
-    solver->load(scene.start);
-    limits = solver->measure();
-    time = 0 - shot.preroll;  // no -0
-    scene.obstacles.place(*solver, time, time);
-    scene.sinks.place(*solver, time, time);
-    solver->refresh();
-    if (scene.overlapping > 0) {
+    next_id = reported_id = int(run.scene.start.id.size());
+    births = run.scene.births;
+    run.solver->refresh();
+    if (run.scene.overlapping > 0) {
       log_info("sim", fmt::format("{} particles of sources that overlap were left out",
-                                  scene.overlapping));
+                                  run.scene.overlapping));
     }
-    if (scene.inside_obstacles > 0) {
+    if (run.scene.inside_obstacles > 0) {
       log_info("sim", fmt::format("{} particles of the sources start inside obstacles or within "
                                   "half a spacing of them and were left out",
-                                  scene.inside_obstacles));
+                                  run.scene.inside_obstacles));
     }
-    for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
-    probes.start(time, *solver);
+    for (const std::string& warning : sim::warnings_of(run.scene.report))
+      log_warning("sim", warning);
+    probes.start(run.time, *run.solver);
   }
 
   double frame_time(int f) const { return (f - shot.timeline.first) / shot.timeline.fps; }
@@ -121,12 +119,12 @@ struct Simulator::Implementation {
         if (shut[e] > 0) continue;
         const double frame_then = shot.timeline.first + leaves * shot.timeline.fps;
         const sim::Inlet inlet = sim::inlet_at(source, shot.timeline, frame_then);
-        limits.max_speed = std::max(limits.max_speed, float(inlet.velocity.length()));
+        run.limits.max_speed = std::max(run.limits.max_speed, float(inlet.velocity.length()));
         births.add({next_id, emitter_source(e), leaves});
         add_layer(layer[e], inlet, until - leaves, until);
       }
     }
-    for (sim::MeshEmitter& e : scene.mesh_emitter) {
+    for (sim::MeshEmitter& e : run.scene.mesh_emitter) {
       if (e.active(until)) fill(e, until);
     }
   }
@@ -136,7 +134,7 @@ struct Simulator::Implementation {
   }
 
   void check_room(size_t emitter, size_t more, double now) const {
-    if (solver->particles() + more <= max_particles) return;
+    if (run.solver->particles() + more <= max_particles) return;
     throw Error(fmt::format(
         "{}: emitter {} would pass {} particles at t = {:.4g} s. Use a larger spacing or stop the "
         "emitter earlier",
@@ -156,8 +154,8 @@ struct Simulator::Implementation {
   /// Of `more` particles of an emitter those that a closed domain has room for. Nothing but their
   /// number decides, so that a sink lets it send again and a resumed run does the same.
   size_t that_fit(size_t emitter, size_t more, double now) {
-    if (!room) room = sim::room_of(shot, scene, sim::Counted::standing, -shot.preroll);
-    const double there = double(solver->particles());
+    if (!room) room = sim::room_of(shot, run.scene, sim::Counted::standing, -shot.preroll);
+    const double there = double(run.solver->particles());
     if (there + double(more) <= *room) return more;
     warn_full(
         emitter, now,
@@ -173,24 +171,25 @@ struct Simulator::Implementation {
     if (shot.obstacle.empty() && shot.cloth.empty()) return;
     for (size_t e = 0; e < layer.size(); ++e) {
       const FluidEmitter& emitter = shot.fluid.emitter[e];
-      const double since = now + shot.preroll, most = sim::pressure_without_room(scene, emitter);
+      const double since = now + shot.preroll,
+                   most = sim::pressure_without_room(run.scene, emitter);
       const bool sends = since >= emitter.start && since <= emitter.stop;
       if (emitter.type == EmitterType::mesh || !sends) continue;
-      if (shut[e] == 0 && !(double(limits.pressure) > most)) continue;
-      solver->refresh();  // the density of these positions, whoever has looked or stopped since
-      const sim::NearInlet near =
-          sim::near_inlet(shot, scene, emitter, shot.timeline.first + now * shot.timeline.fps,
-                          solver->positions(), solver->density(), solver->pressure_term());
+      if (shut[e] == 0 && !(double(run.limits.pressure) > most)) continue;
+      run.solver->refresh();  // the density of these positions, whoever has looked or stopped since
+      const sim::NearInlet near = sim::near_inlet(
+          shot, run.scene, emitter, shot.timeline.first + now * shot.timeline.fps,
+          run.solver->positions(), run.solver->density(), run.solver->pressure_term());
       constexpr double dense = 0.97;  // all around the inlet is fluid
       if (shut[e] > 0) {
-        if (uint64_t(solver->particles()) < shut[e] || near.density < dense) shut[e] = 0;
+        if (uint64_t(run.solver->particles()) < shut[e] || near.density < dense) shut[e] = 0;
       } else if (near.density > dense && near.pressure > most) {
-        shut[e] = uint64_t(solver->particles());
+        shut[e] = uint64_t(run.solver->particles());
         warn_full(
             e, now,
             fmt::format("the fluid around it has a pressure of {:.3g} Pa, as in a vessel that "
                         "is closed and full",
-                        near.pressure * scene.parameters.rest_density));
+                        near.pressure * run.scene.parameters.rest_density));
       }
     }
   }
@@ -200,11 +199,11 @@ struct Simulator::Implementation {
     sim::HostVec position, velocity;
     std::vector<int> id;
     births.add({next_id, emitter_source(emitter.index()), now});
-    for (const auto& [p, u] : emitter.missing(scene, solver->positions(), now)) {
-      if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
-      position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
+    for (const auto& [p, u] : emitter.missing(run.scene, run.solver->positions(), now)) {
+      if (!sim::clear_of_obstacles(run.scene.obstacles, p, now, shot.fluid.spacing)) continue;
+      position.push(run.scene.place(0, p.x), run.scene.place(1, p.y), run.scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
-      limits.max_speed = std::max(limits.max_speed, float(u.length()));
+      run.limits.max_speed = std::max(run.limits.max_speed, float(u.length()));
       id.push_back(next_id++);
     }
     if (id.empty()) return;
@@ -213,7 +212,7 @@ struct Simulator::Implementation {
     next_id -= int(id.size() - fit);
     position.resize(fit), velocity.resize(fit), id.resize(fit);
     if (id.empty()) return;
-    solver->append(position, velocity, id);
+    run.solver->append(position, velocity, id);
     emitted[emitter.index()] += id.size();
   }
 
@@ -226,70 +225,44 @@ struct Simulator::Implementation {
     inlet.center += moved;
     for (const auto& place : what.place) {
       V3d p = inlet.at(place);
-      const sim::InletPlace from = sim::inlet_place(shot, scene.obstacles, p - moved, along, now);
+      const sim::InletPlace from =
+          sim::inlet_place(shot, run.scene.obstacles, p - moved, along, now);
       if (from.blocked != sim::InletPlace::Blocked::no) continue;
       if (from.ahead > 0) p += along * from.ahead;
-      if (!sim::clear_of_obstacles(scene.obstacles, p, now, shot.fluid.spacing)) continue;
-      position.push(scene.place(0, p.x), scene.place(1, p.y), scene.place(2, p.z));
+      if (!sim::clear_of_obstacles(run.scene.obstacles, p, now, shot.fluid.spacing)) continue;
+      position.push(run.scene.place(0, p.x), run.scene.place(1, p.y), run.scene.place(2, p.z));
       velocity.push(float(u.x), float(u.y), float(u.z));
       id.push_back(next_id++);
     }
-    if (!id.empty()) solver->append(position, velocity, id);
+    if (!id.empty()) run.solver->append(position, velocity, id);
   }
 
   /// Steps to time `end` exactly: the rest is cut into equal parts no longer than the stable step.
   void advance_to(double end, StepReport& report, const std::function<bool()>& keep_going) {
     std::map<std::string, int> ruled;
-    while (time < end) {
+    while (run.time < end) {
       if (keep_going && !keep_going()) throw Stopped("stopped on request");
-      emit(time);
-      sim::StepLimit limit = driven_step();
-      const double moves = scene.obstacles.limit(time, limit.dt);
-      if (moves < limit.dt) limit = {moves, "obstacle speed"};
+      emit(run.time);
+      sim::StepLimit limit = run.limit();
       if (shot.time_step > 0) limit = fixed_step(limit);
-      const double stop = scene.obstacles.stop(time, end);
-      const double rest = stop - time;
-      const double parts = std::ceil(rest / limit.dt - 1e-9);
-      const double dt = parts <= 1 ? rest : rest / parts;
-      const int substeps =
-          shot.cloth.empty()
-              ? 1
-              : std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6)));
-      const double then = parts <= 1 ? stop : time + dt;
-      scene.obstacles.place(*solver, time, then);
-      scene.sinks.place(*solver, time, then);
-      if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(then));
-      if (scene.motion.moves()) solver->drive(scene.motion.over(time, then));
-      limits = solver->step(dt, substeps);
-      time = then;
-      ++steps;
+      const double dt = run.step_towards(end, limit.dt);
       check_state(dt);
-      probes.record(time, *solver);
+      probes.record(run.time, *run.solver);
       report.smallest_dt = report.steps ? std::min(report.smallest_dt, dt) : dt;
       report.largest_dt = std::max(report.largest_dt, dt);
-      report.max_speed = std::max(report.max_speed, double(limits.max_speed));
-      report.iterations += limits.iterations;
-      report.unconverged += limits.residual > scene.parameters.tolerance;
-      report.worst_residual = std::max(report.worst_residual, double(limits.residual));
-      report.viscous_iterations += limits.viscous_iterations;
-      report.viscous_unconverged += limits.viscous_residual > 0;
-      report.sheet_sweeps += limits.sheet_sweeps;
-      report.sheets_cut_short += limits.sheets_cut_short;
+      report.max_speed = std::max(report.max_speed, double(run.limits.max_speed));
+      report.iterations += run.limits.iterations;
+      report.unconverged += run.limits.residual > run.scene.parameters.tolerance;
+      report.worst_residual = std::max(report.worst_residual, double(run.limits.residual));
+      report.viscous_iterations += run.limits.viscous_iterations;
+      report.viscous_unconverged += run.limits.viscous_residual > 0;
+      report.sheet_sweeps += run.limits.sheet_sweeps;
+      report.sheets_cut_short += run.limits.sheets_cut_short;
       report.worst_viscous_residual =
-          std::max(report.worst_viscous_residual, double(limits.viscous_residual));
-      ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : substeps;
+          std::max(report.worst_viscous_residual, double(run.limits.viscous_residual));
+      ++report.steps, report.cloth_substeps += shot.cloth.empty() ? 0 : run.cloth_substeps(dt);
       if (++ruled[limit.name] > ruled[report.limit]) report.limit = limit.name;
     }
-  }
-
-  /// The stable step, of gravity and the frame's motion as they are now.
-  sim::StepLimit driven_step() {
-    if (scene.motion.moves()) scene.set_drive(time);
-    const sim::StepLimit limit = sim::stable_step(scene.parameters, limits);
-    if (!scene.motion.turns()) return limit;
-    sim::Limits more = limits;
-    more.max_speed += float(scene.motion.kick(time, limit.dt));
-    return sim::stable_step(scene.parameters, more);
   }
 
   sim::StepLimit fixed_step(const sim::StepLimit& stable) const {
@@ -312,10 +285,10 @@ struct Simulator::Implementation {
   /// @throws BlowUp if anything is not finite or absurdly fast after a step of dt: what, where,
   /// when, why, and what is safe.
   void check_state(double dt) {
-    if (limits.bad_particle < 0 && limits.bad_vertex < 0) return;
-    const sim::HostState state = solver->save();
-    const bool particle = limits.bad_particle >= 0;
-    const int i = particle ? limits.bad_particle : limits.bad_vertex;
+    if (run.limits.bad_particle < 0 && run.limits.bad_vertex < 0) return;
+    const sim::HostState state = run.solver->save();
+    const bool particle = run.limits.bad_particle >= 0;
+    const int i = particle ? run.limits.bad_particle : run.limits.bad_vertex;
     const sim::HostVec &x = particle ? state.position : state.cloth_position,
                        &v = particle ? state.velocity : state.cloth_velocity;
     const double speed =
@@ -324,13 +297,13 @@ struct Simulator::Implementation {
         "{}: the simulation blew up {}, t = {:.5f} s, step {}: {} {} at ({:.4g}, {:.4g}, {:.4g}) m "
         "has speed "
         "{:.4g} m/s. No file of the next frame was written; last good checkpoint: {}. {}",
-        shot.file.string(), time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll",
-        time, steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
-        scene.frame.to_world(0, x.x[i]), scene.frame.to_world(1, x.y[i]),
-        scene.frame.to_world(2, x.z[i]), speed,
+        shot.file.string(), run.time > 0 ? fmt::format("after frame {}", frame) : "in the pre-roll",
+        run.time, run.steps, particle ? "particle" : "cloth vertex", particle ? state.id[i] : i,
+        run.scene.frame.to_world(0, x.x[i]), run.scene.frame.to_world(1, x.y[i]),
+        run.scene.frame.to_world(2, x.z[i]), speed,
         last_checkpoint.empty() ? "none" : last_checkpoint.string(),
-        sim::cause_of_blow_up(shot, scene, state, solver->density(), crowded(), {particle, i}, time,
-                              dt));
+        sim::cause_of_blow_up(shot, run.scene, state, run.solver->density(), crowded(),
+                              {particle, i}, run.time, dt));
     throw BlowUp(text, last_checkpoint);
   }
 
@@ -350,19 +323,20 @@ struct Simulator::Implementation {
           fmt::format("frame {}: in {} of {} steps {} iterations of the pressure solve "
                       "did not reach fluid.tolerance = {:.2g}; mean density error {:.2g} "
                       "at worst",
-                      frame, report.unconverged, report.steps, scene.parameters.most_iterations,
-                      scene.parameters.tolerance, report.worst_residual),
+                      frame, report.unconverged, report.steps, run.scene.parameters.most_iterations,
+                      run.scene.parameters.tolerance, report.worst_residual),
           "pressure solve unconverged");
     }
     if (report.viscous_unconverged > 0) {
-      log_warning("sim",
-                  fmt::format("frame {}: in {} of {} steps {} iterations of the viscous solve did "
-                              "not reach {:.2g} of the velocity; {:.2g} at worst. Smaller steps "
-                              "(shot.time_step) ask for fewer",
-                              frame, report.viscous_unconverged, report.steps,
-                              scene.parameters.most_viscous_iterations,
-                              scene.parameters.viscous_tolerance, report.worst_viscous_residual),
-                  "viscous solve unconverged");
+      log_warning(
+          "sim",
+          fmt::format("frame {}: in {} of {} steps {} iterations of the viscous solve did "
+                      "not reach {:.2g} of the velocity; {:.2g} at worst. Smaller steps "
+                      "(shot.time_step) ask for fewer",
+                      frame, report.viscous_unconverged, report.steps,
+                      run.scene.parameters.most_viscous_iterations,
+                      run.scene.parameters.viscous_tolerance, report.worst_viscous_residual),
+          "viscous solve unconverged");
     }
     if (report.sheets_cut_short > 0) {
       log_warning("sim",
@@ -372,14 +346,14 @@ struct Simulator::Implementation {
                               frame, report.sheets_cut_short, report.steps),
                   "sheets' solve cut short");
     }
-    const std::vector<float> density = solver->density();
-    const sim::HostState state = solver->save();
-    report.time = time;
+    const std::vector<float> density = run.solver->density();
+    const sim::HostState state = run.solver->save();
+    report.time = run.time;
     report.particles = density.size();
-    for (int t : solver->near_triangles()) report.near += t >= 0;
+    for (int t : run.solver->near_triangles()) report.near += t >= 0;
     double sum = 0, energy = 0;
     for (float rho : density) {
-      const double over = std::max(0.0, double(rho) / scene.parameters.rest_density - 1);
+      const double over = std::max(0.0, double(rho) / run.scene.parameters.rest_density - 1);
       sum += over;
       report.max_compression = std::max(report.max_compression, over);
     }
@@ -388,46 +362,46 @@ struct Simulator::Implementation {
       return 0.5 * (double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
     };
     for (size_t i = 0; i < state.velocity.size(); ++i)
-      energy += scene.parameters.particle_mass * kinetic(state.velocity, i);
+      energy += run.scene.parameters.particle_mass * kinetic(state.velocity, i);
     for (size_t i = 0; i < state.cloth_velocity.size(); ++i)
-      energy += scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
+      energy += run.scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
-    for (const sim::ColumnMemory& group : solver->memory()) report.memory += group.bytes;
+    for (const sim::ColumnMemory& group : run.solver->memory()) report.memory += group.bytes;
     count_particles(report, state.removed);
   }
 
   ParticleFrame particles() const {
-    const sim::HostState state = solver->save();
+    const sim::HostState state = run.solver->save();
     ParticleFrame out;
     out.spacing = float(shot.fluid.spacing), out.rest_density = float(shot.fluid.rest_density);
-    out.density = solver->density();
+    out.density = run.solver->density();
     for (size_t i = 0; i < state.id.size(); ++i) {
       out.position.push_back(world(state.position, i));
       out.velocity.emplace_back(state.velocity.x[i], state.velocity.y[i], state.velocity.z[i]);
       out.id.push_back(uint32_t(state.id[i]));
       const sim::Birth& birth = births.of(state.id[i]);
       if (shot.fluid.write_source) out.source.push_back(uint8_t(birth.source));
-      if (shot.fluid.write_age) out.age.push_back(float(time - birth.time));
+      if (shot.fluid.write_age) out.age.push_back(float(run.time - birth.time));
     }
     return out;
   }
 
   V3f world(const sim::HostVec& p, size_t i, const V3d& shift = V3d(0)) const {
-    return V3f(float(scene.frame.to_world(0, p.x[i]) + shift.x),
-               float(scene.frame.to_world(1, p.y[i]) + shift.y),
-               float(scene.frame.to_world(2, p.z[i]) + shift.z));
+    return V3f(float(run.scene.frame.to_world(0, p.x[i]) + shift.x),
+               float(run.scene.frame.to_world(1, p.y[i]) + shift.y),
+               float(run.scene.frame.to_world(2, p.z[i]) + shift.z));
   }
 
   std::vector<ClothFrame> cloth() const {
-    const sim::HostState state = solver->save();
+    const sim::HostState state = run.solver->save();
     std::vector<ClothFrame> frames;
-    for (size_t s = 0; s < scene.sheet.size(); ++s) {
-      const sim::Sheet& sheet = scene.sheet[s];
+    for (size_t s = 0; s < run.scene.sheet.size(); ++s) {
+      const sim::Sheet& sheet = run.scene.sheet[s];
       ClothFrame out{sheet.name, {}};
       // Both edges at a seam are drawn, so that there is no hole in what is seen.
       for (size_t point = 0; point < sheet.position.size(); ++point) {
-        const int v = scene.first_vertex[s] + sheet.node[point];
+        const int v = run.scene.first_vertex[s] + sheet.node[point];
         const V3d shift = V3d(sheet.image[point]) * sheet.period;
         out.mesh.position.push_back(world(state.cloth_position, size_t(v), shift));
         out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v],
@@ -453,10 +427,10 @@ Simulator::Simulator(Simulator&&) noexcept = default;
 StepReport Simulator::preroll(const std::function<bool()>& keep_going) {
   Implementation& s = *implementation_;
   StepReport report;
-  if (s.time >= 0) return report;
+  if (s.run.time >= 0) return report;
   log_info("sim", fmt::format("pre-roll of {} s", s.shot.preroll));
   s.advance_to(0, report, keep_going);
-  s.solver->refresh();
+  s.run.solver->refresh();
   s.describe(report);
   return report;
 }
@@ -467,7 +441,7 @@ StepReport Simulator::advance_frame(const std::function<bool()>& keep_going) {
   StepReport report;
   s.advance_to(s.frame_time(s.frame + 1), report, keep_going);
   ++s.frame;
-  s.solver->refresh();
+  s.run.solver->refresh();
   s.describe(report);
   return report;
 }
@@ -480,9 +454,17 @@ std::string Simulator::device_name() const { return implementation_->device; }
 
 WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const {
   Implementation& s = *implementation_;
-  sim::Checkpoint checkpoint{s.frame,   s.time, s.steps,          s.next_id,       s.births.runs(),
-                             s.emitted, s.shut, s.solver->save(), s.probes.rows(), s.layout};
-  checkpoint.state.limits = s.limits;
+  sim::Checkpoint checkpoint{.frame = s.frame,
+                             .time = s.run.time,
+                             .steps = uint64_t(s.run.steps),
+                             .next_id = s.next_id,
+                             .births = s.births.runs(),
+                             .emitted = s.emitted,
+                             .shut = s.shut,
+                             .state = s.run.solver->save(),
+                             .probes = s.probes.rows(),
+                             .layout = s.layout};
+  checkpoint.state.limits = s.run.limits;
   WrittenFile written = sim::write_checkpoint(path, checkpoint);
   s.last_checkpoint = path;
   return written;
@@ -492,19 +474,17 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   Implementation& s = *implementation_;
   sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
   if (checkpoint.emitted.size() != s.emitted.size() || checkpoint.shut.size() != s.shut.size() ||
-      checkpoint.state.cloth_position.size() != size_t(s.scene.cloth.vertices()) ||
+      checkpoint.state.cloth_position.size() != size_t(s.run.scene.cloth.vertices()) ||
       checkpoint.state.removed.size() != s.reported.size() || !s.probes.fits(checkpoint.probes)) {
     throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
   }
-  s.frame = checkpoint.frame, s.time = checkpoint.time, s.steps = checkpoint.steps;
+  s.frame = checkpoint.frame;
   s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted, s.shut = checkpoint.shut;
   s.births.resume(std::move(checkpoint.births));
-  s.limits = checkpoint.state.limits;
   s.probes.resume(std::move(checkpoint.probes));
-  s.solver->load(checkpoint.state);
-  s.scene.obstacles.place(*s.solver, s.time, s.time);
-  s.scene.sinks.place(*s.solver, s.time, s.time);
-  s.solver->refresh();
+  s.run.load(checkpoint.state, checkpoint.state.limits, checkpoint.time);
+  s.run.steps = int64_t(checkpoint.steps);
+  s.run.solver->refresh();
   s.reported = checkpoint.state.removed, s.reported_id = s.next_id;
   s.last_checkpoint = path;
 }

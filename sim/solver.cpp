@@ -3,15 +3,17 @@
 #include "sim/solver.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 
+#include "pipeline/contract/hash.h"
+#include "sim/columns.h"
 #include "sim/passes/motion/limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
 #include "sim/passes/probe/probe.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_solve.h"
-#include "sim/state_memory.h"
 #include "sim/step_plan.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -21,8 +23,46 @@ namespace {
 void upload(VecColumn& column, const HostVec& host) {
   from_host(column.x, host.x), from_host(column.y, host.y), from_host(column.z, host.z);
 }
-HostVec download(const VecColumn& column, int n) {
+template <class T>
+void upload(Column<T>& column, const std::vector<T>& host) {
+  from_host(column, host);
+}
+HostVec download(const VecColumn& column, size_t n) {
   return {to_host(column.x, n), to_host(column.y, n), to_host(column.z, n)};
+}
+template <class T>
+std::vector<T> download(const Column<T>& column, size_t n) {
+  return to_host(column, n);
+}
+/// Elements from `at` on.
+void put(VecColumn& column, const HostVec& host, size_t at) {
+  column.x.upload(host.x.data(), host.size(), at), column.y.upload(host.y.data(), host.size(), at);
+  column.z.upload(host.z.data(), host.size(), at);
+}
+template <class T>
+void put(Column<T>& column, const std::vector<T>& host, size_t at) {
+  column.upload(host.data(), host.size(), at);
+}
+/// n elements of what a new particle has.
+HostVec repeated(const VecColumn&, size_t n, int value) {
+  const std::vector<float> all(n, float(value));
+  return {all, all, all};
+}
+template <class T>
+std::vector<T> repeated(const Column<T>&, size_t n, int value) {
+  if constexpr (std::is_arithmetic_v<T>) return std::vector<T>(n, T(value));
+  return std::vector<T>(n);
+}
+
+uint64_t digest_of(const VecColumn& column);
+template <class T>
+uint64_t digest_of(const Column<T>& column) {
+  const std::vector<T> host = to_host(column, column.size());
+  const Digest digest = hash_bytes(host.data(), host.size() * sizeof(T));
+  return digest.low ^ column.size();
+}
+uint64_t digest_of(const VecColumn& column) {
+  return digest_of(column.x) + 3 * digest_of(column.y) + 9 * digest_of(column.z);
 }
 
 class BackendSolver : public Solver {
@@ -33,34 +73,22 @@ class BackendSolver : public Solver {
       state_.wall_table = build_wall_table(parameters.support_radius / parameters.spacing);
     }
     plan_ = step_plan(parameters, cloth.vertices() > 0);
-    for (const Pass& pass : plan_) allocated_ |= pass.reads | pass.writes;
+    for (const Pass& pass : plan_) allocated_ |= pass.writes;
     if (cloth.vertices() > 0) load_topology(cloth);
   }
 
   void load(const HostState& host) override {
     state_.fluid.count = int(host.id.size());
-    resize_particles(host.id.size());
-    upload(state_.fluid.position, host.position);
-    upload(state_.fluid.velocity, host.velocity);
-    from_host(state_.fluid.id, host.id);
-    if (allocated_ & column_memory) {
-      from_host(state_.fluid.memory_triangle, host.memory_triangle);
-      from_host(state_.fluid.memory_side, host.memory_side);
-      upload(state_.fluid.owed, host.owed);
-    }
-    if (allocated_ & column_projection) {
-      std::vector<float> term = host.pressure_term;
-      term.resize(host.id.size(), 0.f);  // a state that no step has made yet has none
-      from_host(state_.fluid.pressure_term, term);
-    }
+    resize_particles(state_, allocated_, host.id.size());
+    for_each_kept_column(state_, [&](const ColumnInfo& info, auto& column, auto member) {
+      if (!allocated_.contains(info.group)) return;
+      const size_t n = count_of(info);  // a state that no step has made yet has no pressures
+      const auto& values = host.*member;
+      upload(column, values.size() == n ? values : repeated(column, n, info.initial));
+      if (info.extent == Extent::vertices) column.resize(state_.cloth.padded);
+    });
     state_.fluid.far_by.clear_bytes(0);
     state_.owes = true;
-    if (allocated_ & column_cloth) {
-      upload(state_.cloth.position, host.cloth_position);
-      upload(state_.cloth.velocity, host.cloth_velocity);
-      state_.cloth.position.resize(state_.cloth.padded);
-      state_.cloth.velocity.resize(state_.cloth.padded);
-    }
     state_.guard_hits = host.guard_hits;
     state_.guard_holds = host.guard_holds;
     state_.removed = host.removed;
@@ -69,21 +97,9 @@ class BackendSolver : public Solver {
 
   HostState save() const override {
     HostState host;
-    const FluidState& f = state_.fluid;
-    const int n = f.count;
-    host.position = download(f.position, n);
-    host.velocity = download(f.velocity, n);
-    host.id = to_host(f.id, n);
-    if (allocated_ & column_memory) {
-      host.memory_triangle = to_host(f.memory_triangle, n);
-      host.memory_side = to_host(f.memory_side, n);
-      host.owed = download(f.owed, n);
-    }
-    if (allocated_ & column_projection) host.pressure_term = to_host(f.pressure_term, n);
-    if (allocated_ & column_cloth) {
-      host.cloth_position = download(state_.cloth.position, state_.cloth.vertices);
-      host.cloth_velocity = download(state_.cloth.velocity, state_.cloth.vertices);
-    }
+    for_each_kept_column(state_, [&](const ColumnInfo& info, const auto& column, auto member) {
+      if (allocated_.contains(info.group)) host.*member = download(column, count_of(info));
+    });
     host.guard_hits = state_.guard_hits;
     host.guard_holds = state_.guard_holds;
     host.removed = state_.removed;
@@ -98,34 +114,23 @@ class BackendSolver : public Solver {
     return to_host(state_.fluid.pressure_term, state_.fluid.count);
   }
   std::vector<int> near_triangles() const override {
-    if (!(allocated_ & column_sheet)) return std::vector<int>(state_.fluid.count, -1);
+    if (!(allocated_.contains(ColumnGroup::near_cloth)))
+      return std::vector<int>(state_.fluid.count, -1);
     return to_host(state_.fluid.triangle, state_.fluid.count);
   }
 
   void append(const HostVec& position, const HostVec& velocity,
               const std::vector<int>& id) override {
-    FluidState& f = state_.fluid;
-    const size_t at = f.count, more = id.size();
-    resize_particles(at + more);
-    const auto put = [&](VecColumn& column, const HostVec& host) {
-      column.x.upload(host.x.data(), more, at);
-      column.y.upload(host.y.data(), more, at);
-      column.z.upload(host.z.data(), more, at);
-    };
-    put(f.position, position);
-    put(f.velocity, velocity);
-    f.id.upload(id.data(), more, at);
-    if (allocated_ & column_memory) {
-      f.memory_triangle.upload(std::vector<int>(more, -1).data(), more, at);
-      f.memory_side.upload(std::vector<int>(more, 1).data(), more, at);
-      const std::vector<float> none(more, 0.f);
-      put(f.owed, {none, none, none});
-      f.far_by.upload(none.data(), more, at);
-    }
-    if (allocated_ & column_projection) {
-      f.pressure_term.upload(std::vector<float>(more, 0.f).data(), more, at);
-    }
-    f.count = int(at + more);
+    const size_t at = state_.fluid.count, more = id.size();
+    resize_particles(state_, allocated_, at + more);
+    for_each_column(state_, [&](const ColumnInfo& info, auto& column, auto) {
+      const bool lasts = info.extent == Extent::particles && info.use != Use::rebuilt;
+      if (lasts && size_of(column) > 0) put(column, repeated(column, more, info.initial), at);
+    });
+    put(state_.fluid.position, position, at);
+    put(state_.fluid.velocity, velocity, at);
+    put(state_.fluid.id, id, at);
+    state_.fluid.count = int(at + more);
   }
 
   Limits step(double dt, int substeps) override {
@@ -134,7 +139,7 @@ class BackendSolver : public Solver {
     if (state_.parameters.fluid && state_.fluid.count == 0) {  // an emitter that has not started
       if (state_.cloth.vertices > 0) step_cloth_alone(state_);
     } else {
-      for (const Pass& pass : plan_) pass.launch(state_);
+      for (const Pass& pass : plan_) launch(pass);
     }
     Limits limits = measure_limits(state_);
     if (state_.parameters.incompressible && state_.fluid.count > 0) {
@@ -143,7 +148,7 @@ class BackendSolver : public Solver {
       limits.iterations = std::max(solve.spent, solve.iterations);
       limits.step = float(dt), limits.pressure = solve.peak;
     }
-    if (allocated_ & column_cloth_system) {
+    if (allocated_.contains(ColumnGroup::cloth_system)) {
       const ClothControl sheets = value_at(state_.cloth_system.control, 0);
       limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
     }
@@ -159,12 +164,16 @@ class BackendSolver : public Solver {
     if (observer) state_.after_substep = [this, observer] { observer(save()); };
   }
 
+  void observe_passes(std::function<void(const PassInfo&, ColumnSet)> observer) override {
+    pass_observer_ = std::move(observer);
+  }
+
   void refresh() override {
     if (state_.fluid.count == 0) return;
     if (state_.parameters.incompressible) return measure_density(state_);
     for (const Pass& pass : plan_) {
       pass.launch(state_);
-      if (pass.writes & column_density) break;
+      if (pass.writes.contains(ColumnGroup::density)) break;
     }
   }
 
@@ -222,16 +231,14 @@ class BackendSolver : public Solver {
     const int count = state_.parameters.obstacles;
     std::vector<ObstacleImpulse> impulses(count);
     for (int k = 0; k < count && state_.dt > 0; ++k) {
-      Impulse pressure = pressure_impulse(state_, k);
-      if (allocated_ & column_tension) pressure = pressure(pressure, tension_impulse(state_, k));
-      if (allocated_ & column_drag) pressure = pressure(pressure, drag_impulse(state_, k));
-      if (state_.contact.near > 0) {
-        pressure = pressure(pressure, pressure_impulse_near_sheets(state_, k));
-      }
-      const double push[3] = {pressure.x, pressure.y, pressure.z};
+      Impulse all = pressure_impulse(state_, k);
+      if (allocated_.contains(ColumnGroup::tension)) all = all + tension_impulse(state_, k);
+      if (allocated_.contains(ColumnGroup::drag)) all = all + drag_impulse(state_, k);
+      if (state_.contact.near > 0) all = all + pressure_impulse_near_cloth(state_, k);
+      const double impulse[3] = {all.x, all.y, all.z};
       for (int c = 0; c < 3; ++c) {
-        impulses[k].impulse[c] =
-            push[c] + double(stopped[4 * k + c]) / StopSums::unit * state_.parameters.particle_mass;
+        impulses[k].impulse[c] = impulse[c] + double(stopped[4 * k + c]) / StopSums::unit *
+                                                  state_.parameters.particle_mass;
       }
       impulses[k].stopped = stopped[4 * k + 3];
     }
@@ -243,69 +250,41 @@ class BackendSolver : public Solver {
     for (const Pass& pass : plan_) info.push_back({pass.name, pass.reads, pass.writes});
     return info;
   }
-  unsigned allocated() const override { return allocated_; }
-  std::vector<ColumnMemory> memory() const override { return memory_of(state_); }
+  ColumnSet allocated() const override { return allocated_; }
+  std::vector<ColumnMemory> memory() const override {
+    std::vector<ColumnMemory> all;
+    for (const std::string_view name : column_group_names) all.push_back({std::string(name), 0});
+    for_each_column(state_, [&](const ColumnInfo& info, const auto& column, auto) {
+      all[size_t(info.group)].bytes += bytes_of(column);
+    });
+    std::erase_if(all, [](const ColumnMemory& one) { return one.bytes == 0; });
+    return all;
+  }
   int particles() const override { return state_.fluid.count; }
 
  private:
-  void resize_particles(size_t n) {
-    FluidState& f = state_.fluid;
-    f.position.resize(n), f.velocity.resize(n), state_.swap_float.resize(n);
-    for (Column<int>* c : {&f.id, &f.cell, &f.order}) c->resize(n);
-    if (allocated_ & column_acceleration) f.acceleration.resize(n);
-    if (allocated_ & column_density) {
-      for (Column<float>* c : {&f.density, &f.pressure_term}) c->resize(n);
-      if (!state_.parameters.incompressible) f.inverse_density.resize(n);
-    }
-    if (allocated_ & column_projection) {
-      state_.pressure.resize(n);
-      if (state_.parameters.full) state_.pressure.mean_displacement.resize(n);
-    }
-    if (allocated_ & column_tension) state_.tension.normal.resize(n);
-    if (state_.parameters.wets) state_.tension.wetting.resize(n);
-    if (allocated_ & column_drag) {
-      ViscosityState& v = state_.viscosity;
-      for (Column<Float4>* c : {&v.body_rate, &v.body_cross, &v.body_source}) c->resize(n);
-    }
-    if (allocated_ & column_sheet) {
-      for (Column<float>* c : {&f.far_by, &f.weight_b, &f.weight_c, &f.sheet_distance, &f.plane,
-                               &f.edge, &f.cloth_share}) {
-        c->resize(n);
-      }
-      f.triangle.resize(n), f.shaded.resize(n);
-      f.normal.resize(n);
-    }
-    if (allocated_ & column_contact) {
-      resize_contacts(n);
-    }
-    if (allocated_ & column_memory) {
-      f.memory_triangle.resize(n);
-      f.memory_side.resize(n);
-      f.owed.resize(n);
-    }
+  size_t count_of(const ColumnInfo& info) const {
+    return info.extent == Extent::vertices ? state_.cloth.vertices : state_.fluid.count;
   }
 
-  void resize_contacts(size_t n) {
-    FluidState& f = state_.fluid;
-    ContactState& c = state_.contact;
-    c.key.resize(n);
-    if (state_.parameters.paper) return f.impulse.resize(n);
-    for (VecColumn* v : {&f.start, &f.end}) v->resize(n);
-    for (Column<int>* v : {&f.held, &f.moved, &f.stopped}) v->resize(n);
-    const size_t rows = (n + 23) / 8 * 8;
-    c.stride = int(rows);
-    c.particle.resize(rows), c.vertex.resize(3 * rows), c.weight.resize(3 * rows);
-    c.change.resize(rows);
-    if (allocated_ & column_cloth_system) {
-      f.drift.resize(n), c.gradient.resize(rows);
-      for (Column<float>* v : {&c.recovery, &c.compliance, &c.gap, &c.open}) v->resize(rows);
-      if (state_.parameters.no_slip_sheets) c.rate_along.resize(rows), c.rate_across.resize(rows);
-    } else {
-      for (VecColumn* v : {&c.normal, &c.velocity, &c.drag}) v->resize(rows);
-      for (Column<float>* v : {&c.inverse_row, &c.pressure_target, &c.pressure_rate,
-                               &c.pressure_scale, &c.least, &c.drag_rate, &c.drag_scale, &c.lambda})
-        v->resize(rows);
-    }
+  std::array<uint64_t, column_group_names.size()> digests() const {
+    std::array<uint64_t, column_group_names.size()> all{};
+    for_each_column(state_, [&](const ColumnInfo& info, const auto& column, auto) {
+      uint64_t& of_group = all[size_t(info.group)];
+      of_group = of_group * 1099511628211u + digest_of(column);
+    });
+    return all;
+  }
+
+  void launch(const Pass& pass) {
+    if (!pass_observer_) return pass.launch(state_);
+    const auto before = digests();
+    pass.launch(state_);
+    const auto after = digests();
+    ColumnSet changed;
+    for (size_t k = 0; k < before.size(); ++k)
+      if (before[k] != after[k]) changed |= ColumnGroup(k);
+    pass_observer_({pass.name, pass.reads, pass.writes}, changed);
   }
 
   void load_topology(const ClothTopology& t) {
@@ -347,7 +326,8 @@ class BackendSolver : public Solver {
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
-    if (allocated_ & column_cloth_system) allocate_cloth_system(), find_loose_sheets(t);
+    if (allocated_.contains(ColumnGroup::cloth_system))
+      allocate_cloth_system(), find_loose_sheets(t);
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
   }
@@ -434,7 +414,8 @@ class BackendSolver : public Solver {
 
   State state_;
   std::vector<Pass> plan_;
-  unsigned allocated_ = 0;
+  ColumnSet allocated_;
+  std::function<void(const PassInfo&, ColumnSet)> pass_observer_;
 };
 
 }  // namespace

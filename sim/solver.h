@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/contract/geometry/level_set.h"
+#include "sim/column_groups.h"
 #include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
@@ -66,25 +67,9 @@ struct ObstacleImpulse {
 /// What bodies in space are for: fluid flows around obstacles and vanishes in sinks.
 enum class Solids { obstacles, sinks };
 
-/// Columns a pass may name; only those that the plan names are allocated.
-enum ColumnGroup : unsigned {
-  column_position = 1,
-  column_velocity = 2,
-  column_acceleration = 4,
-  column_density = 8,
-  column_sheet = 16,    // nearest triangle, weights, normal, distance, edge, share
-  column_memory = 32,   // remembered side
-  column_contact = 64,  // impulses
-  column_cloth = 128,
-  column_cloth_system = 512,  // the implicit step of the sheets
-  column_projection = 256,    // neighbour lists and rows of the pressure solve
-  column_tension = 1024,      // normals of the surface
-  column_drag = 2048,         // what obstacles and sheets brake the fluid by
-};
-
 struct PassInfo {
   std::string name;
-  unsigned reads, writes;  // of ColumnGroup
+  ColumnSet reads, writes;
 };
 
 /// What a group of columns takes in the memory of the backend, room to grow included.
@@ -114,6 +99,10 @@ class Solver {
   /// step on; without one (the default) nothing is done for it. Each call reads the whole state
   /// back to the host.
   virtual void observe_substeps(std::function<void(const HostState&)> observer) = 0;
+  /// Calls `observer` after each launch of a pass with the groups of columns that it changed, from
+  /// the next step on. Digests every column before and after: for tests.
+  virtual void observe_passes(
+      std::function<void(const PassInfo& pass, ColumnSet changed)> observer) = 0;
   /// Density and nearest triangles of the current positions, without a step. Sorts the particles,
   /// which the next step would do in the same way: its result is the same bits with or without
   /// this.
@@ -136,7 +125,7 @@ class Solver {
   /// step. What the numbers are: sim/probe_query.h.
   virtual std::vector<std::vector<double>> probe(const std::vector<ProbeQuery>& queries) = 0;
   virtual std::vector<PassInfo> plan() const = 0;
-  virtual unsigned allocated() const = 0;                // ColumnGroup of the columns in memory
+  virtual ColumnSet allocated() const = 0;               // groups whose columns are in memory
   virtual std::vector<ColumnMemory> memory() const = 0;  // of the groups that take anything
   virtual int particles() const = 0;
 };

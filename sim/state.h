@@ -111,7 +111,7 @@ struct ClothState {
   VecColumn air_push;          // N
   VecColumn force;             // N from the fluid, constant over the step
   Column<int> held;            // by the path test for this substep
-  Column<long long> stop_sum;  // 4 a vertex: see PathTest
+  Column<long long> stop_sum;  // 4 a vertex: see ContinuousCollision
 };
 
 /// Scalars of the conjugate gradients of the sheets, in the memory of the backend.
@@ -254,18 +254,10 @@ struct PressureState {
   Column<Float4> scratch_a, scratch_b;
   Column<Float4> wall;  // kg/m^4, rho_0 times the gradient of the walls' share; w: times the share
   Column<Float4> correction, correction_cross;  // L of the gradients: xx, yy, zz and xy, yz, zx
-  Column<Float4> mean_displacement;             // m, see MeanWay; only in a closed domain
+  Column<Float4> mean_displacement;             // m, see MeanDisplacement; only in a closed domain
   Column<float> inverse_diagonal, source, before, next, product;
   Column<SolveControl> control;
   Hierarchy hierarchy;
-
-  void resize(size_t n) {
-    for (Column<Float4>* c :
-         {&place, &scratch_a, &wall, &correction, &correction_cross, &scratch_b})
-      c->resize(n);
-    for (Column<float>* c : {&inverse_diagonal, &source, &before, &next, &product}) c->resize(n);
-    control.resize(1);
-  }
 };
 
 /// Columns of surface tension (passes/tension/surface_tension.h), rebuilt every step.

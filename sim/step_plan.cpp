@@ -30,14 +30,14 @@ ConstVecView beside_sheets(const State& state) {
 void exact_nearest(State& state) {
   find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
 }
-void exact_sides(State& state) { find_sheet_sides(state, beside_sheets(state)); }
+void exact_sides(State& state) { find_cloth_sides(state, beside_sheets(state)); }
 void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
 void settle_cloth_alone(State& state) {
   state.contact.near = 0;
   if (state.parameters.air_density > 0) wind_on_cloth(state);
   linearise_cloth(state);
-  settle_sheets(state);
-  finish_sheets(state);
+  settle_cloth(state);
+  finish_cloth(state);
   finish_substep(state.cloth);
 }
 // The paper's voxels have the rest distance between centroids as edge: no reach is added.
@@ -67,7 +67,7 @@ bool around_obstacles(const Parameters& p, bool cloth) {
 }
 bool smoothed(const Parameters& p, bool cloth) { return projected(p, cloth) && p.xsph > 0; }
 bool tense(const Parameters& p, bool cloth) { return projected(p, cloth) && p.surface_tension > 0; }
-bool wetting(const Parameters& p, bool cloth) { return tense(p, cloth) && p.wets; }
+bool wets(const Parameters& p, bool cloth) { return tense(p, cloth) && p.wets; }
 bool viscous(const Parameters& p, bool cloth) {
   return projected(p, cloth) && p.dynamic_viscosity > 0;
 }
@@ -84,7 +84,9 @@ bool turning_compressible(const Parameters& p, bool cloth) {
   return p.turns && compressible(p, cloth);
 }
 bool coupled(const Parameters& p, bool cloth) { return p.fluid && cloth && !p.paper; }
-bool exact(const Parameters& p, bool cloth) { return coupled(p, cloth) && !p.incompressible; }
+bool coupled_exactly(const Parameters& p, bool cloth) {
+  return coupled(p, cloth) && !p.incompressible;
+}
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
@@ -99,66 +101,82 @@ bool implicit_alone(const Parameters& p, bool cloth) {
   return cloth_alone(p, cloth) && sheets_are_implicit(p);
 }
 
-constexpr unsigned moving = column_position | column_velocity;
+using enum ColumnGroup;
+constexpr ColumnSet moving = position | velocity;
+constexpr ColumnSet walls =
+    projection | solve;  // of the pressure solve, at the predicted positions
+constexpr ColumnSet sheets = cloth | cloth_fixed;
+constexpr ColumnSet near_list = near_cloth | contact | rows | cloth_fixed;
+/// What a pressure solve writes beside cloth.
+constexpr ColumnSet response = cloth_system | cloth_obstacles | loads;
 
 const Pass all_passes[] = {
-    {"turn_frame", turning, column_position, column_velocity, turn_frame},
-    {"predict_particles", free_of_obstacles, moving, moving, predict_particles},
-    {"predict_around_obstacles", around_obstacles, moving, moving, predict_around_obstacles},
-    {"sort_particles", fluid, column_position, moving, sort_particles},
-    {"polygon_grid", coupled, column_cloth, column_cloth, exact_grid},
-    {"nearest_triangle", coupled, column_position | column_cloth, column_sheet, exact_nearest},
-    {"sheet_side", coupled, column_position | column_cloth, column_sheet | column_memory,
-     exact_sides},
-    {"sort_near", strong, column_sheet, column_contact, sort_all_contacts},
-    {"start_rows", strong, column_sheet | column_contact, column_cloth, start_contacts},
+    {"turn_frame", turning, moving | cloth, velocity, turn_frame, cloth},
+    {"predict_particles", free_of_obstacles, moving, moving, predict_particles, start},
+    {"predict_around_obstacles", around_obstacles, moving, moving | stopped,
+     predict_around_obstacles, start},
+    {"sort_particles", fluid, position, moving | pressure | cells | sorting, sort_particles,
+     memory | near_cloth | start},
+    {"polygon_grid", coupled, sheets, polygons | sorting, exact_grid},
+    {"nearest_triangle", coupled, position | start | sheets | polygons | memory, near_cloth,
+     exact_nearest},
+    {"sheet_side", coupled, position | start | sheets | polygons, near_cloth | memory, exact_sides},
+    {"sort_near", strong, near_cloth, contact | sorting, sort_all_contacts},
+    {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
-    {"wind_on_cloth", strong_in_wind, column_cloth, column_cloth, wind_on_cloth},
-    {"linearise_cloth", strong, column_cloth, column_cloth_system, linearise_cloth},
-    {"find_neighbours", projected, column_position, column_density | column_projection,
-     find_neighbours},
-    {"apply_surface_tension", tense, column_velocity | column_projection,
-     column_velocity | column_projection | column_tension, apply_surface_tension},
-    {"apply_contact_angles", wetting, column_velocity | column_projection | column_tension,
-     column_velocity | column_projection | column_tension, apply_contact_angles},
-    {"smooth_velocities", smoothed, column_velocity | column_projection,
-     column_velocity | column_projection, smooth_velocities},
-    {"project_full_box", without_surface, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_full_box},
-    {"project_density", with_surface, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_density},
-    {"project_around_obstacles", around_obstacles, moving | column_density | column_projection,
-     moving | column_density | column_projection, project_around_obstacles},
-    {"find_body_drag", dragged, column_velocity | column_projection, column_drag, find_body_drag},
-    {"apply_viscosity", viscous, column_velocity | column_projection,
-     column_velocity | column_projection, apply_viscosity},
-    {"wind_on_fluid", windy, moving | column_density | column_projection, column_velocity,
-     wind_on_fluid},
-    {"paper_polygon_grid", paper, column_cloth, column_cloth, paper_grid},
-    {"paper_nearest_centroid", paper, column_position | column_cloth, column_sheet,
+    {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
+    {"linearise_cloth", strong, sheets | cloth_load | cloth_air, cloth_system, linearise_cloth},
+    {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
+     find_neighbours, cloth_rows},
+    {"apply_surface_tension", tense, velocity | lists | walls, velocity | tension | scratch,
+     apply_surface_tension, memory},
+    {"apply_contact_angles", wets, velocity | lists | walls | tension, velocity | wetting | scratch,
+     apply_contact_angles},
+    {"smooth_velocities", smoothed, velocity | lists, velocity | scratch, smooth_velocities},
+    {"project_closed_domain", without_surface, moving | lists | projection,
+     moving | pressure | solve | scratch | mean_displacement | projection, project_closed_domain,
+     response},
+    {"project_density", with_surface, moving | density | pressure | lists | projection,
+     moving | pressure | solve | scratch, project_density, response},
+    {"project_around_obstacles", around_obstacles, moving | density | pressure | lists | projection,
+     moving | pressure | solve | scratch | projection | stopped, project_around_obstacles,
+     response},
+    {"find_body_drag", dragged, velocity | solve, drag, find_body_drag, cloth_drag},
+    {"apply_viscosity", viscous, velocity | lists | solve | drag, velocity | scratch | viscosity,
+     apply_viscosity, cloth_drag | cloth_system | loads},
+    {"wind_on_fluid", windy, moving | density | lists | solve, velocity, wind_on_fluid},
+    {"paper_polygon_grid", paper, sheets, polygons | sorting, paper_grid},
+    {"paper_nearest_centroid", paper, position | sheets | polygons, near_cloth,
      find_nearest_centroids},
-    {"density", compressible, column_position, column_density, sum_density},
-    {"pressure_viscosity", compressible, moving | column_density, column_acceleration,
+    {"density", compressible, position | cells, density | pressure | inverse_density, sum_density,
+     near_cloth},
+    {"pressure_viscosity", compressible, moving | pressure | inverse_density | cells, acceleration,
      pressure_viscosity},
-    {"paper_forces", paper, column_sheet, column_acceleration | column_contact, add_paper_forces},
-    {"turn_frame", turning_compressible, column_position, column_velocity, turn_frame},
-    {"integrate_velocity", compressible, column_acceleration, column_velocity, integrate_velocity},
-    {"sort_contacts", exact, column_sheet, column_contact, sort_exact_contacts},
-    {"start_contacts", exact, column_sheet | column_contact, column_velocity | column_cloth,
+    {"paper_forces", paper, near_cloth | moving, acceleration | impulse, add_paper_forces},
+    {"turn_frame", turning_compressible, moving | cloth, velocity, turn_frame, cloth},
+    {"integrate_velocity", compressible, acceleration, velocity, integrate_velocity},
+    {"sort_contacts", coupled_exactly, near_cloth, contact | sorting, sort_exact_contacts},
+    {"start_contacts", coupled_exactly, near_list | memory, rows | loads | memory | cloth_load,
      start_contacts},
-    {"cloth_predict", exact, column_cloth, column_cloth, cloth_predict},
-    {"contact_exact", exact, column_sheet | column_density | column_cloth,
-     column_velocity | column_contact | column_cloth, solve_contacts},
-    {"paper_reaction", paper, column_contact, column_cloth, paper_reaction},
+    {"cloth_predict", coupled_exactly, sheets | cloth_load, cloth_substep | cloth_air,
+     cloth_predict},
+    {"contact_exact", coupled_exactly, near_list | velocity | pressure | inverse_density | sheets,
+     velocity | exact | loads | cloth_load | cloth_substep, solve_contacts},
+    {"paper_reaction", paper, impulse | near_cloth, contact | cloth_load | sorting, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
-    {"move_cloth", explicit_alone, column_cloth, column_cloth, move_cloth},
-    {"settle_cloth", implicit_alone, column_cloth, column_cloth | column_cloth_system,
+    {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
+    {"settle_cloth", implicit_alone, sheets,
+     cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped,
      settle_cloth_alone},
-    {"move_with_sheets", strong, moving | column_cloth | column_cloth_system,
-     moving | column_cloth | column_contact, move_with_sheets},
-    {"move_coupled", exact, moving | column_cloth, moving | column_cloth | column_contact,
+    {"move_with_sheets", strong, moving | near_list | sheets | start | drift | cloth_system,
+     moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
+         sorting | cloth_load | stopped,
+     move_with_sheets},
+    {"move_coupled", coupled_exactly, moving | near_list | sheets,
+     moving | cloth | cloth_substep | near_cloth | memory | path | start | cloth_air | contact |
+         sorting,
      move_coupled},
-    {"paper_move", paper, moving | column_cloth, moving | column_cloth, paper_move},
+    {"paper_move", paper, moving | sheets, moving | cloth | cloth_substep, paper_move},
 };
 
 }  // namespace
@@ -168,7 +186,9 @@ std::span<const Pass> every_pass() { return all_passes; }
 std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
   std::vector<Pass> plan;
   for (const Pass& pass : all_passes) {
-    if (pass.when(parameters, cloth)) plan.push_back(pass);
+    if (!pass.when(parameters, cloth)) continue;
+    plan.push_back(pass);
+    if (cloth) plan.back().writes |= pass.writes_beside_cloth;
   }
   return plan;
 }

@@ -11,8 +11,9 @@ namespace drench::sim::DRENCH_BACKEND {
 struct Pass {
   const char* name;
   bool (*when)(const Parameters& p, bool cloth);
-  unsigned reads, writes;  // ColumnGroup
+  ColumnSet reads, writes;
   void (*launch)(State& state);
+  ColumnSet writes_beside_cloth = {};  // in a shot with cloth, too; step_plan adds it to writes
 };
 
 /// Every pass there is, in order.

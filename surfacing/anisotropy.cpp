@@ -16,10 +16,10 @@ namespace {
 
 constexpr float thinnest = 0.25f;      // shortest half axis / longest
 constexpr float fattest = 0.9f;        // the same: an axis must be left to draw in along
-constexpr float centre_moved = 0.9f;   // share of the way to the mean of the neighbours
-constexpr float sheet_voxels = 2.2f;   // least thickness of a sheet in the field
+constexpr float centre_moved = 0.9f;   // of the distance to the mean of the neighbours
+constexpr float film_voxels = 2.2f;    // least thickness of a film in the field
 constexpr float thread_voxels = 1.2f;  // least radius of a thread
-constexpr float sheet_level = 0.30652f, sheet_weight = 2.01815f;    // t, pi / (16 t P(t))
+constexpr float film_level = 0.30652f, film_weight = 2.01815f;      // t, pi / (16 t P(t))
 constexpr float thread_level = 0.31814f, thread_weight = 2.88684f;  // t, 1 / (8 t^2 Q(t))
 
 float ramp(float v, float from, float to) {
@@ -84,14 +84,14 @@ Ellipsoid ellipsoid_of(const Neighbours& near, Thinness thin, float weight, cons
                        const ColourKernel& kernel) {
   const float support = kernel.support, voxel = 1 / lattice.voxels_per_spacing;
   const float c = near.colour * kernel.scale();
-  const float thickness = sheet_thickness(c, support), radius = thread_radius(c, support);
-  const Squeeze sheet = squeeze_sheet(thickness, voxel, kernel);
+  const float thickness = film_thickness(c, support), radius = thread_radius(c, support);
+  const Squeeze film = squeeze_film(thickness, voxel, kernel);
   const Squeeze thread = squeeze_thread(radius, voxel, kernel);
-  const float round = 1 - thin.sheet - thin.thread;
+  const float round = 1 - thin.film - thin.thread;
   const float across =
-      round + (thin.sheet * sheet.half_axis + thin.thread * thread.half_axis) / support;
+      round + (thin.film * film.half_axis + thin.thread * thread.half_axis) / support;
   const float middle = 1 - thin.thread + thin.thread * thread.half_axis / support;
-  const float blended = std::exp(round * std::log(weight) + thin.sheet * std::log(sheet.weight) +
+  const float blended = std::exp(round * std::log(weight) + thin.film * std::log(film.weight) +
                                  thin.thread * std::log(thread.weight));
   // The mesh of a thread lies within its field: chords of a voxel cut voxel^2 / 12 R off a circle.
   const float cut = voxel * voxel / (12 * thread.size);
@@ -107,8 +107,8 @@ Ellipsoid ellipsoid_of(const Neighbours& near, Thinness thin, float weight, cons
   shape.peak = blended / (across * middle);
   shape.shift =
       centre_moved * lattice.reach *
-      ((thin.sheet + thin.thread) * n.dot(near.mean) * n + thin.thread * m.dot(near.mean) * m);
-  const float drawn = thin.sheet * (1 - thickness / (2 * sheet.size)) +
+      ((thin.film + thin.thread) * n.dot(near.mean) * n + thin.thread * m.dot(near.mean) * m);
+  const float drawn = thin.film * (1 - thickness / (2 * film.size)) +
                       thin.thread * (1 - (radius + cut) / thread.size);
   shape.pull = drawn / g;
   return shape;
@@ -121,8 +121,8 @@ struct VertexPack {
   const NearParticles& near;
   float reach;
 
-  /// Calls f(w, x, y, z, ellipsoid or null) for particles in reach, w = (1 - q^2)^2, (x, y, z) the
-  /// way from the particle.
+  /// Calls f(w, x, y, z, ellipsoid or null) for particles in reach, w = (1 - q^2)^2, (x, y, z) from
+  /// the particle.
   template <class F>
   void for_each(const Ellipsoids& ellipsoids, F f) const {
     const Pack x = load(points.x.data()), y = load(points.y.data()), z = load(points.z.data());
@@ -173,15 +173,15 @@ void for_each_thin_pack(const LatticeMesh& mesh, const BinnedParticles& particle
 
 }  // namespace
 
-float sheet_thickness(float c, float support) { return std::min(5 * c * support / 7, 1.f); }
+float film_thickness(float c, float support) { return std::min(5 * c * support / 7, 1.f); }
 
 float thread_radius(float c, float support) {
   return std::min(support * std::sqrt(c / 6), std::sqrt(1 / std::numbers::pi_v<float>));
 }
 
-Squeeze squeeze_sheet(float thickness, float voxel, const ColourKernel& kernel) {
-  Squeeze result = squeeze(thickness / 2, sheet_voxels * voxel / 2, sheet_level, kernel.support);
-  result.weight = sheet_weight * kernel.iso_value * 2 * result.size / thickness;
+Squeeze squeeze_film(float thickness, float voxel, const ColourKernel& kernel) {
+  Squeeze result = squeeze(thickness / 2, film_voxels * voxel / 2, film_level, kernel.support);
+  result.weight = film_weight * kernel.iso_value * 2 * result.size / thickness;
   return result;
 }
 
@@ -220,7 +220,7 @@ void add_ellipsoids(const BinnedParticles& particles, const std::vector<float>& 
       const uint32_t i = wanted[begin + k];
       const Neighbours around = neighbours_of(sums, k);
       const Thinness thin = thinness(around.variance, around.count);
-      if (thin.sheet + thin.thread < 0.01f) continue;
+      if (thin.film + thin.thread < 0.01f) continue;
       found.push_back({i, ellipsoid_of(around, thin, weight[i], particles.lattice, kernel)});
     }
   }

@@ -17,19 +17,19 @@ constexpr const char* cure = "the frame of the cloth is damaged, simulate it aga
 
 }  // namespace
 
-Sheets::Sheets(std::span<const TriangleMesh> meshes, const BinnedParticles& particles)
+ClothSolids::ClothSolids(std::span<const TriangleMesh> meshes, const BinnedParticles& particles)
     : NearTriangles(meshes, particles, reach, "sheet", cure) {
-  for (size_t sheet = 0; sheet < meshes.size(); ++sheet) {
-    const TriangleMesh& mesh = meshes[sheet];
+  for (size_t m = 0; m < meshes.size(); ++m) {
+    const TriangleMesh& mesh = meshes[m];
     if (mesh.velocity.size() != mesh.position.size())
-      throw Error(fmt::format("surfacing: sheet {}: {} velocities for {} vertices; {}", sheet,
+      throw Error(fmt::format("surfacing: sheet {}: {} velocities for {} vertices; {}", m,
                               mesh.velocity.size(), mesh.position.size(), cure));
     for (const auto& t : mesh.triangle)
       velocity_.push_back({mesh.velocity[t.x], mesh.velocity[t.y], mesh.velocity[t.z]});
   }
 }
 
-void Sheets::cut(V3i block, BlockValues& value, float iso_value) const {
+void ClothSolids::cut(V3i block, BlockValues& value, float iso_value) const {
   constexpr float slope = 0.25f;  // of the field in a voxel, about that at a surface
   std::array<float, block_size> square;
   square.fill(reach * reach);
@@ -56,7 +56,7 @@ void Sheets::cut(V3i block, BlockValues& value, float iso_value) const {
   }
 }
 
-V3f Sheets::velocity(const Foot& foot) const {
+V3f ClothSolids::velocity(const Foot& foot) const {
   const auto& v = velocity_[foot.triangle];
   return v[0] * foot.weight.x + v[1] * foot.weight.y + v[2] * foot.weight.z;
 }

@@ -12,12 +12,12 @@
 namespace drench::surfacing {
 namespace {
 
-/// Calls f(block, v) for the vertices of the blocks that are near a sheet.
+/// Calls f(block, v) for the vertices of the blocks that are near cloth.
 template <class F>
-void for_each_near_vertex(const LatticeMesh& mesh, const Sheets& sheets, F f) {
+void for_each_near_vertex(const LatticeMesh& mesh, const ClothSolids& cloth, F f) {
   tbb::parallel_for(size_t{0}, mesh.block.size(), [&](size_t b) {
     const BlockVertices& range = mesh.block[b];
-    if (!sheets.near(range.block)) return;
+    if (!cloth.near(range.block)) return;
     for (uint32_t v = range.begin; v < range.end; ++v) f(range.block, v);
   });
 }
@@ -60,7 +60,7 @@ bool cross_each_other(const Corners& a, const Corners& b) {
 }
 
 /// Those with a corner that is marked.
-std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& sheets,
+std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const ClothSolids& cloth,
                                          const std::vector<uint8_t>& marked) {
   return tbb::parallel_deterministic_reduce(
       tbb::blocked_range<uint32_t>(0, static_cast<uint32_t>(mesh.triangle.size()), 4096),
@@ -69,7 +69,7 @@ std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& 
         for (uint32_t t = range.begin(); t < range.end(); ++t) {
           const Triangle& triangle = mesh.triangle[t];
           if ((marked[triangle.x] || marked[triangle.y] || marked[triangle.z]) &&
-              crosses_a_sheet(mesh, triangle, sheets))
+              crosses_cloth(mesh, triangle, cloth))
             found.push_back(t);
         }
         return found;
@@ -80,21 +80,21 @@ std::vector<uint32_t> crossing_triangles(const LatticeMesh& mesh, const Sheets& 
       });
 }
 
-V3f laid(const Sheets& sheets, V3i block, const V3f& p, int side, float offset) {
-  const Foot foot = sheets.foot(block, p);
+V3f laid(const ClothSolids& cloth, V3i block, const V3f& p, int side, float offset) {
+  const Foot foot = cloth.foot(block, p);
   if (!foot.found()) return p;
-  V3f away = p - foot.place;
+  V3f away = p - foot.point;
   // smoothing may have moved it through
   if (away.dot(foot.normal) * static_cast<float>(side) < 0) away = -away;
   const float length = away.length();
-  return foot.place + (length > 1e-3f ? away / length : foot.normal * float(side)) * offset;
+  return foot.point + (length > 1e-3f ? away / length : foot.normal * float(side)) * offset;
 }
 
-/// p, farther from the nearest sheet.
-V3f pushed(const Sheets& sheets, V3i block, const V3f& p, float distance) {
-  const Foot foot = sheets.foot(block, p);
+/// p, farther from the nearest cloth.
+V3f pushed(const ClothSolids& cloth, V3i block, const V3f& p, float distance) {
+  const Foot foot = cloth.foot(block, p);
   if (!foot.found() || distance <= 0) return p;
-  return p + (p - foot.place).normalized() * distance;
+  return p + (p - foot.point).normalized() * distance;
 }
 
 V3f mean_of_ring(const std::vector<V3f>& position, const VertexRings& rings, uint32_t v) {
@@ -104,88 +104,89 @@ V3f mean_of_ring(const std::vector<V3f>& position, const VertexRings& rings, uin
   return sum / static_cast<float>(rings.first[v + 1] - rings.first[v]);
 }
 
-/// Moves the corners of triangles that cross a sheet until none does, at most eight times.
-/// @param moved  the next place of a vertex
+/// Moves the corners of triangles that cross cloth until none does, at most eight times.
+/// @param moved  the next position of a vertex
 /// @return       how many still cross
 template <class F>
-size_t move_until_free(LatticeMesh& mesh, const Sheets& sheets, F moved) {
+size_t move_until_free(LatticeMesh& mesh, const ClothSolids& cloth, F moved) {
   std::vector<uint8_t> stirred(mesh.position.size(), 0);  // vertices that may be across
-  for_each_near_vertex(mesh, sheets, [&](V3i, uint32_t v) { stirred[v] = 1; });
-  std::vector<uint32_t> crossing = crossing_triangles(mesh, sheets, stirred);
+  for_each_near_vertex(mesh, cloth, [&](V3i, uint32_t v) { stirred[v] = 1; });
+  std::vector<uint32_t> crossing = crossing_triangles(mesh, cloth, stirred);
   for (int round = 0; round < 8 && !crossing.empty(); ++round) {
     stirred.assign(stirred.size(), 0);
     for (const uint32_t t : crossing)
       for (int k = 0; k < 3; ++k)
         if (const uint32_t v = mesh.triangle[t][k]; !std::exchange(stirred[v], 1))
           mesh.position[v] = moved(v);
-    crossing = crossing_triangles(mesh, sheets, stirred);
+    crossing = crossing_triangles(mesh, cloth, stirred);
   }
   return crossing.size();
 }
 
 }  // namespace
 
-bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets) {
+bool crosses_cloth(const LatticeMesh& mesh, const Triangle& t, const ClothSolids& cloth) {
   const Corners own{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
   bool crosses = false;
   V3i last(0);
   for (int k = 0; k < 3 && !crosses; ++k) {
     const V3i block = block_of_vertex(mesh, t[k]);
     if (block == std::exchange(last, block) && k > 0) continue;
-    sheets.for_each_near(
-        block, [&](uint32_t s) { crosses = crosses || cross_each_other(own, sheets.corners(s)); });
+    cloth.for_each_near(
+        block, [&](uint32_t s) { crosses = crosses || cross_each_other(own, cloth.corners(s)); });
   }
   return crosses;
 }
 
-SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets) {
-  if (sheets.empty()) return {};
-  SheetContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
+ClothContact find_contact(const LatticeMesh& mesh, const VertexRings& rings,
+                          const ClothSolids& cloth) {
+  if (cloth.empty()) return {};
+  ClothContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
   const std::vector<V3f> normal = normals_of(mesh, rings);
-  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
-    const Foot foot = sheets.foot(block, mesh.position[v]);
-    if (foot.distance > Sheets::gap + 0.25f) return;
-    const V3f to = foot.place - mesh.position[v];
+  for_each_near_vertex(mesh, cloth, [&](V3i block, uint32_t v) {
+    const Foot foot = cloth.foot(block, mesh.position[v]);
+    if (foot.distance > ClothSolids::gap + 0.25f) return;
+    const V3f to = foot.point - mesh.position[v];
     if (normal[v].dot(to) < 0.4f * foot.distance) return;  // the far side of a thin film
     contact.side[v] = to.dot(foot.normal) < 0 ? 1 : -1;
   });
   return contact;
 }
 
-size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetContact& contact,
-                     const Sheets& sheets, const std::vector<V3f>& normal, float offset) {
-  if (sheets.empty()) return 0;
+size_t lay_on_cloth(LatticeMesh& mesh, const VertexRings& rings, const ClothContact& contact,
+                    const ClothSolids& cloth, const std::vector<V3f>& normal, float offset) {
+  if (cloth.empty()) return 0;
   const std::vector<V3f> smooth = mesh.position;
   const auto lay = [&](V3i block, uint32_t v, const V3f& p) {
-    return laid(sheets, block, p, contact.side[v], offset);
+    return laid(cloth, block, p, contact.side[v], offset);
   };
-  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+  for_each_near_vertex(mesh, cloth, [&](V3i block, uint32_t v) {
     if (contact.side[v]) mesh.position[v] = lay(block, v, smooth[v]);
   });
   constexpr float cos2_15 = 0.9330f;  // of 15 degrees
   for (int pass = 0; pass < 3; ++pass) {
     const std::vector<V3f> before = mesh.position;
-    for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+    for_each_near_vertex(mesh, cloth, [&](V3i block, uint32_t v) {
       if (!has_sliver(before, rings, v, cos2_15)) return;
-      const V3f way = mean_of_ring(before, rings, v) - before[v];
-      mesh.position[v] = contact.side[v] ? lay(block, v, before[v] + way)
-                                         : before[v] + way - normal[v] * normal[v].dot(way);
+      const V3f shift = mean_of_ring(before, rings, v) - before[v];
+      mesh.position[v] = contact.side[v] ? lay(block, v, before[v] + shift)
+                                         : before[v] + shift - normal[v] * normal[v].dot(shift);
     });
   }
   const std::vector<V3f> lying = mesh.position;
   std::vector<uint8_t> steps(mesh.position.size(), 0);  // back
-  const auto moved_back = [&](uint32_t v) {             // half the way, smooth, extracted, farther
+  const auto moved_back = [&](uint32_t v) {             // half of it, smooth, extracted, farther
     steps[v] = std::max<uint8_t>(steps[v] + 1, contact.side[v] ? 1 : 3);
     if (contact.side[v] && steps[v] == 1) return (lying[v] + smooth[v]) * 0.5f;
     if (contact.side[v] && steps[v] == 2) return smooth[v];
-    return pushed(sheets, block_of_vertex(mesh, v), contact.extracted[v],
+    return pushed(cloth, block_of_vertex(mesh, v), contact.extracted[v],
                   0.25f * float(steps[v] - 3));
   };
-  return move_until_free(mesh, sheets, moved_back);
+  return move_until_free(mesh, cloth, moved_back);
 }
 
 std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
-                              const SheetContact& contact) {
+                              const ClothContact& contact) {
   std::vector<V3f> normal(mesh.position.size());
   tbb::parallel_for(size_t{0}, normal.size(), [&](size_t v) {
     V3f free(0);
@@ -198,13 +199,13 @@ std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
   return normal;
 }
 
-void move_with_sheets(const LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
-                      std::vector<V3f>& velocity) {
-  if (sheets.empty()) return;
-  for_each_near_vertex(mesh, sheets, [&](V3i block, uint32_t v) {
+void move_with_cloth(const LatticeMesh& mesh, const ClothContact& contact, const ClothSolids& cloth,
+                     std::vector<V3f>& velocity) {
+  if (cloth.empty()) return;
+  for_each_near_vertex(mesh, cloth, [&](V3i block, uint32_t v) {
     if (!contact.side[v]) return;
-    const Foot foot = sheets.foot(block, mesh.position[v]);
-    if (foot.found()) velocity[v] = sheets.velocity(foot);
+    const Foot foot = cloth.foot(block, mesh.position[v]);
+    if (foot.found()) velocity[v] = cloth.velocity(foot);
   });
 }
 

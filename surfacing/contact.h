@@ -1,5 +1,5 @@
 #pragma once
-// Where the mesh lies on sheets.
+// Where the mesh lies on cloth.
 
 #include <cstdint>
 #include <vector>
@@ -10,9 +10,9 @@
 
 namespace drench::surfacing {
 
-/// By vertex of the mesh as it was extracted; empty where there are no sheets.
-struct SheetContact {
-  std::vector<int8_t> side;    // of the sheet's triangle that it faces, 1 or -1; 0: none
+/// By vertex of the mesh as it was extracted; empty where there is no cloth.
+struct ClothContact {
+  std::vector<int8_t> side;    // of the cloth's triangle that it faces, 1 or -1; 0: none
   std::vector<V3f> extracted;  // voxels
 
   bool touches(const Triangle& t) const {
@@ -20,27 +20,28 @@ struct SheetContact {
   }
 };
 
-/// Vertices in the gap around the sheets that face one.
-SheetContact find_contact(const LatticeMesh& mesh, const VertexRings& rings, const Sheets& sheets);
+/// Vertices in the gap around the cloth that face it.
+ClothContact find_contact(const LatticeMesh& mesh, const VertexRings& rings,
+                          const ClothSolids& cloth);
 
-bool crosses_a_sheet(const LatticeMesh& mesh, const Triangle& t, const Sheets& sheets);
+bool crosses_cloth(const LatticeMesh& mesh, const Triangle& t, const ClothSolids& cloth);
 
-/// Moves vertices in contact to `offset` voxels before the sheets, and the corners of slivers that
+/// Moves vertices in contact to `offset` voxels before the cloth, and the corners of slivers that
 /// this makes, there and at the rims, along the surface to the mean of their neighbours. What would
-/// cross a sheet between its vertices goes back on its way, to where it was extracted and farther:
-/// the rim of a sheet may stand out of the gap around it.
+/// cross cloth between its vertices goes back, to where it was extracted and farther:
+/// the rim of a cloth may stand out of the gap around it.
 /// @param normal  of the mesh before
-/// @return the triangles that cross a sheet all the same.
-size_t lay_on_sheets(LatticeMesh& mesh, const VertexRings& rings, const SheetContact& contact,
-                     const Sheets& sheets, const std::vector<V3f>& normal, float offset);
+/// @return the triangles that cross cloth all the same.
+size_t lay_on_cloth(LatticeMesh& mesh, const VertexRings& rings, const ClothContact& contact,
+                    const ClothSolids& cloth, const std::vector<V3f>& normal, float offset);
 
 /// Unit normals of the free surface, in which triangles in contact have no part; 0 inside the
 /// contact.
 std::vector<V3f> free_normals(const LatticeMesh& mesh, const VertexRings& rings,
-                              const SheetContact& contact);
+                              const ClothContact& contact);
 
-/// Vertices in contact move as the sheet does, m/s.
-void move_with_sheets(const LatticeMesh& mesh, const SheetContact& contact, const Sheets& sheets,
-                      std::vector<V3f>& velocity);
+/// Vertices in contact move as the cloth does, m/s.
+void move_with_cloth(const LatticeMesh& mesh, const ClothContact& contact, const ClothSolids& cloth,
+                     std::vector<V3f>& velocity);
 
 }  // namespace drench::surfacing

@@ -140,8 +140,8 @@ void emit_vertices(const ColourField& field, const BlockPlan& plan, float iso_va
   for (int axis = 0; axis < 3; ++axis)
     for (int z = 0; z < block_edge; ++z)
       for (uint64_t bits = plan.cut[axis][z]; bits != 0; bits &= bits - 1) {
-        const int place = std::countr_zero(bits);
-        const V3i at(place % block_edge, place / block_edge, z);
+        const int bit = std::countr_zero(bits);
+        const V3i at(bit % block_edge, bit / block_edge, z);
         V3i end = at;
         ++end[axis];
         const uint32_t other = end[axis] < block_edge ? plan.field : upper[1 << axis];

@@ -63,7 +63,7 @@ void splat(const V3f p, float weight, float step, BlockValues& value) {
 }
 
 void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel,
-                    const Sheets& sheets, FieldBlock& field, BlockValues& value,
+                    const ClothSolids& cloth, FieldBlock& field, BlockValues& value,
                     NearParticles& near) {
   value.fill(0.f);
   const float reach = particles.lattice.reach;
@@ -76,7 +76,7 @@ void evaluate_block(const BinnedParticles& particles, const ColourKernel& kernel
     else
       splat(p, near.weight[j] * scale, step, value);
   }
-  if (sheets.near(field.block)) sheets.cut(field.block, value, kernel.iso_value);
+  if (cloth.near(field.block)) cloth.cut(field.block, value, kernel.iso_value);
   for (int row = 0; row < rows; ++row)
     field.inside[row] = static_cast<uint8_t>(
         not_less_bits(load(value.data() + row * block_edge), pack(kernel.iso_value)));
@@ -169,13 +169,15 @@ BlockSet blocks_in_reach(const BinnedParticles& particles) {
   return set;
 }
 
+enum class Side { outside, inside };
+
 /// Whether the layer of points of `field` that shares cells with the block at `step` is wholly on
-/// the side `inside`.
-bool border_is(const FieldBlock& field, V3i step, bool inside) {
+/// that side.
+bool border_is(const FieldBlock& field, V3i step, Side side) {
   const auto first = [](int s) { return s > 0 ? block_edge - 1 : 0; };
   const auto last = [](int s) { return s < 0 ? 0 : block_edge - 1; };
   const uint8_t mask = step.x > 0 ? 0x80 : step.x < 0 ? 0x01 : 0xff;
-  const uint8_t wanted = inside ? mask : 0;
+  const uint8_t wanted = side == Side::inside ? mask : 0;
   for (int z = first(step.z); z <= last(step.z); ++z)
     for (int y = first(step.y); y <= last(step.y); ++y)
       if ((field.inside[z * block_edge + y] & mask) != wanted) return false;
@@ -192,7 +194,8 @@ std::vector<BlockKey> contradicted(const BlockSet& set, const std::vector<FieldB
       const V3i block = fields[f].block + step;
       const uint32_t b = set.map.find(block);
       if (b != BlockMap::none && set.slot[b] != BlockMap::none) return;
-      if (!border_is(fields[f], step, b != BlockMap::none)) found.local().push_back(key_of(block));
+      const Side side = b != BlockMap::none ? Side::inside : Side::outside;
+      if (!border_is(fields[f], step, side)) found.local().push_back(key_of(block));
     });
   });
   if (first_new == 0)
@@ -236,11 +239,11 @@ float ColourKernel::shape(float q) {
 }
 
 float ColourKernel::weight(float c, float offset) const {
-  constexpr float sheet_colour = 0.66f, surface_colour = 0.78f, one_sided = 0.12f;
-  // At supports below 1.6 a particle's own share is above the sheet's colour, and nothing is
+  constexpr float film_colour = 0.66f, surface_colour = 0.78f, one_sided = 0.12f;
+  // At supports below 1.6 a particle's own part is above the film's colour, and nothing is
   // missing.
-  const float alone = std::max(1 / scale() - 1 / sheet_colour, 1e-3f);
-  const float missing = std::max(0.f, 1 / c - 1 / sheet_colour) / alone;
+  const float alone = std::max(1 / scale() - 1 / film_colour, 1e-3f);
+  const float missing = std::max(0.f, 1 / c - 1 / film_colour) / alone;
   const float thin = 1 + (lone_weight - 1) * missing * (0.5f + 0.5f * missing);
   const float surface = std::min(surface_colour / c, 1.3f) - 1;
   return bulk * std::max(thin, 1 + surface * std::min(offset / one_sided, 1.f));
@@ -317,13 +320,13 @@ void weigh_particles(BinnedParticles& particles, const ColourKernel& kernel,
 }
 
 ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior, const Sheets& sheets,
+                           const std::vector<uint8_t>& interior, const ClothSolids& cloth,
                            InteriorBlocks mode, double max_bytes) {
   BlockSet set = blocks_in_reach(particles);
   std::vector<BlockKey> wanted;
   for (size_t b = 0; b < set.key.size(); ++b)
     if (mode == InteriorBlocks::evaluate || b >= interior.size() || !interior[b] ||
-        sheets.near(block_of(set.key[b])))
+        cloth.near(block_of(set.key[b])))
       wanted.push_back(set.key[b]);
   ColourField field;
   field.stats.candidates = set.key.size();
@@ -345,7 +348,7 @@ ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel&
       field.block[first_new + k].block = block_of(wanted[k]);
     }
     tbb::parallel_for(first_new, field.block.size(), [&](size_t f) {
-      evaluate_block(particles, kernel, sheets, field.block[f], field.value[f], nears.local());
+      evaluate_block(particles, kernel, cloth, field.block[f], field.value[f], nears.local());
     });
     wanted = contradicted(set, field.block, first_new);
     field.stats.grown += wanted.size();

@@ -21,20 +21,18 @@ struct ColourKernel {
   float scale() const;
   /// Shape at q = r / support.
   static float shape(float q);
-  /// Weight of a particle at which the field of equal weights is c, from the mean place of its
+  /// Weight of a particle at which the field of equal weights is c, from the mean position of its
   /// neighbours (weighted by W, itself among them), `offset` supports away from it.
   ///
   /// In the bulk it is constant. Where neighbours are missing it grows as c falls, which evens out
   /// the noise of their number:
   /// * missing on one side (a large offset), the particle lies at a surface of the bulk: as 1 / c,
-  /// a
-  ///   little, so that the field there is what it is where the particles lie evenly;
-  /// * missing all around, it is a drop or part of a sheet: from 1 in a sheet one particle thick up
-  /// to
-  ///   the weight that gives a lone particle the volume spacing^3, and between them so that a sheet
-  ///   stretched to 1.5 spacings does not tear.
-  /// The constants were fitted at support 2.5 and iso value 0.45. Relaxed sphere of 65 thousand
-  /// particles, against equal weights: scatter 0.026 -> 0.017, bias 0.020 -> 0.003 spacings.
+  ///   a little, so that the field there is what it is where the particles lie evenly;
+  /// * missing all around, it is a drop or part of a film: from 1 in a film one particle thick up
+  ///   to the weight that gives a lone particle the volume spacing^3, and between them so that a
+  ///   film stretched to 1.5 spacings does not tear.
+  /// The constants are fitted at support 2.5 and iso value 0.45, where they take a third off the
+  /// scatter of equal weights.
   float weight(float c, float offset) const;
   float bulk_weight() const;
 };
@@ -63,7 +61,7 @@ struct ColourField {
 
 inline constexpr size_t bytes_a_block = sizeof(FieldBlock) + sizeof(BlockValues);
 
-class Sheets;
+class ClothSolids;
 
 /// Marks occupied blocks that a count of particles calls full, with all their bins: 1, else 0.
 std::vector<uint8_t> count_interior(const BinnedParticles& particles);
@@ -75,10 +73,10 @@ void weigh_particles(BinnedParticles& particles, const ColourKernel& kernel,
 
 /// Evaluates every block that may hold surface. Interior blocks are left out unless told otherwise,
 /// and taken in again wherever a neighbour's border has a point outside, until nothing changes.
-/// The field is cut around sheets; no block near one is interior.
+/// The field is cut around cloth; no block near it is interior.
 /// @throws Error when the blocks would take more than max_bytes.
 ColourField evaluate_field(const BinnedParticles& particles, const ColourKernel& kernel,
-                           const std::vector<uint8_t>& interior, const Sheets& sheets,
+                           const std::vector<uint8_t>& interior, const ClothSolids& cloth,
                            InteriorBlocks mode, double max_bytes);
 
 }  // namespace drench::surfacing

@@ -12,7 +12,7 @@
 namespace drench::surfacing {
 namespace {
 
-/// d less whole periods: the shortest way between two places.
+/// d less whole periods: the shortest displacement between two points.
 V3f shortest(V3f d, const Domain& domain) {
   for (int axis = 0; axis < 3; ++axis) {
     if (domain.axis[axis] != Axis::periodic) continue;
@@ -28,9 +28,9 @@ void add_images(int axis, const Domain& domain, float reach, std::vector<V3f>& p
   if (domain.axis[axis] == Axis::open) return;
   const float low = float(domain.min[axis]), high = float(domain.max[axis]);
   const bool mirrors = domain.axis[axis] == Axis::walls;
-  const auto add = [&](size_t i, float place) {
+  const auto add = [&](size_t i, float image) {
     V3f p = position[i], v = velocity[i];
-    p[axis] = place;
+    p[axis] = image;
     if (mirrors) v[axis] = -v[axis];
     position.push_back(p);
     velocity.push_back(v);
@@ -55,10 +55,7 @@ Lattice lattice_around(const std::vector<V3f>& fluid, const std::vector<V3f>& po
         low[axis] = std::min(low[axis], p[axis]);
         high[axis] = std::max(high[axis], p[axis]);
       }
-  const double margin = block_edge * (lattice.ring() + 1);
-  for (int axis = 0; axis < 3; ++axis) {
-    lattice.origin[axis] = std::floor(low[axis] / lattice.voxel) - margin;
-    if (lattice.to_voxels(high[axis], axis) + margin < double(block_edge) * max_block) continue;
+  if (const int axis = lattice.fit(low, high); axis >= 0) {
     throw Error(fmt::format(
         "foam: fluid and foam are spread over {:.4g} m along {}, more than 2^24 voxels of {:.4g} "
         "m. Make the domain smaller, or simulate again if the fluid blew up",
@@ -70,13 +67,6 @@ Lattice lattice_around(const std::vector<V3f>& fluid, const std::vector<V3f>& po
 struct Sum {
   Pack weight{}, u{}, v{}, w{};
 };
-
-float total(Pack sum) {
-  float lane[pack_width], all = 0;
-  store(lane, sum);
-  for (const float value : lane) all += value;
-  return all;
-}
 
 Around around_point(const NearFluid& fluid, V3f point) {
   const Pack x = pack(point.x), y = pack(point.y), z = pack(point.z);
@@ -97,27 +87,28 @@ Around around_point(const NearFluid& fluid, V3f point) {
     sum.v = multiply_add(weight, load(fluid.v.data() + j), sum.v);
     sum.w = multiply_add(weight, load(fluid.w.data() + j), sum.w);
   }
-  const float weight = total(sum.weight);
+  const float weight = sum_of(sum.weight);
   if (!(weight > 0)) return {count, V3f(0)};
-  return {count, fluid.base + V3f(total(sum.u), total(sum.v), total(sum.w)) / weight};
+  return {count, fluid.base + V3f(sum_of(sum.u), sum_of(sum.v), sum_of(sum.w)) / weight};
 }
 
 }  // namespace
 
 FluidMotion::FluidMotion(const ParticleFrame& before, const ParticleFrame& after,
                          const Domain& domain, float dt)
-    : place_(after.position), velocity_(after.velocity), dt_(dt) {
-  const size_t n = place_.size();
-  way_.resize(n);
+    : position_(after.position), velocity_(after.velocity), dt_(dt) {
+  const size_t n = position_.size();
+  displacement_.resize(n);
   start_velocity_.resize(n);
   const bool named = after.id.size() == n && before.id.size() == before.position.size();
   for (size_t i = 0, k = 0; i < n; ++i) {
     while (named && k < before.id.size() && before.id[k] < after.id[i]) ++k;
     const bool known = named && k < before.id.size() && before.id[k] == after.id[i];
-    way_[i] = known ? shortest(place_[i] - before.position[k], domain) : velocity_[i] * dt;
+    displacement_[i] =
+        known ? shortest(position_[i] - before.position[k], domain) : velocity_[i] * dt;
     start_velocity_[i] = known ? before.velocity[k] : velocity_[i];
-    const float speed2 = std::max(
-        {velocity_[i].length2(), start_velocity_[i].length2(), way_[i].length2() / (dt * dt)});
+    const float speed2 = std::max({velocity_[i].length2(), start_velocity_[i].length2(),
+                                   displacement_[i].length2() / (dt * dt)});
     largest_speed_ = std::max(largest_speed_, std::sqrt(speed2));
   }
 }
@@ -125,21 +116,22 @@ FluidMotion::FluidMotion(const ParticleFrame& before, const ParticleFrame& after
 V3f FluidMotion::position(size_t i, float s) const {
   const float left = 1 - s;
   const float end = s * s * (3 - 2 * s), from = s * left * left, to = -s * s * left;
-  return place_[i] - way_[i] * (1 - end) + (start_velocity_[i] * from + velocity_[i] * to) * dt_;
+  return position_[i] - displacement_[i] * (1 - end) +
+         (start_velocity_[i] * from + velocity_[i] * to) * dt_;
 }
 
 V3f FluidMotion::velocity(size_t i, float s) const {
   const float from = (3 * s - 4) * s + 1, to = (3 * s - 2) * s;
-  return way_[i] * (6 * s * (1 - s) / dt_) + start_velocity_[i] * from + velocity_[i] * to;
+  return displacement_[i] * (6 * s * (1 - s) / dt_) + start_velocity_[i] * from + velocity_[i] * to;
 }
 
-V3f wrapped(V3f place, const Domain& domain) {
+V3f wrapped(V3f position, const Domain& domain) {
   for (int axis = 0; axis < 3; ++axis) {
     if (domain.axis[axis] != Axis::periodic) continue;
     const float low = float(domain.min[axis]), period = float(domain.max[axis] - domain.min[axis]);
-    place[axis] -= period * std::floor((place[axis] - low) / period);
+    position[axis] -= period * std::floor((position[axis] - low) / period);
   }
-  return place;
+  return position;
 }
 
 FluidMoment fluid_at(const FluidMotion& motion, float s, const Domain& domain, float spacing,

@@ -12,22 +12,22 @@ inline constexpr float foam_support = 2;
 inline constexpr float foam_voxels_per_spacing = 2;
 inline constexpr float foam_reach = foam_support * foam_voxels_per_spacing;  // voxels
 
-/// Paths of the particles of a frame since the frame before: cubics through both places with both
-/// velocities. Who was not there before comes in a straight line.
+/// Paths of the particles of a frame since the frame before: cubics through both positions with
+/// both velocities. Who is not in the frame before comes in a straight line.
 class FluidMotion {
  public:
   /// @param dt  s between the frames. Particles are told apart by their ids.
   FluidMotion(const ParticleFrame& before, const ParticleFrame& after, const Domain& domain,
               float dt);
 
-  size_t size() const { return place_.size(); }
-  /// At share s of the time between the frames, 0 to 1; m, not wrapped, and m/s.
+  size_t size() const { return position_.size(); }
+  /// At fraction s of the time between the frames, 0 to 1; m, not wrapped, and m/s.
   V3f position(size_t i, float s) const;
   V3f velocity(size_t i, float s) const;
   float largest_speed() const { return largest_speed_; }
 
  private:
-  std::vector<V3f> place_, way_;                // m: at the end, and from the frame before to it
+  std::vector<V3f> position_, displacement_;    // m: at the end, and from the frame before to it
   std::vector<V3f> start_velocity_, velocity_;  // m/s
   float dt_ = 0, largest_speed_ = 0;
 };
@@ -61,7 +61,7 @@ struct NearFluid {
   void gather(const FluidMoment& fluid, V3i block);
 };
 
-/// Where the periodic axes of a domain bring a place back to.
-V3f wrapped(V3f place, const Domain& domain);
+/// Where the periodic axes of a domain bring a position back to.
+V3f wrapped(V3f position, const Domain& domain);
 
 }  // namespace drench::surfacing

@@ -21,16 +21,16 @@ constexpr uint32_t least_foam = 6, most_foam = 20;  // fluid particles within fo
 /// depth in spacings: by the disc that the surface cuts, pi 2^2.
 constexpr float floating_count = 16.755f, count_by_depth = 12.566f;
 constexpr int most_substeps = 64;
-constexpr float fading = 0.2f;            // share of its life in which foam shrinks
+constexpr float fading = 0.2f;            // fraction of its life in which foam shrinks
 constexpr double bytes_a_particle = 200;  // with what a substep holds
 enum Draw : uint32_t { life_draw, size_draw, count_draw, first_birth_draw };
-constexpr uint32_t always = 0;  // in place of a frame, for what a particle keeps
+constexpr uint32_t always = 0;  // instead of a frame, for what a particle keeps
 
 struct Particle {
-  V3f place, velocity;
+  V3f position, velocity;
   float age = 0, radius = 0;
   uint32_t id = 0;
-  float birth = 0;  // share of the time between the frames; 0: it was there
+  float birth = 0;  // fraction of the time between the frames; 0: it is there already
   FoamKind kind = FoamKind::spray;
   bool lost = false;
 };
@@ -81,15 +81,15 @@ Particle born(const Shot& shot, int frame, const FluidMotion& motion, size_t i, 
   };
   Particle p;
   p.birth = draw(0);
-  p.place = motion.position(i, p.birth);
+  p.position = motion.position(i, p.birth);
   p.velocity = motion.velocity(i, p.birth);
   if (p.velocity.length2() > 0) {
     const auto [u, v] = across(p.velocity);
     const float angle = 2 * std::numbers::pi_v<float> * draw(1);
     const float off = 0.5f * float(shot.fluid.spacing) * std::sqrt(draw(2));
-    p.place += (u * std::cos(angle) + v * std::sin(angle)) * off;
+    p.position += (u * std::cos(angle) + v * std::sin(angle)) * off;
   }
-  p.place = wrapped(p.place, shot.domain);
+  p.position = wrapped(p.position, shot.domain);
   return p;
 }
 
@@ -119,7 +119,7 @@ class FoamMotion {
     std::vector<V3f> middle(moving.size());
     for (size_t m = 0; m < moving.size(); ++m) {
       const Particle& p = particles[moving[m]];
-      middle[m] = wrapped(p.place + p.velocity * (0.5f * time(p)), shot_.domain);
+      middle[m] = wrapped(p.position + p.velocity * (0.5f * time(p)), shot_.domain);
     }
     const FluidMoment now =
         fluid_at(fluid_, 0.5f * (from + to), shot_.domain, float(shot_.fluid.spacing), middle);
@@ -128,7 +128,7 @@ class FoamMotion {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, moving.size(), 1024), [&](const auto& range) {
       for (size_t m = range.begin(); m < range.end(); ++m) {
         Particle& p = particles[moving[m]];
-        const V3f start = p.place;
+        const V3f start = p.position;
         const Flight flight{std::max(from, p.birth), to, time(p)};
         move(p, around[m], flight, turns_ ? pull_at(middle[m], flight) : everywhere);
         meet_walls(p, start, time(p), to);
@@ -137,7 +137,7 @@ class FoamMotion {
   }
 
  private:
-  /// Shares of the time between the frames, and s.
+  /// Fractions of the time between the frames, and s.
   struct Flight {
     float from, to, dt;
     float middle() const { return 0.5f * (from + to); }
@@ -158,26 +158,28 @@ class FoamMotion {
     return pull;
   }
   /// In a turning frame: with what the centrifuge adds there.
-  Pull pull_at(const V3f& place, const Flight& flight) const {
+  Pull pull_at(const V3f& position, const Flight& flight) const {
     const double frame = before_ + double(flight.middle());
-    return pull_of(gravity_at(shot_, frame) + frame_turn_at(shot_, frame).centrifugal(V3d(place)));
+    return pull_of(gravity_at(shot_, frame) +
+                   frame_turn_at(shot_, frame).centrifugal(V3d(position)));
   }
 
   /// A parabola of the world, however the frame turns meanwhile.
   void fly(Particle& p, const Flight& flight, const Pull& pull) const {
     if (!turns_) {
       const V3f velocity = p.velocity + pull.gravity * flight.dt;
-      p.place += (p.velocity + velocity) * (0.5f * flight.dt);
+      p.position += (p.velocity + velocity) * (0.5f * flight.dt);
       p.velocity = velocity;
       return;
     }
     const FrameTurn start = frame_turn_at(shot_, before_ + double(flight.from)),
                     end = frame_turn_at(shot_, before_ + double(flight.to));
-    const V3d before = start.velocity_in_world(V3d(p.place), V3d(p.velocity)),
+    const V3d before = start.velocity_in_world(V3d(p.position), V3d(p.velocity)),
               after = before + shot_.gravity.at(before_ + double(flight.middle())) * flight.dt,
-              place = start.position_in_world(V3d(p.place)) + (before + after) * (0.5 * flight.dt);
-    const V3d own = end.position_from_world(place);
-    p.place = V3f(own), p.velocity = V3f(end.velocity_from_world(own, after));
+              position =
+                  start.position_in_world(V3d(p.position)) + (before + after) * (0.5 * flight.dt);
+    const V3d own = end.position_from_world(position);
+    p.position = V3f(own), p.velocity = V3f(end.velocity_from_world(own, after));
   }
 
   void move(Particle& p, const Around& around, const Flight& flight, const Pull& pull) const {
@@ -189,12 +191,12 @@ class FoamMotion {
       fly(p, flight, pull);
     } else if (p.kind == FoamKind::foam) {
       p.velocity = around.velocity + pull.up * float_up(around.count, dt);
-      p.place += p.velocity * dt;
+      p.position += p.velocity * dt;
       p.age += dt;
     } else {
       const V3f aim = around.velocity + pull.rise, off = p.velocity - aim;
       const float left = pull.drag_time > 0 ? std::exp(-dt / pull.drag_time) : 0;
-      p.place += aim * dt + off * (pull.drag_time * (1 - left));
+      p.position += aim * dt + off * (pull.drag_time * (1 - left));
       p.velocity = aim + off * left;
     }
   }
@@ -203,13 +205,13 @@ class FoamMotion {
   float float_up(uint32_t count, float dt) const {
     const float spacing = float(shot_.fluid.spacing);
     const float depth = spacing * (float(count) - floating_count) / count_by_depth;
-    const float share = 1 - std::exp(-dt * float(shot_.foam.rise_speed) / (0.5f * spacing));
-    return dt > 0 ? depth * share / dt : 0;
+    const float fraction = 1 - std::exp(-dt * float(shot_.foam.rise_speed) / (0.5f * spacing));
+    return dt > 0 ? depth * fraction / dt : 0;
   }
 
   void meet_walls(Particle& p, const V3f& start, float dt, float s) const {
-    const FoamWalls::Touch touch = walls_.keep_out(start, p.place, p.radius, s);
-    p.lost = walls_.lost(p.place);
+    const FoamWalls::Touch touch = walls_.keep_out(start, p.position, p.radius, s);
+    p.lost = walls_.lost(p.position);
     if (!touch.met) return;
     if (p.kind == FoamKind::spray) {
       p.velocity = touch.velocity;
@@ -232,7 +234,7 @@ std::vector<Particle> particles_of(const FoamFrame& frame) {
   std::vector<Particle> particles(frame.position.size());
   for (size_t k = 0; k < particles.size(); ++k) {
     Particle& p = particles[k];
-    p.place = frame.position[k], p.velocity = frame.velocity[k], p.age = frame.age[k];
+    p.position = frame.position[k], p.velocity = frame.velocity[k], p.age = frame.age[k];
     p.radius = frame.radius[k], p.id = frame.id[k], p.kind = frame.kind[k];
   }
   return particles;
@@ -274,7 +276,7 @@ FoamFrame frame_of(const Shot& shot, const std::vector<Particle>& particles, Foa
     const bool dead = !p.lost && p.age >= life_of(shot, p.id);
     stats.died += dead;
     if (p.lost || dead) continue;
-    frame.position.push_back(p.place);
+    frame.position.push_back(p.position);
     frame.velocity.push_back(p.velocity);
     frame.id.push_back(p.id);
     frame.age.push_back(p.age);

@@ -12,27 +12,20 @@ namespace {
 
 constexpr float full_at = 5;  // times the threshold: from here on all air is caught
 /// Kinetic energy over that at the breaking speed: none below the first, all above the second.
-constexpr float calm = 1, wild = 10;
+constexpr float energy_low = 1, energy_high = 10;
 constexpr float crest_low = 0.1f, crest_high = 0.4f;  // curvature of crests
 /// Weighted sums over a full neighbourhood: the integral of 1 - r / h over its ball.
 constexpr float full_weight = 3.14159265f / 3 * foam_support * foam_support * foam_support;
-/// Who has fewer neighbours than this share sees air; who has a smaller offset has no normal.
-constexpr float airy = 0.85f, least_offset = 0.2f;
+/// Who has fewer neighbours than this fraction sees air; who has a smaller offset has no normal.
+constexpr float airy_fullness = 0.85f, least_offset = 0.2f;
 
 float ramp(float value, float low, float high) {
   return std::clamp((value - low) / (high - low), 0.f, 1.f);
 }
 
-float total(Pack sum) {
-  float lane[pack_width], all = 0;
-  store(lane, sum);
-  for (const float value : lane) all += value;
-  return all;
-}
-
 /// A particle as its block sees it: voxels from the corner, m/s from the block's base.
 struct Seen {
-  V3f place, velocity;
+  V3f position, velocity;
 };
 
 struct Sums {
@@ -41,7 +34,7 @@ struct Sums {
 
 /// The sums over all neighbours, itself among them.
 Potential sum_up(const NearFluid& fluid, const Seen& me) {
-  const Pack x = pack(me.place.x), y = pack(me.place.y), z = pack(me.place.z);
+  const Pack x = pack(me.position.x), y = pack(me.position.y), z = pack(me.position.z);
   const Pack u = pack(me.velocity.x), v = pack(me.velocity.y), w = pack(me.velocity.z);
   const Pack scale = pack(1 / foam_reach), reach2 = pack(foam_reach * foam_reach);
   Sums sum;
@@ -66,12 +59,12 @@ Potential sum_up(const NearFluid& fluid, const Seen& me) {
     sum.closing = multiply_add(weight, closing, sum.closing);
   }
   Potential p;
-  const float weight = total(sum.weight);
+  const float weight = sum_of(sum.weight);
   p.fullness = weight / full_weight;
-  p.closing = total(sum.closing) / full_weight;
+  p.closing = sum_of(sum.closing) / full_weight;
   p.offset =
-      V3f(total(sum.x), total(sum.y), total(sum.z)) * (-1 / (weight * foam_voxels_per_spacing));
-  const V3f relative = V3f(total(sum.u), total(sum.v), total(sum.w)) * (-1 / weight);
+      V3f(sum_of(sum.x), sum_of(sum.y), sum_of(sum.z)) * (-1 / (weight * foam_voxels_per_spacing));
+  const V3f relative = V3f(sum_of(sum.u), sum_of(sum.v), sum_of(sum.w)) * (-1 / weight);
   const float length = p.offset.length();
   const float ahead = length > least_offset ? relative.dot(p.offset) / length : 0;
   if (ahead > 0.6f * relative.length()) p.ahead = ahead;
@@ -84,7 +77,7 @@ float crest_curvature(const NearFluid& fluid, const FluidMoment& all, const Seen
   const V3f normal = offset.normalized();
   double sum = 0, weights = 0;
   for (size_t j = 0; j < fluid.near.size(); ++j) {
-    const V3f d = V3f(fluid.near.x[j], fluid.near.y[j], fluid.near.z[j]) - me.place;
+    const V3f d = V3f(fluid.near.x[j], fluid.near.y[j], fluid.near.z[j]) - me.position;
     const float distance = d.length();
     if (distance >= foam_reach || d.dot(normal) >= 0) continue;
     const uint32_t source = all.bins.source[fluid.near.index[j]];
@@ -128,8 +121,8 @@ std::pair<std::vector<uint8_t>, std::vector<uint8_t>> fast_blocks(const FluidMom
   std::vector<uint8_t> fast(bins.block.size(), 0), around(bins.block.size(), 0);
   for (size_t b = 0; b < bins.block.size(); ++b)
     for (uint32_t k = bins.first[b]; k < bins.first[b + 1] && !fast[b]; ++k)
-      fast[b] =
-          bins.source[k] < fluid.real && energy(fluid.velocity[bins.source[k]], breaking) > calm;
+      fast[b] = bins.source[k] < fluid.real &&
+                energy(fluid.velocity[bins.source[k]], breaking) > energy_low;
   for (size_t b = 0; b < bins.block.size(); ++b) {
     if (!fast[b]) continue;
     V3i step;
@@ -160,7 +153,7 @@ std::vector<Potential> potentials(const FluidMoment& fluid, float breaking) {
   });
   for_each_particle(fluid, fast, [&](const NearFluid& near, uint32_t i, const Seen& me) {
     Potential& p = result[i];
-    if (p.ahead > 0 && p.fullness < airy)
+    if (p.ahead > 0 && p.fullness < airy_fullness)
       p.curvature = crest_curvature(near, fluid, me, p.offset, result);
   });
   return result;
@@ -174,11 +167,12 @@ std::vector<float> birth_rates(const FluidMoment& fluid, const Shot& shot) {
   std::vector<float> rate(fluid.real);
   for (size_t i = 0; i < fluid.real; ++i) {
     const Potential& p = potential[i];
-    if (!(p.fullness < airy)) continue;
+    if (!(p.fullness < airy_fullness)) continue;
     const float trapped = air * ramp(p.closing, low, high) * p.closing;
     const float thrown =
         crest * ramp(p.curvature, crest_low, crest_high) * ramp(p.ahead, low, high) * p.ahead;
-    rate[i] = ramp(energy(fluid.velocity[i], breaking), calm, wild) * (trapped + thrown) / spacing;
+    rate[i] = ramp(energy(fluid.velocity[i], breaking), energy_low, energy_high) *
+              (trapped + thrown) / spacing;
   }
   return rate;
 }

@@ -5,7 +5,7 @@
 // difference of velocities by 1 - cos of its angle to the line between two particles, which is not
 // 0 for a body that turns: here only the speed at which neighbours close in counts. Their crests
 // move along their normals in the world: here relative to the fluid around them, so that a body
-// that flies makes no foam. Both count ways in spacings in place of time, so that the amount of
+// that flies makes no foam. Both count lengths in spacings instead of time, so that the amount of
 // foam does not depend on the spacing; and only particles that see air can take it in.
 
 #include "pipeline/contract/shot/shot.h"

@@ -88,8 +88,8 @@ FoamWalls::FoamWalls(const Shot& shot, int frame, const LevelSetMaker& level_set
 }
 
 FoamWalls::Distance FoamWalls::distance(const Solid& solid, const Pose& pose,
-                                        const V3f& place) const {
-  const V3f own(pose.to_own(V3d(place)));
+                                        const V3f& position) const {
+  const V3f own(pose.to_own(V3d(position)));
   OwnDistance found{own.y, V3f(0, 1, 0)};
   switch (solid.obstacle->type) {
     case ObstacleType::plane:
@@ -108,11 +108,13 @@ FoamWalls::Distance FoamWalls::distance(const Solid& solid, const Pose& pose,
   return {found.value, V3f(pose.to_world(V3d(found.normal)) - pose.position)};
 }
 
-/// Puts `place` just inside the solid where the way first enters it.
-void FoamWalls::stop_at(const Solid& solid, const Pose& pose, const V3f& from, V3f& place,
+/// Puts `position` just inside the solid where the path first enters it.
+void FoamWalls::stop_at(const Solid& solid, const Pose& pose, const V3f& from, V3f& position,
                         float radius) const {
-  const V3f way = place - from;
-  const auto inside = [&](float t) { return distance(solid, pose, from + way * t).value < radius; };
+  const V3f displacement = position - from;
+  const auto inside = [&](float t) {
+    return distance(solid, pose, from + displacement * t).value < radius;
+  };
   float low = 0, high = 0.5f;
   if (!inside(high)) low = 0.5f, high = 1;
   if (!inside(high) || inside(low)) return;
@@ -120,44 +122,45 @@ void FoamWalls::stop_at(const Solid& solid, const Pose& pose, const V3f& from, V
     const float middle = 0.5f * (low + high);
     (inside(middle) ? high : low) = middle;
   }
-  place = from + way * high;
+  position = from + displacement * high;
 }
 
-FoamWalls::Touch FoamWalls::keep_out(const V3f& from, V3f& place, float radius, float s) const {
+FoamWalls::Touch FoamWalls::keep_out(const V3f& from, V3f& position, float radius, float s) const {
   Touch touch;
   for (const Solid& solid : solids_) {
     const Pose pose = between(solid.before, solid.after, s);
-    stop_at(solid, pose, from, place, radius);
-    const Distance d = distance(solid, pose, place);
+    stop_at(solid, pose, from, position, radius);
+    const Distance d = distance(solid, pose, position);
     if (!(d.value < radius)) continue;
-    const V3d own = pose.to_own(V3d(place));
+    const V3d own = pose.to_own(V3d(position));
     touch.met = true;
     touch.normal = d.normal;
     touch.velocity =
         V3f((solid.after.to_world(own) - solid.before.to_world(own)) * shot_.timeline.fps);
-    place += d.normal * (radius - d.value);
+    position += d.normal * (radius - d.value);
   }
   const Domain& domain = shot_.domain;
   for (int axis = 0; axis < 3; ++axis) {
     const float low = float(domain.min[axis]), high = float(domain.max[axis]);
     if (domain.axis[axis] == Axis::periodic)
-      place[axis] -= (high - low) * std::floor((place[axis] - low) / (high - low));
+      position[axis] -= (high - low) * std::floor((position[axis] - low) / (high - low));
     if (domain.axis[axis] != Axis::walls) continue;
     const float inner = std::min(radius, 0.5f * (high - low));
-    const float held = std::clamp(place[axis], low + inner, high - inner);
-    if (held == place[axis]) continue;
+    const float held = std::clamp(position[axis], low + inner, high - inner);
+    if (held == position[axis]) continue;
     touch = {true, V3f(0),
-             V3f(domain.wall_velocity.all()[size_t(2 * axis + (held < place[axis]))])};
-    touch.normal[axis] = held < place[axis] ? -1.f : 1.f;
-    place[axis] = held;
+             V3f(domain.wall_velocity.all()[size_t(2 * axis + (held < position[axis]))])};
+    touch.normal[axis] = held < position[axis] ? -1.f : 1.f;
+    position[axis] = held;
   }
   return touch;
 }
 
-bool FoamWalls::lost(const V3f& place) const {
+bool FoamWalls::lost(const V3f& position) const {
   for (int axis = 0; axis < 3; ++axis)
-    if (shot_.domain.axis[axis] == Axis::open && !(place[axis] >= float(shot_.domain.min[axis]) &&
-                                                   place[axis] <= float(shot_.domain.max[axis])))
+    if (shot_.domain.axis[axis] == Axis::open &&
+        !(position[axis] >= float(shot_.domain.min[axis]) &&
+          position[axis] <= float(shot_.domain.max[axis])))
       return true;
   return false;
 }

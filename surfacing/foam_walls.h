@@ -24,12 +24,12 @@ class FoamWalls {
     V3f normal{0, 0, 0};    // away from the last solid met
     V3f velocity{0, 0, 0};  // m/s, of the solid there
   };
-  /// Stops a particle of that radius on its way where it meets a solid, moves it out of all solids
-  /// at share s between the frames, and home along periodic axes. A way of at most four spacings
-  /// does not pass solids two spacings thick.
-  Touch keep_out(const V3f& from, V3f& place, float radius, float s) const;
-  /// Whether a place lies beyond an open side.
-  bool lost(const V3f& place) const;
+  /// Stops a particle of that radius on its path where it meets a solid, moves it out of all solids
+  /// at fraction s between the frames, and home along periodic axes. A path of at most four
+  /// spacings does not pass solids two spacings thick.
+  Touch keep_out(const V3f& from, V3f& position, float radius, float s) const;
+  /// Whether a position lies beyond an open side.
+  bool lost(const V3f& position) const;
 
  private:
   struct Solid {
@@ -41,9 +41,9 @@ class FoamWalls {
     float value;  // m, negative inside
     V3f normal;   // unit
   };
-  void stop_at(const Solid& solid, const Pose& pose, const V3f& from, V3f& place,
+  void stop_at(const Solid& solid, const Pose& pose, const V3f& from, V3f& position,
                float radius) const;
-  Distance distance(const Solid& solid, const Pose& pose, const V3f& place) const;
+  Distance distance(const Solid& solid, const Pose& pose, const V3f& position) const;
 
   const Shot& shot_;
   std::vector<Solid> solids_;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -31,6 +32,16 @@ struct Lattice {
   int ring() const {
     return (static_cast<int>(reach) + block_edge) / block_edge;
   }  // blocks in reach
+  /// Puts the origin below `low`, with room for blocks in reach of [low, high], m.
+  /// @return the axis along which these are too far apart for keys, or -1.
+  int fit(const V3f& low, const V3f& high) {
+    const double margin = block_edge * (ring() + 1);
+    for (int axis = 0; axis < 3; ++axis) {
+      origin[axis] = std::floor(low[axis] / voxel) - margin;
+      if (!(to_voxels(high[axis], axis) + margin < double(block_edge) * max_block)) return axis;
+    }
+    return -1;
+  }
   double to_voxels(double metres, int axis) const { return metres / voxel - origin[axis]; }
   float to_metres(double voxels, int axis) const {
     return static_cast<float>((origin[axis] + voxels) * voxel);

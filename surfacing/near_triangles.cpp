@@ -132,11 +132,11 @@ Foot NearTriangles::foot(V3i block, const V3f& p) const {
     const float faces = std::abs(normal.dot(p - at));
     if (foot.found() && square > least * (1 - 1e-5f) && faces <= facing) return;
     least = std::min(least, square), facing = faces;
-    foot.place = at, foot.normal = normal, foot.triangle = triangle;
+    foot.point = at, foot.normal = normal, foot.triangle = triangle;
   });
   if (!foot.found()) return foot;
-  foot.distance = (foot.place - p).length();
-  foot.weight = weights_of(corner_[foot.triangle], foot.place);
+  foot.distance = (foot.point - p).length();
+  foot.weight = weights_of(corner_[foot.triangle], foot.point);
   return foot;
 }
 

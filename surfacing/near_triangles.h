@@ -1,5 +1,5 @@
 #pragma once
-// Triangles of other things (sheets of cloth, obstacles) near the fluid, by blocks of the lattice.
+// Triangles of what is no fluid (cloth, obstacles) near the fluid, by blocks of the lattice.
 
 #include <span>
 #include <vector>
@@ -11,7 +11,7 @@ namespace drench::surfacing {
 /// The nearest point of the triangles.
 struct Foot {
   float distance = 1e30f;  // voxels
-  V3f place{0};            // voxels from the lattice's origin
+  V3f point{0};            // voxels from the lattice's origin
   V3f normal{0};           // of the triangle, unit
   uint32_t triangle = ~0u;
   V3f weight{0};  // of the triangle's corners

@@ -16,11 +16,11 @@ float thickness(const NearTriangles& solids, V3i block, const V3f& from, const V
     const V3f u = t[1] - t[0], v = t[2] - t[0], normal = u.cross(v);
     const float rate = normal.dot(direction);
     if (!(rate > 0)) return;  // seen from outside, or along it
-    const float way = normal.dot(t[0] - from) / rate;
-    if (way < 0 || way >= least) return;
-    const V3f at = from + direction * way - t[0];
+    const float distance = normal.dot(t[0] - from) / rate;
+    if (distance < 0 || distance >= least) return;
+    const V3f at = from + direction * distance - t[0];
     const float b = normal.dot(at.cross(v)), c = normal.dot(u.cross(at)), all = normal.dot(normal);
-    if (b >= 0 && c >= 0 && b + c <= all) least = way;
+    if (b >= 0 && c >= 0 && b + c <= all) least = distance;
   });
   return least;
 }
@@ -28,12 +28,12 @@ float thickness(const NearTriangles& solids, V3i block, const V3f& from, const V
 V3f pressed(const NearTriangles& solids, V3i block, const V3f& p, float spacing) {
   const Foot foot = solids.foot(block, p);
   if (!foot.found()) return p;
-  const V3f away = p - foot.place;
+  const V3f away = p - foot.point;
   const float side = away.dot(foot.normal) < 0 ? -1.f : 1.f, distance = side * foot.distance;
   const float reach = 0.6f * spacing;
   if (distance >= reach) return p;
   const V3f outward = foot.distance > 1e-3f * spacing ? away * (side / foot.distance) : foot.normal;
-  const float room = 0.5f * thickness(solids, block, foot.place, -outward) + distance;
+  const float room = 0.5f * thickness(solids, block, foot.point, -outward) + distance;
   const float push = 0.75f * spacing * (1 - std::max(distance, 0.f) / reach);
   return p - outward * std::clamp(push, 0.f, std::max(room, 0.f));
 }
@@ -45,7 +45,7 @@ float stretched(float y, float ground, float spacing) {
 
 }  // namespace
 
-std::vector<uint8_t> overlap_solids(LatticeMesh& mesh, const SheetContact& contact,
+std::vector<uint8_t> overlap_solids(LatticeMesh& mesh, const ClothContact& contact,
                                     const NearTriangles& solids, std::optional<float> ground,
                                     float spacing) {
   if (solids.empty() && !ground) return {};

@@ -33,27 +33,34 @@ inline unsigned not_less_bits(Pack a, Pack b) {
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_GE_OQ)));
 }
 
-/// The places of up to eight lanes, in order; those after them are any.
-using PackPlaces = __m256i;
+inline float sum_of(Pack value) {
+  float lane[pack_width], sum = 0;
+  store(lane, value);
+  for (const float one : lane) sum += one;
+  return sum;
+}
 
-/// Places of the bits that are set.
-inline PackPlaces set_places(unsigned bits) {
+/// Indices of up to eight lanes, in order; those after them are any.
+using LaneIndices = __m256i;
+
+/// Of the bits that are set.
+inline LaneIndices set_lanes(unsigned bits) {
   static constexpr auto table = [] {
-    std::array<uint64_t, 256> places{};  // a byte each
+    std::array<uint64_t, 256> lanes{};  // a byte each
     for (unsigned b = 0; b < 256; ++b)
       for (unsigned lane = 8; lane-- > 0;)
-        if (b >> lane & 1) places[b] = places[b] << 8 | lane;
-    return places;
+        if (b >> lane & 1) lanes[b] = lanes[b] << 8 | lane;
+    return lanes;
   }();
   return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(table[bits])));
 }
-inline Pack picked(Pack value, PackPlaces places) {
-  return _mm256_permutevar8x32_ps(value, places);
+inline Pack picked(Pack value, LaneIndices chosen) {
+  return _mm256_permutevar8x32_ps(value, chosen);
 }
-/// Writes first + each of the places.
-inline void store(uint32_t* target, PackPlaces places, uint32_t first) {
+/// Writes first + each of the indices.
+inline void store(uint32_t* target, LaneIndices chosen, uint32_t first) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(target),
-                      _mm256_add_epi32(places, _mm256_set1_epi32(static_cast<int>(first))));
+                      _mm256_add_epi32(chosen, _mm256_set1_epi32(static_cast<int>(first))));
 }
 
 }  // namespace drench::surfacing

@@ -172,12 +172,12 @@ void NearParticles::add(const BinnedParticles& particles, uint32_t begin, uint32
     const Pack dx = outside(at[0]), dy = outside(at[1]), dz = outside(at[2]);
     unsigned chosen = less_bits(dx * dx + dy * dy + dz * dz, pack(reach * reach));
     if (end - i < pack_width) chosen &= (1u << (end - i)) - 1;
-    const PackPlaces places = set_places(chosen);
-    store(x.data() + count_, picked(at[0], places));
-    store(y.data() + count_, picked(at[1], places));
-    store(z.data() + count_, picked(at[2], places));
-    store(weight.data() + count_, picked(load(particles.weight.data() + i), places));
-    store(index.data() + count_, places, i);
+    const LaneIndices lanes = set_lanes(chosen);
+    store(x.data() + count_, picked(at[0], lanes));
+    store(y.data() + count_, picked(at[1], lanes));
+    store(z.data() + count_, picked(at[2], lanes));
+    store(weight.data() + count_, picked(load(particles.weight.data() + i), lanes));
+    store(index.data() + count_, lanes, i);
     count_ += static_cast<size_t>(std::popcount(chosen));
   }
 }

@@ -27,12 +27,12 @@ bool is_sliver(const V3f& a, const V3f& b, const V3f& c) { return has_angle_belo
 /// One pass of merges, each away from the others, so that the rings stay true for all.
 class Merges {
  public:
-  Merges(const LatticeMesh& mesh, const VertexRings& rings, const SheetContact& contact,
-         const Sheets& sheets)
+  Merges(const LatticeMesh& mesh, const VertexRings& rings, const ClothContact& contact,
+         const ClothSolids& cloth)
       : mesh_(mesh),
         rings_(rings),
         contact_(contact),
-        sheets_(sheets),
+        cloth_(cloth),
         into_(mesh.position.size()),
         taken_(mesh.position.size(), 0) {
     std::iota(into_.begin(), into_.end(), 0u);
@@ -107,15 +107,15 @@ class Merges {
                 after = (at(a) - at(w)).cross(at(b) - at(w));
       const float dot = before.dot(after);  // turned by less than 45 degrees
       good = dot > 0 && dot * dot > 0.5f * before.length2() * after.length2() &&
-             !crosses_a_sheet(mesh_, {w, a, b}, sheets_);
+             !crosses_cloth(mesh_, {w, a, b}, cloth_);
     });
     return good;
   }
 
   const LatticeMesh& mesh_;
   const VertexRings& rings_;
-  const SheetContact& contact_;
-  const Sheets& sheets_;
+  const ClothContact& contact_;
+  const ClothSolids& cloth_;
   std::vector<uint32_t> into_;
   std::vector<uint8_t> taken_;  // in a merge or beside one
   std::vector<uint32_t> postponed_;
@@ -123,10 +123,10 @@ class Merges {
 };
 
 std::vector<uint32_t> corners_of_slivers(const LatticeMesh& mesh, const VertexRings& rings,
-                                         const Sheets& sheets) {
+                                         const ClothSolids& cloth) {
   std::vector<std::vector<uint32_t>> found(mesh.block.size());
   tbb::parallel_for(size_t{0}, mesh.block.size(), [&](size_t b) {
-    if (!sheets.near(mesh.block[b].block)) return;
+    if (!cloth.near(mesh.block[b].block)) return;
     for (uint32_t v = mesh.block[b].begin; v < mesh.block[b].end; ++v)
       if (has_sliver(mesh.position, rings, v, thin)) found[b].push_back(v);
   });
@@ -145,7 +145,7 @@ void keep(std::vector<T>& column, const std::vector<uint32_t>& into) {
 }
 
 /// Takes the merged vertices out, and the triangles that have lost a side.
-void compact(LatticeMesh& mesh, SheetContact& contact, std::vector<V3f>& normal,
+void compact(LatticeMesh& mesh, ClothContact& contact, std::vector<V3f>& normal,
              const std::vector<uint32_t>& into) {
   std::vector<uint32_t> name(into.size() + 1, 0);  // of a vertex that stays, from now on
   for (uint32_t v = 0; v < into.size(); ++v) name[v + 1] = name[v] + (into[v] == v);
@@ -173,14 +173,14 @@ bool has_sliver(const std::vector<V3f>& position, const VertexRings& rings, uint
   return found;
 }
 
-size_t remove_slivers(LatticeMesh& mesh, VertexRings rings, SheetContact& contact,
-                      const Sheets& sheets, std::vector<V3f>& normal) {
-  if (sheets.empty()) return 0;
+size_t remove_slivers(LatticeMesh& mesh, VertexRings rings, ClothContact& contact,
+                      const ClothSolids& cloth, std::vector<V3f>& normal) {
+  if (cloth.empty()) return 0;
   size_t removed = 0;
   for (int pass = 0; pass < 4; ++pass) {
     if (pass > 0) rings = rings_of(mesh);
-    Merges merges(mesh, rings, contact, sheets);
-    for (const uint32_t v : corners_of_slivers(mesh, rings, sheets)) merges.try_vertex(v);
+    Merges merges(mesh, rings, contact, cloth);
+    for (const uint32_t v : corners_of_slivers(mesh, rings, cloth)) merges.try_vertex(v);
     removed += merges.count();
     if (merges.count() == 0) break;
     const bool last = !merges.unfinished();

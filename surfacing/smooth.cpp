@@ -97,11 +97,11 @@ void filter_both(std::vector<V3f>& value, std::vector<V3f>& smooth, const Vertex
   });
   for (size_t k = 1; k < many.size(); ++k) {
     const float turn = k == 1 ? 1.f : 2.f;  // T_1 = A, T_k+1 = 2 A T_k - T_k-1
-    const float share = k < few.size() ? few[k] : 0.f;
+    const float weight = k < few.size() ? few[k] : 0.f;
     for_each_vertex(value.size(), [&](uint32_t v) {
       before[v] = mean_of_neighbours(now, rings, v) * turn - before[v];
       smooth[v] += before[v] * many[k];
-      if (share != 0) value[v] += before[v] * share;
+      if (weight != 0) value[v] += before[v] * weight;
     });
     before.swap(now);
   }
@@ -235,8 +235,8 @@ std::vector<V3f> remove_bumps(LatticeMesh& mesh, const VertexRings& rings, int p
   for_each_vertex(raw.size(), [&](uint32_t v) { lost[v] = (raw[v] - smooth[v]).dot(normal[v]); });
   filter(lost, rings, passes_in_few(passes));
   for_each_vertex(raw.size(), [&](uint32_t v) {
-    const float way = (smooth[v] - mesh.position[v]).dot(normal[v]) + lost[v];
-    mesh.position[v] += normal[v] * std::clamp(way, -farthest, farthest);
+    const float height = (smooth[v] - mesh.position[v]).dot(normal[v]) + lost[v];
+    mesh.position[v] += normal[v] * std::clamp(height, -farthest, farthest);
   });
   return normal;
 }

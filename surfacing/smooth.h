@@ -27,7 +27,7 @@ struct VertexRings {
 };
 VertexRings rings_of(const LatticeMesh& mesh);
 
-/// Connected parts of a mesh. A part is named by its place in the order of lowest vertex.
+/// Connected parts of a mesh. A part is named by its index in the order of lowest vertex.
 struct Components {
   std::vector<uint32_t> first;   // members of each, and the number of vertices
   std::vector<uint32_t> vertex;  // grouped by part, ascending

@@ -109,11 +109,8 @@ Lattice lattice_of(const ParticleFrame& particles, const SurfaceSettings& settin
   lattice.voxels_per_spacing = static_cast<float>(1 / settings.voxel);
   for (lattice.bins = 8; lattice.bins > 1; lattice.bins /= 2)  // bins of at least 0.7 spacings
     if (block_edge * settings.voxel / lattice.bins > 0.7) break;
-  const double margin = block_edge * (lattice.ring() + 1);
-  for (int axis = 0; axis < 3; ++axis) {
-    lattice.origin[axis] = std::floor(bounds.low[axis] / lattice.voxel) - margin;
+  if (const int axis = lattice.fit(bounds.low, bounds.high); axis >= 0) {
     const double extent = lattice.to_voxels(bounds.high[axis], axis);
-    if (extent + margin < double(block_edge) * max_block) continue;
     throw Error(fmt::format(
         "surfacing: particles are spread over {:.4g} m along {}, {:.3g} voxels of {:.4g} m; at "
         "most "
@@ -142,14 +139,14 @@ double memory_left(size_t n, double memory_gib) {
                           needed / (1 << 30), memory_gib));
 }
 
-/// Sheets and obstacles near the particles, on the lattice.
-struct NearThings {
-  Sheets sheets;
+/// Cloth and obstacles near the particles, on the lattice.
+struct NearSolids {
+  ClothSolids cloth;
   NearTriangles obstacles;
   std::optional<float> ground;  // voxels from the lattice's origin
 
-  NearThings(const Surroundings& around, const BinnedParticles& binned)
-      : sheets(around.sheets, binned),
+  NearSolids(const Surroundings& around, const BinnedParticles& binned)
+      : cloth(around.cloth, binned),
         obstacles(around.obstacles, binned, 2 * binned.lattice.voxels_per_spacing, "obstacle",
                   "export its mesh again") {
     if (around.ground)
@@ -157,39 +154,42 @@ struct NearThings {
   }
 };
 
-/// Smooth, in solids, on sheets, with normals; positions in voxels still.
+/// Whether the volume that the mesh encloses is measured.
+enum class Volume { ignored, measured };
+
+/// Smooth, in solids, on cloth, with normals; positions in voxels still.
 struct Finished {
   LatticeMesh mesh;
-  SheetContact contact;
+  ClothContact contact;
   std::vector<V3f> normal;
 };
-Finished finish(LatticeMesh extracted, const NearThings& things, const BinnedParticles& binned,
-                int passes, bool measure_volume, SurfaceStats& report) {
+Finished finish(LatticeMesh extracted, const NearSolids& solids, const BinnedParticles& binned,
+                int passes, Volume volume, SurfaceStats& report) {
   const Lattice& lattice = binned.lattice;
-  constexpr float offset = 0.02f;  // spacings before a sheet
+  constexpr float offset = 0.02f;  // spacings before cloth
   Finished result{std::move(extracted), {}, {}};
   LatticeMesh& mesh = result.mesh;
   VertexRings rings = rings_of(mesh);
   const Components parts = components_of(mesh);
   const float spacing = lattice.voxels_per_spacing;
-  result.contact = find_contact(mesh, rings, things.sheets);
+  result.contact = find_contact(mesh, rings, solids.cloth);
   smooth_mesh(mesh, rings, parts, passes);
   draw_in(mesh, binned);
   result.normal = normals_of(mesh, rings);
   const std::vector<uint8_t> moved =
-      overlap_solids(mesh, result.contact, things.obstacles, things.ground, spacing);
-  if (!things.sheets.empty()) {
+      overlap_solids(mesh, result.contact, solids.obstacles, solids.ground, spacing);
+  if (!solids.cloth.empty()) {
     report.crossing =
-        lay_on_sheets(mesh, rings, result.contact, things.sheets, result.normal, offset * spacing);
+        lay_on_cloth(mesh, rings, result.contact, solids.cloth, result.normal, offset * spacing);
     std::vector<V3f> free = free_normals(mesh, rings, result.contact);
     for (size_t v = 0; v < free.size(); ++v)  // what is in a solid keeps what it had outside
       if (moved.empty() || !moved[v]) result.normal[v] = free[v];
   }
   smooth_normals(result.normal, rings, passes > 0 ? 4 : 0);
-  if (measure_volume)
-    for (const double volume : volumes_of(mesh, rings, parts))
-      report.volume += volume * std::pow(lattice.voxel, 3);
-  remove_slivers(mesh, std::move(rings), result.contact, things.sheets, result.normal);
+  if (volume == Volume::measured)
+    for (const double voxels : volumes_of(mesh, rings, parts))
+      report.volume += voxels * std::pow(lattice.voxel, 3);
+  remove_slivers(mesh, std::move(rings), result.contact, solids.cloth, result.normal);
   report.components = parts.size();
   report.vertices = mesh.position.size();
   report.triangles = mesh.triangle.size();
@@ -227,7 +227,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   BinnedParticles binned =
       bin_particles(particles.position, lattice_of(particles, settings, bounds_of(particles)));
   report.occupied_blocks = binned.block.size();
-  const NearThings things(around, binned);
+  const NearSolids solids(around, binned);
   report.bin_s = watch.lap();
 
   const ColourKernel kernel{static_cast<float>(settings.support),
@@ -238,7 +238,7 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   left -= binned.ellipsoids.bytes();
   report.weight_s = watch.lap();
 
-  ColourField field = evaluate_field(binned, kernel, interior, things.sheets, mode, left);
+  ColourField field = evaluate_field(binned, kernel, interior, solids.cloth, mode, left);
   report.interior_blocks = field.stats.interior;
   report.evaluated_blocks = field.stats.evaluated;
   report.grown_blocks = field.stats.grown;
@@ -249,15 +249,15 @@ TriangleMesh surface_frame(const ParticleFrame& particles, const SurfaceSettings
   LatticeMesh mesh = extract_surface(std::move(field), kernel.iso_value, beside);
   report.extract_s = watch.lap();
 
-  Finished finished =
-      finish(std::move(mesh), things, binned, settings.smoothing, stats != nullptr, report);
+  Finished finished = finish(std::move(mesh), solids, binned, settings.smoothing,
+                             stats ? Volume::measured : Volume::ignored, report);
   report.smooth_s = watch.lap();
 
   const float column_reach =
       std::min(2.5f * binned.lattice.voxels_per_spacing, binned.lattice.reach);
   TriangleMesh columns;
   columns.velocity = vertex_velocities(finished.mesh, binned, particles.velocity, column_reach);
-  move_with_sheets(finished.mesh, finished.contact, things.sheets, columns.velocity);
+  move_with_cloth(finished.mesh, finished.contact, solids.cloth, columns.velocity);
   add_attributes(finished.mesh, binned, particles, column_reach, columns);
   report.velocity_s = watch.lap();
   TriangleMesh result = world_mesh(std::move(finished), binned.lattice, std::move(columns));

@@ -20,7 +20,7 @@ struct SurfaceStats {
   size_t evaluated_blocks = 0, grown_blocks = 0;    // grown: added by the closure
   int closure_rounds = 0;
   size_t components = 0, vertices = 0, triangles = 0;
-  size_t contact = 0, crossing = 0;             // triangles on sheets, and through one all the same
+  size_t contact = 0, crossing = 0;             // triangles on cloth, and through it all the same
   double volume = 0;                            // m^3, enclosed, before slivers are removed
   double bin_s = 0, weight_s = 0, field_s = 0;  // wall seconds of the steps
   double extract_s = 0, smooth_s = 0, velocity_s = 0;
@@ -28,7 +28,7 @@ struct SurfaceStats {
 
 /// What the fluid lies on. Meshes in m, world; taken as they are while a frame is made.
 struct Surroundings {
-  std::span<const TriangleMesh> sheets = {};     // of cloth, with velocities
+  std::span<const TriangleMesh> cloth = {};      // with velocities
   std::span<const TriangleMesh> obstacles = {};  // outward oriented
   std::optional<float> ground = {};              // y of the ground that is drawn
 };
@@ -38,9 +38,9 @@ struct Surroundings {
 /// @param particles  n >= 0 particles; positions in m, velocities in m/s, n each. Not modified.
 ///                   Densities are not read: where neighbours are missing is found from positions.
 /// @param settings   voxel and support in spacings; iso_value in (0, 1); smoothing passes >= 0.
-/// @param around     Fluid is cut apart where a sheet goes through it and lies 0.02 spacings before
+/// @param around     Fluid is cut apart where cloth goes through it and lies 0.02 spacings before
 ///                   it; faces between vertices that lie there are `contact` and move with the
-///                   sheet. Into obstacles and the ground it goes a little way (overlap.h).
+///                   cloth. Into obstacles and the ground it goes a little (overlap.h).
 /// @return closed manifold mesh, outward orientation, velocity in m/s interpolated from the
 ///         particles (a uniform or an affine motion comes out as it went in), the columns source,
 ///         age and wetness where the particles have them, unit normals; the lattice is locked to

@@ -77,8 +77,8 @@ struct Moments {
     const Pack square = uu * inverse;
     const Pack spread2 = larger(square * (1 - 1e-6f) - dot(mean, mean), Pack{});
     const Pack limit = square_root(4.f * spread2 / larger(dot(step, step), pack(1e-30f)));
-    const Pack share = smaller(limit, one);
-    return {mean.x - share * step.x, mean.y - share * step.y, mean.z - share * step.z};
+    const Pack fraction = smaller(limit, one);
+    return {mean.x - fraction * step.x, mean.y - fraction * step.y, mean.z - fraction * step.z};
   }
 };
 

@@ -47,7 +47,7 @@ struct TriangleMesh {
   std::vector<Imath::V3f> rest_position;  // cloth: m, at rest, or empty
   std::vector<float> source;              // fluid: of the nearest particle, or empty
   std::vector<float> age;                 // fluid: as of its particles, or empty
-  std::vector<float> wetness;             // as age; cloth: share that is wet, 0 to 1; or empty
+  std::vector<float> wetness;             // as age; cloth: wet fraction, 0 to 1; or empty
   std::vector<uint32_t> point;  // the first vertex at the same point of the surface, where
                                 // several differ in uv or normal; or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside

@@ -18,7 +18,7 @@ void log_verbose(std::string_view part, std::string_view text);  // shown with -
 /// What was dropped, guessed or mended: what, where, how many, what to do. Written once a cause;
 /// later ones of the same cause are counted.
 /// @param cause  the text itself if empty. A warning that a sequence would repeat with every frame
-///               names what they share.
+///               names what they have in common.
 /// @throws Error with the text where warnings are errors.
 void log_warning(std::string_view part, std::string_view text, std::string_view cause = {});
 

@@ -235,7 +235,8 @@ void plan_command(const ShotArguments& arguments) {
     scene_object = json_line(scene_json(scene.report));
   }
   if (plan.simulation.needed || renders(plan)) check_obstacle_meshes(job.shot);
-  if (renders(plan)) check_pictures(job.shot, PictureMemory::within(arguments.memory_gib));
+  if (renders(plan))
+    render::check_pictures(job.shot, render::PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
   if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
   print(printable(text, Lines::many));

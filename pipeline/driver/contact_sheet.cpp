@@ -53,8 +53,8 @@ void draw_glyph(Picture& picture, int x, int y, int scale, const Glyph& glyph, i
 }
 
 /// Mean of the film's pixels under each thumbnail pixel, in linear light.
-Film shrink(const Film& film, int width, int height) {
-  Film small{width, height, std::vector<float>(4 * size_t(width) * height)};
+render::Film shrink(const render::Film& film, int width, int height) {
+  render::Film small{width, height, std::vector<float>(4 * size_t(width) * height)};
   for (int y = 0; y < height; ++y) {
     const int y0 = int(int64_t(y) * film.height / height);
     const int y1 = std::max(y0 + 1, int(int64_t(y + 1) * film.height / height));
@@ -104,10 +104,10 @@ void draw_number(Picture& picture, int x, int y, int scale, std::string_view tex
   }
 }
 
-Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransform& view) {
+Picture contact_sheet(const std::vector<NumberedImage>& images, const render::ViewTransform& view) {
   if (images.empty()) throw std::logic_error("contact sheet without frames");
   const std::vector<NumberedImage> shown = evenly_picked(images);
-  Film film = read_exr(shown.front().file);
+  render::Film film = render::read_exr(shown.front().file);
   const int width = std::min(film.width, thumbnail_width);
   const int height = std::max(1, int(std::lround(double(width) * film.height / film.width)));
   // Wider than high, like a screen: columns x width about 16/9 of rows x height.
@@ -117,7 +117,7 @@ Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransf
   Picture sheet{columns * (width + gap) + gap, rows * (height + gap) + gap, {}};
   sheet.rgb.assign(3 * size_t(sheet.width) * sheet.height, background);
   for (size_t k = 0; k < shown.size(); ++k) {
-    if (k > 0) film = read_exr(shown[k].file);
+    if (k > 0) film = render::read_exr(shown[k].file);
     if (film.width < 1 || film.height < 1) {
       throw Error(
           fmt::format("{}: holds no pixels; render the frame again", shown[k].file.string()));
@@ -132,9 +132,9 @@ Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransf
 
 WrittenFile write_contact_sheet(const std::filesystem::path& path,
                                 const std::vector<NumberedImage>& images,
-                                const ViewTransform& view) {
+                                const render::ViewTransform& view) {
   const Picture sheet = contact_sheet(images, view);
-  return write_png(path, sheet.width, sheet.height, sheet.rgb);
+  return render::write_png(path, sheet.width, sheet.height, sheet.rgb);
 }
 
 }  // namespace drench

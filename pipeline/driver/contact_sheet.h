@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/files/files.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 
 namespace drench {
 
@@ -26,10 +26,11 @@ struct Picture {
 /// the view; frame numbers in the corner.
 /// @param images  at least one; frames of different sizes are an error.
 /// @throws Error if a frame cannot be read.
-Picture contact_sheet(const std::vector<NumberedImage>& images, const ViewTransform& view = {});
+Picture contact_sheet(const std::vector<NumberedImage>& images,
+                      const render::ViewTransform& view = {});
 WrittenFile write_contact_sheet(const std::filesystem::path& path,
                                 const std::vector<NumberedImage>& images,
-                                const ViewTransform& view = {});
+                                const render::ViewTransform& view = {});
 
 /// Writes digits and '-' of a built-in 5 x 7 font, white with a dark rim, `scale` pixels a dot,
 /// with the top left corner of the first character at (x, y). What lies outside the picture is cut

@@ -174,10 +174,10 @@ std::vector<std::string> encode_command(const fs::path& ffmpeg, const fs::path& 
 /// @return the error text, empty when the file was written.
 std::string encode(const fs::path& file, const std::vector<NumberedImage>& images, double fps,
                    std::string_view codec, const std::function<bool()>& keep_going,
-                   const ViewTransform& view) {
+                   const render::ViewTransform& view) {
   const std::optional<fs::path> ffmpeg = find_ffmpeg();
   if (!ffmpeg) throw Error("ffmpeg: not found on PATH; install the package ffmpeg");
-  Film film = read_exr(images.front().file);
+  render::Film film = render::read_exr(images.front().file);
   const int width = film.width, height = film.height;
   if (width < 2 || height < 2) {
     throw Error(fmt::format("{}: {} x {} pixels cannot be a movie; render at least 2 x 2",
@@ -186,7 +186,7 @@ std::string encode(const fs::path& file, const std::vector<NumberedImage>& image
   Child child(encode_command(*ffmpeg, file, width, height, fps, codec));
   for (size_t k = 0; k < images.size(); ++k) {
     if (keep_going && !keep_going()) throw Stopped("stopped while making the movie");
-    if (k > 0) film = read_exr(images[k].file);
+    if (k > 0) film = render::read_exr(images[k].file);
     if (film.width != width || film.height != height) {
       throw Error(
           fmt::format("{}: has {} x {} pixels, the frames before have {} x {}; render all "
@@ -222,7 +222,8 @@ std::optional<fs::path> find_ffmpeg() {
 }
 
 WrittenFile write_movie(const fs::path& path, const std::vector<NumberedImage>& images, double fps,
-                        const std::function<bool()>& keep_going, const ViewTransform& view) {
+                        const std::function<bool()>& keep_going,
+                        const render::ViewTransform& view) {
   return write_file_whole(path, [&](const fs::path& temporary) {
     const std::string first = encode(temporary, images, fps, "libx264", keep_going, view);
     if (first.empty()) return;

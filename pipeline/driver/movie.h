@@ -22,6 +22,6 @@ std::optional<std::filesystem::path> find_ffmpeg();
 /// @throws Error if a frame cannot be read, the sizes differ, or ffmpeg fails, with its last words.
 WrittenFile write_movie(const std::filesystem::path& path, const std::vector<NumberedImage>& images,
                         double fps, const std::function<bool()>& keep_going,
-                        const ViewTransform& view = {});
+                        const render::ViewTransform& view = {});
 
 }  // namespace drench

@@ -17,8 +17,8 @@ void read(const std::filesystem::path& file) {
   if (extension == ".vdb" && name.starts_with("foam.")) (void)read_foam(file);
   if (extension == ".ply") (void)read_mesh(file);
   const bool noisy = file.parent_path().filename() == "noisy";
-  if (extension == ".exr" && noisy) (void)picture_of(read_layers(file));
-  if (extension == ".exr" && !noisy) (void)read_exr(file);
+  if (extension == ".exr" && noisy) (void)render::picture_of(render::read_layers(file));
+  if (extension == ".exr" && !noisy) (void)render::read_exr(file);
 }
 
 }  // namespace

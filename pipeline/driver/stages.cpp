@@ -14,8 +14,8 @@
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
 #include "pipeline/driver/readable.h"
-#include "render/color/view_transform.h"
 #include "render/denoise/noisy_frame.h"
+#include "render/display/view_transform.h"
 #include "render/renderer.h"
 #include "render/scene/scene_cache.h"
 #include "surfacing/foam.h"
@@ -118,7 +118,8 @@ class ShotStages final : public Stages {
       : shot_(shot),
         folder_(std::move(folder)),
         options_(options),
-        parts_(std::make_shared<KeptParts>(PictureMemory::within(options.memory_gib))) {
+        cache_(std::make_shared<render::SceneCache>(
+            render::PictureMemory::within(options.memory_gib))) {
     if (options.memory_gib > 0) {
       shot_.surface.memory_gib = std::min(shot_.surface.memory_gib, options.memory_gib);
     }
@@ -187,7 +188,7 @@ class ShotStages final : public Stages {
 
   StageReport render(const fs::path& folder, int frame, const Attributes& attributes,
                      const std::function<void(double)>& progress) override {
-    FrameGeometry geometry;
+    render::FrameGeometry geometry;
     if (shot_.fluid.present()) geometry.fluid = read_mesh(folder / layout::fluid_mesh(frame));
     if (shot_.foam.present && shot_.fluid.present())
       geometry.foam = read_foam(folder / layout::foam(frame));
@@ -198,14 +199,15 @@ class ShotStages final : public Stages {
       if (obstacle.visible)
         geometry.obstacle.push_back({obstacle.name, obstacle_surface(shot_, obstacle, frame)});
     }
-    RenderStats stats;
-    RenderOptions options;
-    options.parts = parts_;
+    render::RenderStats stats;
+    render::RenderOptions options;
+    options.cache = cache_;
     options.checkpoint.file = folder / layout::frame_samples(shot_.name, frame);
     options.checkpoint.inputs = digest_of(attributes);
     const bool later = shot_.render.denoise && shot_.render.denoise_frames > 0;
-    if (later) options.denoised = Denoised::later;
-    const Film film = render_frame(shot_, frame, geometry, options, &stats, progress);
+    if (later) options.denoised = render::Denoised::later;
+    const render::Film film =
+        render::render_frame(shot_, frame, geometry, options, &stats, progress);
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
     all.emplace_back("samples", std::to_string(shot_.render.samples));
@@ -217,7 +219,7 @@ class ShotStages final : public Stages {
     StageReport report;
     const std::string file =
         later ? layout::noisy(shot_.name, frame) : layout::image(shot_.name, frame);
-    report.files.push_back(write_exr(folder / file, film, all));
+    report.files.push_back(render::write_exr(folder / file, film, all));
     fs::remove(options.checkpoint.file);
     report.json = json{
         {"camera_samples", stats.camera_samples},
@@ -244,10 +246,11 @@ class ShotStages final : public Stages {
       for (const std::string& file : files) out.push_back(folder / file);
       return out;
     };
-    const Film film = denoised_film(folder / noisy.frame, paths(noisy.before), paths(noisy.after),
-                                    shot_.render.denoiser);
+    const render::Film film = render::denoised_film(folder / noisy.frame, paths(noisy.before),
+                                                    paths(noisy.after), shot_.render.denoiser);
     StageReport report;
-    report.files.push_back(write_exr(folder / layout::image(shot_.name, frame), film, attributes));
+    report.files.push_back(
+        render::write_exr(folder / layout::image(shot_.name, frame), film, attributes));
     report.json = json{{"before", noisy.before.size()}, {"after", noisy.after.size()}}.dump();
     report.line = fmt::format("before={} after={}", noisy.before.size(), noisy.after.size());
     return report;
@@ -255,8 +258,8 @@ class ShotStages final : public Stages {
 
   StageReport contact_sheet(const fs::path& folder, const std::vector<int>& frames) override {
     StageReport report;
-    report.files.push_back(write_contact_sheet(folder / layout::contact_sheet,
-                                               images(folder, frames), ViewTransform(shot_.view)));
+    report.files.push_back(write_contact_sheet(
+        folder / layout::contact_sheet, images(folder, frames), render::ViewTransform(shot_.view)));
     return report;
   }
 
@@ -264,7 +267,8 @@ class ShotStages final : public Stages {
                     const std::function<bool()>& keep_going) override {
     StageReport report;
     report.files.push_back(write_movie(folder / layout::movie(shot_.name), images(folder, frames),
-                                       shot_.timeline.fps, keep_going, ViewTransform(shot_.view)));
+                                       shot_.timeline.fps, keep_going,
+                                       render::ViewTransform(shot_.view)));
     return report;
   }
 
@@ -284,7 +288,7 @@ class ShotStages final : public Stages {
   Shot shot_;
   fs::path folder_;
   StageOptions options_;
-  const std::shared_ptr<KeptParts> parts_;
+  const std::shared_ptr<render::SceneCache> cache_;
 };
 
 }  // namespace

@@ -10,8 +10,8 @@
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/movie.h"
-#include "render/color/view_transform.h"
 #include "render/denoise/oidn.h"
+#include "render/display/view_transform.h"
 
 namespace drench {
 
@@ -148,7 +148,7 @@ StageKey mesh_key(const Shot& shot) {
 /// @throws Error if it is not there, before anything is made
 std::string denoiser_release(const Shot& shot) {
   if (!shot.render.denoise || shot.render.denoiser != Denoiser::oidn) return "";
-  return fmt::format("oidn {}", OpenImageDenoise().version());
+  return fmt::format("oidn {}", render::OpenImageDenoise().version());
 }
 
 /// @param denoiser  "" if rendering does not denoise, or by what is built in
@@ -181,7 +181,7 @@ StageKey denoise_key(const Shot& shot, const std::string& denoiser) {
 StageKey dailies_key(const Shot& shot) {
   return StageKeyBuilder("dailies", build_id::dailies, {})
       .number("fps", shot.timeline.fps)
-      .part("view", ViewTransform(shot.view).key())
+      .part("view", render::ViewTransform(shot.view).key())
       .finish();
 }
 

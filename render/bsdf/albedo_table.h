@@ -7,16 +7,16 @@
 
 #include <array>
 
-namespace drench {
+namespace drench::render {
 
 class AlbedoTable {
  public:
-  struct Share {
+  struct Albedo {
     float reflected = 0, total = 1;  // of single scattering; total with what is refracted
   };
 
   /// @param cos  of the direction that light leaves by, 0..1
-  Share at(float cos) const;
+  Albedo at(float cos) const;
   /// Means over light from everywhere on this side: of reflected / total, and of total.
   float mean_reflected() const { return mean_reflected_; }
   float mean_total() const { return mean_total_; }
@@ -27,13 +27,13 @@ class AlbedoTable {
   static AlbedoTable mirrors(float alpha);
 
  private:
-  static constexpr int kNodes = 128;  // over the root of the cosine, finer where facets are grazed
+  static constexpr int nodes = 128;  // over the root of the cosine, finer where facets are grazed
 
   template <class Fresnel>
   static AlbedoTable integrate(float alpha, float eta, const Fresnel& fresnel);
 
-  std::array<Share, kNodes + 1> share_;
+  std::array<Albedo, nodes + 1> albedo_;
   float mean_reflected_ = 0, mean_total_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,12 +3,12 @@
 //   V3f value(const V3f& incoming, float& pdf) const   value x |cos|, and the density of `sample`
 //   Scatter sample(const V2f& u) const                 a rough dielectric takes one number more
 // and every surface, of one lobe or two,
-//   V3f albedo() const                                 share of the light that goes on, roughly
+//   V3f albedo() const                                 fraction of the light that goes on, roughly
 // The loop's parts are templates over them; which it is the material's type says.
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Scatter {
   V3f direction;  // unit
@@ -20,9 +20,9 @@ struct Scatter {
 /// surface, so that a smooth or mapped normal shows no reflections from behind it.
 /// All unit; `outgoing` and `shading` in the hemisphere of `geometric`.
 inline V3f mirroring_normal(const V3f& outgoing, const V3f& geometric, const V3f& shading) {
-  constexpr float kLeast = 0.01f;  // cosine of a mirrored direction
+  constexpr float min_cosine = 0.01f;  // cosine of a mirrored direction
   const V3f mirrored = shading * (2 * dot(shading, outgoing)) - outgoing;
-  const float least = std::min(0.9f * dot(outgoing, geometric), kLeast);
+  const float least = std::min(0.9f * dot(outgoing, geometric), min_cosine);
   const float height = dot(mirrored, geometric);
   if (height >= least) return shading;
   const V3f half = outgoing + normalized(mirrored + geometric * (least - height));
@@ -53,4 +53,4 @@ struct FacingFrame {
         basis(mirroring_normal(outgoing, geometric_normal * side, shading * side)) {}
 };
 
-}  // namespace drench
+}  // namespace drench::render

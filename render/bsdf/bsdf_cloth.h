@@ -6,7 +6,7 @@
 #include "render/packed.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Of photons, on the side that is looked at and on the other, W/m^2.
 struct Irradiance {
@@ -46,7 +46,7 @@ class ClothBsdf {
     const float cos = dot(incoming, shading_) * side;
     pdf = 0;
     if (!(cos > 0)) return V3f(0);
-    const float density = cos / kPi;
+    const float density = cos / pi;
     pdf = density * (side > 0 ? reflect_probability_ : 1 - reflect_probability_);
     return (side > 0 ? reflectance_ : transmittance_) * density;
   }
@@ -59,7 +59,7 @@ class ClothBsdf {
   }
   /// Radiance that leaves for it.
   V3f radiance(const Irradiance& light) const {
-    return (reflectance_ * light.front + transmittance_ * light.back) * (1 / kPi);
+    return (reflectance_ * light.front + transmittance_ * light.back) * (1 / pi);
   }
 
   /// One number says both the side and a direction on it: a number of its own for the side would
@@ -71,13 +71,13 @@ class ClothBsdf {
     const float probability = reflect ? reflect_probability_ : 1 - reflect_probability_;
     const float x = (u.x - (reflect ? 0 : reflect_probability_)) / probability;
     out.direction =
-        Basis(shading_ * side).world(sample_cosine({std::min(x, kOneMinusEpsilon), u.y}));
+        Basis(shading_ * side).world(sample_cosine({std::min(x, one_minus_epsilon), u.y}));
     const float cos = dot(out.direction, shading_) * side;
     // The smooth hemisphere reaches a little through the real surface: nothing comes from there.
     if (!(cos > 0) || !(dot(out.direction, geometric_) * side > 0)) return out;
-    out.pdf = cos / kPi * probability;
-    const V3f& share = reflect ? reflectance_ : transmittance_;
-    out.weight = share * (1 / probability);
+    out.pdf = cos / pi * probability;
+    const V3f& albedo = reflect ? reflectance_ : transmittance_;
+    out.weight = albedo * (1 / probability);
     return out;
   }
 
@@ -87,4 +87,4 @@ class ClothBsdf {
   float reflect_probability_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -16,48 +16,53 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
-/// A lobe's `share` is the chance that the loop samples it, which density and weight hold.
+/// A lobe's `probability` is that of the loop sampling it, which density and weight hold.
 class CoatLobe {
  public:
-  CoatLobe(const GgxReflection& facets, float eta, float gain, float share)
-      : facets_(facets), eta_(eta), gain_(gain), share_(share) {}
+  CoatLobe(const GgxReflection& facets, float eta, float gain, float probability)
+      : facets_(facets), eta_(eta), gain_(gain), probability_(probability) {}
 
   V3f value(const V3f& incoming, float& pdf) const {
     const GgxReflection::Facet facet = facets_.value(incoming);
-    pdf = facet.pdf * share_;
+    pdf = facet.pdf * probability_;
     return V3f(gain_ * fresnel_reflectance(facet.cos_facet, eta_) * facet.value);
   }
 
   Scatter sample(const V2f& u) const {
     const GgxReflection::Facet facet = facets_.sample(u);
     const float fresnel = fresnel_reflectance(facet.cos_facet, eta_);
-    return {facet.direction, V3f(gain_ * fresnel * facet.value / share_), facet.pdf * share_};
+    return {facet.direction, V3f(gain_ * fresnel * facet.value / probability_),
+            facet.pdf * probability_};
   }
 
  private:
   GgxReflection facets_;
-  float eta_, gain_, share_;
+  float eta_, gain_, probability_;
 };
 
 class CoatedBase {
  public:
-  /// @param entering  share of `outgoing`'s light that the coat lets in, over 1 - <R>
+  /// @param entering  fraction of `outgoing`'s light that the coat lets in, over 1 - <R>
   CoatedBase(const ClothBsdf& diffuse, const V3f& normal, const AlbedoTable& coat, float entering,
-             float share)
-      : diffuse_(diffuse), normal_(normal), coat_(coat), entering_(entering), share_(share) {}
+             float probability)
+      : diffuse_(diffuse),
+        normal_(normal),
+        coat_(coat),
+        entering_(entering),
+        probability_(probability) {}
 
   V3f value(const V3f& incoming, float& pdf) const {
     const V3f value = diffuse_.value(incoming, pdf);
-    pdf *= share_;
+    pdf *= probability_;
     return value * through(incoming);
   }
 
   Scatter sample(const V2f& u) const {
     Scatter out = diffuse_.sample(u);
-    out.weight *= through(out.direction) / share_;
-    out.pdf *= share_;
+    out.weight *= through(out.direction) / probability_;
+    out.pdf *= probability_;
     return out;
   }
 
@@ -68,14 +73,14 @@ class CoatedBase {
 
  private:
   float through(const V3f& incoming) const {
-    const AlbedoTable::Share coat = coat_.at(std::abs(dot(incoming, normal_)));
+    const AlbedoTable::Albedo coat = coat_.at(std::abs(dot(incoming, normal_)));
     return entering_ * (1 - coat.reflected / coat.total);
   }
 
   ClothBsdf diffuse_;
   V3f normal_;
   const AlbedoTable& coat_;
-  float entering_, share_;
+  float entering_, probability_;
 };
 
 class CoatedBsdf {
@@ -90,12 +95,12 @@ class CoatedBsdf {
         facets_(outgoing, geometric, shading, alpha),
         eta_(eta),
         coat_(coat) {
-    const AlbedoTable::Share share = coat.at(facets_.cos());
-    gain_ = 1 / share.total;
-    const float reflected = share.reflected * gain_;
+    const AlbedoTable::Albedo table = coat.at(facets_.cos());
+    gain_ = 1 / table.total;
+    const float reflected = table.reflected * gain_;
     const float out = std::min((1 - coat.mean_reflected()) / (eta * eta), 1.f);  // 1 - k2
     entering_ = (1 - reflected) / (1 - coat.mean_reflected());
-    const auto leaving = [out](float share) { return share * out / (1 - (1 - out) * share); };
+    const auto leaving = [out](float total) { return total * out / (1 - (1 - out) * total); };
     for (int k = 0; k < 3; ++k) {
       const float sum = leaving(reflectance[k] + transmittance[k]),
                   difference = leaving(reflectance[k] - transmittance[k]);
@@ -106,29 +111,29 @@ class CoatedBsdf {
     albedo_ = V3f(reflected) + base * (1 - reflected);
     // A coat reflects little, but what it shows are lamps: it is looked at a quarter of the time.
     const float diffuse = largest(base) * (1 - reflected);
-    coat_share_ = diffuse > 0 ? std::max(reflected / (reflected + diffuse), 0.25f) : 1;
+    coat_probability_ = diffuse > 0 ? std::max(reflected / (reflected + diffuse), 0.25f) : 1;
     reflected_ = reflected;
   }
 
   V3f albedo() const { return albedo_; }
-  float coat_share() const { return coat_share_; }
+  float coat_probability() const { return coat_probability_; }
   float reflected() const { return reflected_; }  // by the coat
-  CoatLobe coat() const { return coat(coat_share_); }
-  CoatedBase base() const { return base(1 - coat_share_); }
-  /// With another chance that the loop samples the lobe.
-  CoatLobe coat(float share) const { return {facets_, eta_, gain_, share}; }
-  CoatedBase base(float share) const {
+  CoatLobe coat() const { return coat(coat_probability_); }
+  CoatedBase base() const { return base(1 - coat_probability_); }
+  /// With another probability of the loop sampling the lobe.
+  CoatLobe coat(float probability) const { return {facets_, eta_, gain_, probability}; }
+  CoatedBase base(float probability) const {
     const ClothBsdf diffuse(outgoing_, geometric_, facets_.normal(), base_reflectance_,
                             base_transmittance_);
-    return {diffuse, facets_.normal(), coat_, entering_, share};
+    return {diffuse, facets_.normal(), coat_, entering_, probability};
   }
 
  private:
   V3f outgoing_, geometric_;
   GgxReflection facets_;
-  float eta_, gain_ = 1, entering_ = 1, reflected_ = 0, coat_share_ = 1;
+  float eta_, gain_ = 1, entering_ = 1, reflected_ = 0, coat_probability_ = 1;
   V3f albedo_, base_reflectance_, base_transmittance_;
   const AlbedoTable& coat_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,7 +3,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Where light goes at an interface, for radiance divided by the squared index ("basic radiance"),
 /// which refraction leaves unchanged: so no factor for the change of solid angle appears here.
@@ -12,7 +12,7 @@ struct InterfaceSplit {
   float reflectance = 1;     // Fresnel's, unpolarised; 1 is total reflection, without `refracted`
 };
 
-/// Fresnel's share of unpolarised light, of the cosines on both sides.
+/// Fresnel's reflectance for unpolarised light, of the cosines on both sides.
 inline float fresnel_reflectance(float cos_in, float cos_out, float eta) {
   const float parallel = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
   const float perpendicular = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
@@ -59,4 +59,4 @@ Vector interface_normal(const Vector& direction, const Vector& geometric, const 
   return dot(reflected, g) > 0 ? n : g;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 #include "render/bsdf/albedo_table.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 /// F82-tint: Schlick's reflectance less a bump whose peak, at a cosine of 1/7 (82 degrees), takes
 /// it to `edge` of Schlick's there. Kutz, Hasan, Edmondson 2021, "Novel Aspects of the Adobe
@@ -42,7 +42,7 @@ class MetalBsdf {
   MetalBsdf(const V3f& outgoing, const V3f& geometric, const V3f& shading, float alpha,
             const MetalFresnel& fresnel, const AlbedoTable& albedo)
       : facets_(outgoing, geometric, shading, alpha), fresnel_(fresnel), gain_(1) {
-    // Light that misses the way out meets another facet, loses the mean there, and so on; a share
+    // Light that does not get out meets another facet, loses the mean there, and so on; a fraction
     // of `mean_total` leaves each time. Over what one facet sends back.
     const float single = albedo.at(facets_.cos()).total, leaves = albedo.mean_total();
     const V3f mean = fresnel.mean();
@@ -70,4 +70,4 @@ class MetalBsdf {
   V3f gain_, albedo_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

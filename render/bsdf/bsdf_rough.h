@@ -4,14 +4,14 @@
 // in what refraction weighs.
 //
 // The facet is drawn first, of those that are seen, then one of its two directions by its own
-// Fresnel share: so no sample weighs more than 1 before what further facets return. (The bound for
-// reflections needs the lobe first; weights would then reach Fresnel's share over its mean.)
+// Fresnel factor: so no sample weighs more than 1 before what further facets return. (The bound for
+// reflections needs the lobe first; weights would then reach Fresnel's factor over its mean.)
 
 #include "render/bsdf/albedo_table.h"
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/microfacet.h"
 
-namespace drench {
+namespace drench::render {
 
 class RoughBsdf {
  public:
@@ -38,13 +38,13 @@ class RoughBsdf {
   Scatter sample(const V2f& u, float side) const {
     Scatter out;
     const V3f h = ggx_.sample_normal(o_, u, 1);
-    const float cos = std::min(dot(o_, h), 1.f), share = fresnel_reflectance(cos, eta_);
-    const bool reflect = side < share;
+    const float cos = std::min(dot(o_, h), 1.f), fresnel = fresnel_reflectance(cos, eta_);
+    const bool reflect = side < fresnel;
     const V3f i = reflect ? h * (2 * cos) - o_ : refract_about(o_, h, cos, eta_);
     out.direction = normalized(frame_.basis.world(i));
     if (!(reflect ? i.z > 0 : i.z < 0) || !frame_.agrees(out.direction, i.z)) return out;
     const float density = ggx_.visible_density(o_, h, cos);
-    out.pdf = reflect ? share * density / (4 * cos) : (1 - share) * density * spread(i, h, cos);
+    out.pdf = reflect ? fresnel * density / (4 * cos) : (1 - fresnel) * density * spread(i, h, cos);
     out.weight = V3f(gain_ * ggx_.masking(o_, i) * std::abs(i.z) * (o_.z + ggx_.stretch(o_)) / 2);
     return out;
   }
@@ -58,9 +58,9 @@ class RoughBsdf {
 
   float reflected(const V3f& i, float& pdf) const {
     const V3f h = normalized(o_ + i);
-    const float cos = std::min(dot(o_, h), 1.f), share = fresnel_reflectance(cos, eta_);
-    pdf = share * ggx_.visible_density(o_, h, cos) / (4 * cos);
-    return gain_ * share * ggx_.density(h) * ggx_.masking(o_, i) * i.z / 4;
+    const float cos = std::min(dot(o_, h), 1.f), fresnel = fresnel_reflectance(cos, eta_);
+    pdf = fresnel * ggx_.visible_density(o_, h, cos) / (4 * cos);
+    return gain_ * fresnel * ggx_.density(h) * ggx_.masking(o_, i) * i.z / 4;
   }
 
   float refracted(const V3f& i, float& pdf) const {
@@ -68,10 +68,10 @@ class RoughBsdf {
     if (h.z < 0) h = -h;
     const float cos = std::min(dot(o_, h), 1.f), cos_beyond = std::min(-dot(i, h), 1.f);
     if (!(cos > 0) || !(cos_beyond > 0)) return 0;
-    const float share = 1 - fresnel_reflectance(cos, cos_beyond, eta_),
+    const float transmitted = 1 - fresnel_reflectance(cos, cos_beyond, eta_),
                 jacobian = spread(i, h, cos);
-    pdf = share * ggx_.visible_density(o_, h, cos) * jacobian;
-    return gain_ * share * ggx_.density(h) * ggx_.masking(o_, i) * -i.z * cos * jacobian;
+    pdf = transmitted * ggx_.visible_density(o_, h, cos) * jacobian;
+    return gain_ * transmitted * ggx_.density(h) * ggx_.masking(o_, i) * -i.z * cos * jacobian;
   }
 
   FacingFrame frame_;
@@ -81,4 +81,4 @@ class RoughBsdf {
   float gain_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,14 +7,14 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/shot/shot_table.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-/// The dark squares of the built-in checker, as a share of the reflectance.
-constexpr float kDarkSquare = 0.45f;
+/// The dark squares of the built-in checker, as a fraction of the reflectance.
+constexpr float dark_square = 0.45f;
 /// Below it facets would be narrower than float directions resolve: smooth.
-constexpr double kLeastRoughness = 0.01;
+constexpr double min_roughness = 0.01;
 
 const Material* named(const std::vector<Material>& materials, const std::string& name) {
   for (const Material& m : materials)
@@ -71,7 +71,7 @@ V3f ShadingMaterial::pictured_reflectance(const V2f& uv) const {
   if (checker) {
     const float squares =
         std::floor(uv.x * inverse_checker_size) + std::floor(uv.y * inverse_checker_size);
-    if (squares - 2 * std::floor(squares / 2) == 1) out *= kDarkSquare;  // not of infinite ones
+    if (squares - 2 * std::floor(squares / 2) == 1) out *= dark_square;  // not of infinite ones
   }
   if (texture) {
     const V3f color = texture->at(picture_uv(uv));
@@ -119,7 +119,7 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name, Picture
   if (found->type == MaterialType::diffuse) out.emission = found->emission;
   const bool facets = found->type == MaterialType::dielectric ||
                       found->type == MaterialType::metal || found->type == MaterialType::coated;
-  if (facets && found->roughness >= kLeastRoughness)
+  if (facets && found->roughness >= min_roughness)
     out.alpha = float(found->roughness * found->roughness);
   out.edge = found->edge;
   out.ior = float(found->ior);
@@ -147,4 +147,4 @@ void check_pictures(const Shot& shot, PictureMemory memory) {
     if (!light.map.empty()) read_sky(light.map, memory);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include "render/bsdf/yarn.h"
 #include "render/texture/texture.h"
 
-namespace drench {
+namespace drench::render {
 
 struct ShadingMaterial {
   MaterialType type = MaterialType::diffuse;
@@ -21,7 +21,7 @@ struct ShadingMaterial {
   V3f sheen{0, 0, 0}, yarn{0, 0, 0};  // of cloth
   float sheen_roughness = 0.3f;
   float yarn_alpha = 0.16f;  // slope of fibres along yarns
-  float gap = 0;             // of cloth: share that is open
+  float gap = 0;             // of cloth: fraction that is open
   float film_alpha = 0;      // of cloth where it is wet; Scene makes it alpha of sheets that may be
   WetFibres fibres;          // of such sheets
   V3f emission{0, 0, 0};     // W/(sr m^2)
@@ -76,4 +76,4 @@ ShadingMaterial find_material(const Shot& shot, const std::string& name,
 /// @throws Error as find_material and read_sky.
 void check_pictures(const Shot& shot, PictureMemory memory);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -9,7 +9,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Ggx {
   float alpha = 0;  // root mean square slope, roughly; 0: a plane, with one normal
@@ -22,7 +22,7 @@ struct Ggx {
   /// Normals per steradian and area.
   float density(const V3f& h) const {
     const float a2 = alpha * alpha, r = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
-    return 1 / (kPi * a2 * r * r);
+    return 1 / (pi * a2 * r * r);
   }
 
   /// G / (|o.z| |i.z|), G = 1 / (1 + Lambda(o) + Lambda(i)); i on either side. For refraction too,
@@ -38,7 +38,7 @@ struct Ggx {
     const V3f towards = normalized(V3f(alpha * o.x, alpha * o.y, o.z));
     const float lowest = -bound * towards.z;
     const float z = 1 - u.y * (1 - lowest);
-    const float sin = std::sqrt(std::max(0.f, 1 - z * z)), phi = 2 * kPi * u.x;
+    const float sin = std::sqrt(std::max(0.f, 1 - z * z)), phi = 2 * pi * u.x;
     const V3f h = V3f(sin * std::cos(phi), sin * std::sin(phi), z) + towards;
     return normalized(V3f(alpha * h.x, alpha * h.y, std::max(h.z, 1e-7f)));
   }
@@ -56,7 +56,7 @@ struct Ggx {
   }
 };
 
-/// One reflection off the facets, with Fresnel's share left to the caller.
+/// One reflection off the facets, with Fresnel's factor left to the caller.
 class GgxReflection {
  public:
   GgxReflection(const V3f& outgoing, const V3f& geometric, const V3f& shading, float alpha)
@@ -109,4 +109,4 @@ class GgxReflection {
   float bound_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -10,7 +10,7 @@
 
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Directions are local, z the normal, both in the upper hemisphere.
 struct SheenLobe {
@@ -23,14 +23,14 @@ struct SheenLobe {
     const float square = dot(sum, sum);
     if (!(square > 0)) return 0;
     const float sin2 = std::clamp(1 - sum.z * sum.z / square, 0.f, 1.f);
-    const float density = (2 + power) * std::pow(sin2, 0.5f * power) / (2 * kPi);
+    const float density = (2 + power) * std::pow(sin2, 0.5f * power) / (2 * pi);
     return gain * density / (4 * std::max(o.z + i.z - o.z * i.z, 1e-6f));
   }
 
   /// Uniform over the hemisphere: where fuzz is bright the surface is seen along itself, and
   /// weights stay below (2 + 1/r) / 4.
   static V3f sample(const V2f& u) { return sample_cone(u, 1); }
-  static constexpr float pdf() { return 1 / (2 * kPi); }
+  static constexpr float pdf() { return 1 / (2 * pi); }
 };
 
 /// What fuzz returns of light from everywhere, by the angle it is seen at.
@@ -44,11 +44,11 @@ class SheenTable {
   float mean() const { return mean_; }  // over light from everywhere
 
  private:
-  static constexpr int kNodes = 64;  // over the root of the cosine
+  static constexpr int nodes = 64;  // over the root of the cosine
 
   SheenLobe lobe_;
-  std::array<float, kNodes + 1> share_;
+  std::array<float, nodes + 1> albedo_;
   float mean_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

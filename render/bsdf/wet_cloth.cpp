@@ -2,43 +2,43 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Of cellulose, cotton's and linen's; wool has 1.55, too, polyester more.
-constexpr double kFibreIndex = 1.55;
-/// Shares below it count as none: fibres that only absorb, or a sheet that lets nothing through.
-constexpr double kLeast = 1e-7;
+constexpr double fibre_index = 1.55;
+/// Fractions below it count as none: fibres that only absorb, or a sheet that lets nothing through.
+constexpr double min_fraction = 1e-7;
 
 /// What a smooth surface reflects of light from everywhere: the mean of Fresnel's over 2 cos dcos.
 double mean_reflectance(double eta) {
-  constexpr int kSteps = 4096;
+  constexpr int steps = 4096;
   double sum = 0;
-  for (int k = 0; k < kSteps; ++k) {
-    const double cos = (k + 0.5) / kSteps;
-    sum += 2 * cos * double(fresnel_reflectance(float(cos), float(eta))) / kSteps;
+  for (int k = 0; k < steps; ++k) {
+    const double cos = (k + 0.5) / steps;
+    sum += 2 * cos * double(fresnel_reflectance(float(cos), float(eta))) / steps;
   }
   return sum;
 }
 
-struct Shares {
+struct Fractions {
   double reflected, transmitted;
 };
 
 /// Of a layer with a = 1 + k/s and scattering power s.
-Shares layer(double a_minus_1, double s) {
+Fractions layer(double a_minus_1, double s) {
   const double a = 1 + a_minus_1, b = std::sqrt(a_minus_1 * (a + 1));
   if (b * s < 1e-4) return {s / (1 + a * s), 1 / (1 + a * s)};  // sinh x = x: hardly absorbs
   const double e = std::exp(-2 * b * s), down = a * (1 - e) + b * (1 + e);
   return {(1 - e) / down, 2 * b * std::exp(-b * s) / down};
 }
 
-Shares wet(double r, double t, const WetFibres& fibres) {
-  if (r < kLeast) return {0, std::pow(t, fibres.absorption)};
+Fractions wet(double r, double t, const WetFibres& fibres) {
+  if (r < min_fraction) return {0, std::pow(t, fibres.absorption)};
   const double a_minus_1 = std::max((1 - r - t) * (1 - r + t) / (2 * r), 0.);
   const double wet_a_minus_1 = a_minus_1 * fibres.absorption / fibres.scattering;
-  if (t < kLeast)  // without end: nothing comes from behind
+  if (t < min_fraction)  // without end: nothing comes from behind
     return {1 / (1 + wet_a_minus_1 + std::sqrt(wet_a_minus_1 * (wet_a_minus_1 + 2))), 0};
   const double b = std::sqrt(a_minus_1 * (a_minus_1 + 2)), y = b * r / t;
   const double s = y < 1e-4 ? r / t : r / t * std::asinh(y) / y;
@@ -48,8 +48,8 @@ Shares wet(double r, double t, const WetFibres& fibres) {
 }  // namespace
 
 WetFibres::WetFibres(double liquid) {
-  const double in_air = mean_reflectance(kFibreIndex),
-               in_liquid = mean_reflectance(kFibreIndex / liquid);
+  const double in_air = mean_reflectance(fibre_index),
+               in_liquid = mean_reflectance(fibre_index / liquid);
   scattering = in_liquid / in_air;
   absorption = (1 - in_liquid) / (1 - in_air);
 }
@@ -57,11 +57,12 @@ WetFibres::WetFibres(double liquid) {
 SheetColours wet_colours(const SheetColours& dry, const WetFibres& fibres) {
   SheetColours out;
   for (int c = 0; c < 3; ++c) {
-    const Shares shares = wet(double(dry.reflectance[c]), double(dry.transmittance[c]), fibres);
-    out.reflectance[c] = float(shares.reflected);
-    out.transmittance[c] = float(shares.transmitted);
+    const Fractions fractions =
+        wet(double(dry.reflectance[c]), double(dry.transmittance[c]), fibres);
+    out.reflectance[c] = float(fractions.reflected);
+    out.transmittance[c] = float(fractions.transmitted);
   }
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

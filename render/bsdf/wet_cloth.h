@@ -13,7 +13,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Wet over dry.
 struct WetFibres {
@@ -28,8 +28,8 @@ struct SheetColours {
   V3f reflectance, transmittance;
 };
 
-/// @param dry  diffuse shares, each at least 0, together at most 1
+/// @param dry  diffuse fractions, each at least 0, together at most 1
 /// @return what they are when water fills the sheet, before its surface reflects any of it back
 SheetColours wet_colours(const SheetColours& dry, const WetFibres& fibres);
 
-}  // namespace drench
+}  // namespace drench::render

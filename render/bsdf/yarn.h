@@ -12,7 +12,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 /// One family. Directions are local, z the normal, x along the yarn, o above the horizon.
 struct YarnFacets {
@@ -25,7 +25,7 @@ struct YarnFacets {
   }
   float density(const V3f& h) const {
     const float x = h.x / alpha, r = x * x + h.y * h.y + h.z * h.z;
-    return 1 / (kPi * alpha * r * r);
+    return 1 / (pi * alpha * r * r);
   }
   /// Masking over both cosines, as `Ggx::masking`.
   float masking(const V3f& o, const V3f& i) const {
@@ -50,7 +50,7 @@ struct YarnFacets {
   V3f sample(const V3f& o, const V2f& u) const {
     const V3f towards = normalized(shrunk(o));
     const float lowest = -bound(o) * towards.z, z = 1 - u.y * (1 - lowest);
-    const float sin = std::sqrt(std::max(0.f, 1 - z * z)), phi = 2 * kPi * u.x;
+    const float sin = std::sqrt(std::max(0.f, 1 - z * z)), phi = 2 * pi * u.x;
     V3f h = V3f(sin * std::cos(phi), sin * std::sin(phi), z) + towards;
     h = normalized(shrunk({h.x, h.y, std::max(h.z, 1e-7f)}));
     return h * (2 * dot(o, h)) - o;
@@ -70,13 +70,13 @@ class YarnTable {
   float mean() const { return mean_; }
 
  private:
-  static constexpr int kRows = 48, kColumns = 16;  // over the root of the cosine, and the angle
+  static constexpr int rows = 48, columns = 16;  // over the root of the cosine, and the angle
 
-  float at(float cos, float turn) const;
+  float at(float cos, float angle) const;
 
   YarnFacets facets_;
-  std::array<std::array<float, kColumns + 1>, kRows + 1> share_;
+  std::array<std::array<float, columns + 1>, rows + 1> albedo_;
   float mean_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -2,7 +2,7 @@
 
 #include "pipeline/contract/error.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -63,4 +63,4 @@ float srgb_decode(float code) {
   return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f);
 }
 
-}  // namespace drench
+}  // namespace drench::render

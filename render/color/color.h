@@ -6,7 +6,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// AP1 primaries and white of ACEScg: SMPTE ST 2065-1 / Academy S-2014-004.
 Imf::Chromaticities acescg_chromaticities();
@@ -37,4 +37,4 @@ inline float luminance(const V3f& acescg) {
 float srgb_encode(float linear);
 float srgb_decode(float code);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,55 +12,58 @@
 #include <utility>
 
 #include "render/denoise/fireflies.h"
-#include "render/scene/motion_match.h"
+#include "render/denoise/motion_match.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 using Plane = NoisyPicture::Plane;
 
-constexpr int kTile = 32;        // pixels a side of what is worked on at once
-constexpr int kReach = 7;        // of the window
-constexpr int kReachBeside = 4;  // of that in a frame before or after
-constexpr int kReachGuide = 3;   // of that in which a guide is smoothed
-constexpr int kPatch = 3;        // of the patches compared
-constexpr int kGuidePad = kReachGuide + 1;
-constexpr int kPad = kReach + kPatch;
-constexpr int kPadded = kTile + 2 * kPad;
-constexpr int kCompared = kTile + 2 * kPatch;
+constexpr int tile_size = 32;     // pixels a side of what is worked on at once
+constexpr int window_radius = 7;  // of the window
+constexpr int beside_radius = 4;  // of that in a frame before or after
+constexpr int guide_radius = 3;   // of that in which a guide is smoothed
+constexpr int patch_radius = 3;   // of the patches compared
+constexpr int guide_padding = guide_radius + 1;
+constexpr int padding = window_radius + patch_radius;
+constexpr int padded_size = tile_size + 2 * padding;
+constexpr int compared_size = tile_size + 2 * patch_radius;
 /// Patches this many standard deviations apart (squared) count little.
-constexpr float kBandwidth2 = 1;
-constexpr float kLeastVariance = 1e-10f;
-constexpr float kLeastGuideVariance = 1e-6f;
+constexpr float bandwidth2 = 1;
+constexpr float min_variance = 1e-10f;
+constexpr float min_guide_variance = 1e-6f;
 /// Ridge of a feature without noise, in units of its square.
-constexpr float kRidge = 1e-4f;
+constexpr float ridge = 1e-4f;
 /// Weight from which a neighbour's colour is one that a fit may have.
-constexpr float kCounts = 0.01f;
-constexpr int kMostFeatures = 9;               // with the two of the place in the picture
-constexpr int kMostTerms = kMostFeatures + 1;  // and the constant
-constexpr int kRows = kMostTerms + 3;          // and the colours
+constexpr float min_weight = 0.01f;
+constexpr int max_features = 9;              // with the two of the position in the picture
+constexpr int max_terms = max_features + 1;  // and the constant
+constexpr int max_columns = max_terms + 3;   // and the colours
 
-using TileRow = std::array<float, kTile>;
+using TileRow = std::array<float, tile_size>;
 
 /// One plane around a tile, the picture's edge pixels repeated beyond it.
 struct Padded {
-  std::array<float, kPadded * kPadded> value;
+  std::array<float, padded_size * padded_size> value;
 
   /// @param at  value of a pixel of the picture
   template <class At>
   void take(const At& at, int x0, int y0, int width, int height) {
-    for (int y = 0; y < kPadded; ++y)
-      for (int x = 0; x < kPadded; ++x)
-        value[size_t(y * kPadded + x)] =
-            at(size_t(std::clamp(y0 + y - kPad, 0, height - 1)) * size_t(width) +
-               size_t(std::clamp(x0 + x - kPad, 0, width - 1)));
+    for (int y = 0; y < padded_size; ++y)
+      for (int x = 0; x < padded_size; ++x)
+        value[size_t(y * padded_size + x)] =
+            at(size_t(std::clamp(y0 + y - padding, 0, height - 1)) * size_t(width) +
+               size_t(std::clamp(x0 + x - padding, 0, width - 1)));
   }
   /// Row of the tile's coordinates, which start at 0 within the padding.
-  const float* row(int x, int y) const { return &value[size_t((y + kPad) * kPadded + x + kPad)]; }
+  const float* row(int x, int y) const {
+    return &value[size_t((y + padding) * padded_size + x + padding)];
+  }
 };
 
-/// A picture whose pixels join the windows, with the way to it from the picture that is denoised.
+/// A picture whose pixels join the windows, with the motion to it from the picture that is
+/// denoised.
 struct Source {
   const NoisyPicture* picture;
   const PixelMatch* match;  // null: that picture itself
@@ -99,58 +102,59 @@ struct TileInput {
   int reach;
 };
 
-/// Sums over 2 kPatch + 1 values in a row, and then in a column.
-void sum_patches(const std::array<float, kCompared * kCompared>& distance,
-                 std::array<float, kTile * kTile>& out) {
-  std::array<float, kCompared * kTile> rows;
-  for (int y = 0; y < kCompared; ++y)
-    for (int x = 0; x < kTile; ++x) {
+/// Sums over 2 patch_radius + 1 values in a row, and then in a column.
+void sum_patches(const std::array<float, compared_size * compared_size>& distance,
+                 std::array<float, tile_size * tile_size>& out) {
+  std::array<float, compared_size * tile_size> rows;
+  for (int y = 0; y < compared_size; ++y)
+    for (int x = 0; x < tile_size; ++x) {
       float sum = 0;
-      for (int k = 0; k <= 2 * kPatch; ++k) sum += distance[size_t(y * kCompared + x + k)];
-      rows[size_t(y * kTile + x)] = sum;
+      for (int k = 0; k <= 2 * patch_radius; ++k)
+        sum += distance[size_t(y * compared_size + x + k)];
+      rows[size_t(y * tile_size + x)] = sum;
     }
-  for (int y = 0; y < kTile; ++y)
-    for (int x = 0; x < kTile; ++x) {
+  for (int y = 0; y < tile_size; ++y)
+    for (int x = 0; x < tile_size; ++x) {
       float sum = 0;
-      for (int k = 0; k <= 2 * kPatch; ++k) sum += rows[size_t((y + k) * kTile + x)];
-      out[size_t(y * kTile + x)] = sum;
+      for (int k = 0; k <= 2 * patch_radius; ++k) sum += rows[size_t((y + k) * tile_size + x)];
+      out[size_t(y * tile_size + x)] = sum;
     }
 }
 
-using TileWeight = std::array<float, kTile * kTile>;
+using TileWeight = std::array<float, tile_size * tile_size>;
 
 /// How much the pixel of `other` at an offset counts for each of the tile, by the looks of one
 /// half.
 void weigh(const TileInput& tile, const TileInput& other, int half, int dx, int dy,
            TileWeight& weight) {
-  std::array<float, kCompared * kCompared> distance{};
+  std::array<float, compared_size * compared_size> distance{};
   for (int c = 0; c < 3; ++c)
-    for (int y = 0; y < kCompared; ++y) {
-      const float *a = tile.half[half][c].row(-kPatch, y - kPatch),
-                  *b = other.half[half][c].row(dx - kPatch, y - kPatch + dy),
-                  *va = tile.variance[c].row(-kPatch, y - kPatch),
-                  *vb = other.variance[c].row(dx - kPatch, y - kPatch + dy);
-      float* out = &distance[size_t(y * kCompared)];
-      for (int x = 0; x < kCompared; ++x) {
+    for (int y = 0; y < compared_size; ++y) {
+      const float *a = tile.half[half][c].row(-patch_radius, y - patch_radius),
+                  *b = other.half[half][c].row(dx - patch_radius, y - patch_radius + dy),
+                  *va = tile.variance[c].row(-patch_radius, y - patch_radius),
+                  *vb = other.variance[c].row(dx - patch_radius, y - patch_radius + dy);
+      float* out = &distance[size_t(y * compared_size)];
+      for (int x = 0; x < compared_size; ++x) {
         const float d = a[x] - b[x];
         out[x] += (d * d - (va[x] + std::min(va[x], vb[x]))) /
-                  (kLeastVariance + kBandwidth2 * (va[x] + vb[x]));
+                  (min_variance + bandwidth2 * (va[x] + vb[x]));
       }
     }
   sum_patches(distance, weight);
-  constexpr float kShare = 1.f / (3 * (2 * kPatch + 1) * (2 * kPatch + 1));
-  for (float& w : weight) w = std::exp(-std::max(0.f, w * kShare));
-  for (int y = 0; y < kTile; ++y) {
+  constexpr float per_value = 1.f / (3 * (2 * patch_radius + 1) * (2 * patch_radius + 1));
+  for (float& w : weight) w = std::exp(-std::max(0.f, w * per_value));
+  for (int y = 0; y < tile_size; ++y) {
     const float* same = other.same.row(dx, y + dy);
-    for (int x = 0; x < kTile; ++x) weight[size_t(y * kTile + x)] *= same[x];
+    for (int x = 0; x < tile_size; ++x) weight[size_t(y * tile_size + x)] *= same[x];
   }
 }
 
 /// Sums of the normal equations for a row of pixels: the upper triangle of terms x (terms +
 /// colours).
 struct NormalEquations {
-  std::array<std::array<TileRow, kRows>, kMostTerms> sum;
-  std::array<TileRow, kMostFeatures> noise;  // variance of features, weighed
+  std::array<std::array<TileRow, max_columns>, max_terms> sum;
+  std::array<TileRow, max_features> noise;  // variance of features, weighed
 };
 
 /// The least and the most of each colour in a row's windows, of what counts there.
@@ -162,8 +166,8 @@ struct Range {
     for (TileRow& row : high) row.fill(std::numeric_limits<float>::lowest());
   }
   void add(size_t c, const float* colour, const float* weight) {
-    for (size_t x = 0; x < kTile; ++x) {
-      const bool counts = weight[x] > kCounts;
+    for (size_t x = 0; x < tile_size; ++x) {
+      const bool counts = weight[x] > min_weight;
       low[c][x] = counts && colour[x] < low[c][x] ? colour[x] : low[c][x];
       high[c][x] = counts && colour[x] > high[c][x] ? colour[x] : high[c][x];
     }
@@ -176,13 +180,13 @@ struct Range {
 
 /// Solves for one pixel by Cholesky's factors. @return the constants: the colours at the pixel
 std::array<float, 3> solve(const NormalEquations& equations, int x, int terms) {
-  double a[kMostTerms][kRows];
+  double a[max_terms][max_columns];
   for (int i = 0; i < terms; ++i)
     for (int j = i; j < terms + 3; ++j)
       a[i][j] = double(equations.sum[size_t(i)][size_t(j)][size_t(x)]);
   const double total = a[0][0];
   for (int i = 1; i < terms; ++i)
-    a[i][i] += double(equations.noise[size_t(i - 1)][size_t(x)]) + kRidge * total;
+    a[i][i] += double(equations.noise[size_t(i - 1)][size_t(x)]) + ridge * total;
   for (int i = 0; i < terms; ++i)
     for (int k = i + 1; k < terms; ++k) {
       const double factor = a[i][k] / a[i][i];
@@ -190,7 +194,7 @@ std::array<float, 3> solve(const NormalEquations& equations, int x, int terms) {
     }
   std::array<float, 3> out;
   for (int c = 0; c < 3; ++c) {
-    double v[kMostTerms];
+    double v[max_terms];
     for (int i = terms - 1; i >= 0; --i) {
       v[i] = a[i][terms + c];
       for (int j = i + 1; j < terms; ++j) v[i] -= a[i][j] * v[j];
@@ -229,7 +233,7 @@ class TileDenoiser {
         for_each_offset(other.reach, [&](int dx, int dy) {
           weigh(tile_[0], other, 1 - h, dx, dy, weight_[k++]);
         });
-      for (int y = 0; y < std::min(kTile, picture_.height - y0_); ++y) fit_row(h, y, out);
+      for (int y = 0; y < std::min(tile_size, picture_.height - y0_); ++y) fit_row(h, y, out);
     }
   }
 
@@ -242,9 +246,9 @@ class TileDenoiser {
     size_t k = 0;
     for (const TileInput& other : tile_)
       for_each_offset(other.reach, [&](int dx, int dy) {
-        add_neighbour(other, half, y, dx, dy, &weight_[k++][size_t(y * kTile)]);
+        add_neighbour(other, half, y, dx, dy, &weight_[k++][size_t(y * tile_size)]);
       });
-    for (int x = 0; x < std::min(kTile, picture_.width - x0_); ++x) {
+    for (int x = 0; x < std::min(tile_size, picture_.width - x0_); ++x) {
       const std::array<float, 3> colour = solve(equations_, x, terms_);
       const size_t pixel = size_t(y0_ + y) * size_t(picture_.width) + size_t(x0_ + x);
       for (size_t c = 0; c < 3; ++c) out[c][pixel] += 0.5f * range_.bound(c, size_t(x), colour[c]);
@@ -252,30 +256,30 @@ class TileDenoiser {
   }
 
   void add_neighbour(const TileInput& other, int half, int y, int dx, int dy, const float* weight) {
-    std::array<TileRow, kRows> term;
+    std::array<TileRow, max_columns> term;
     term[0].fill(1);
-    term[1].fill(float(dx) / kReach);
-    term[2].fill(float(dy) / kReach);
+    term[1].fill(float(dx) / window_radius);
+    term[2].fill(float(dy) / window_radius);
     for (size_t f = 0; f < other.feature.size(); ++f) {
       const float *here = tile_[0].feature[f].row(0, y), *there = other.feature[f].row(dx, y + dy),
                   *noise = other.feature_variance[f].row(dx, y + dy);
       TileRow& sum = equations_.noise[f + 2];
-      for (int x = 0; x < kTile; ++x) {
+      for (int x = 0; x < tile_size; ++x) {
         term[f + 3][size_t(x)] = there[x] - here[x];
         sum[size_t(x)] += weight[x] * noise[x];
       }
     }
     for (size_t c = 0; c < 3; ++c) {
       const float* there = other.half[half][c].row(dx, y + dy);
-      std::copy(there, there + kTile, term[size_t(terms_) + c].begin());
+      std::copy(there, there + tile_size, term[size_t(terms_) + c].begin());
       range_.add(c, there, weight);
     }
     for (size_t i = 0; i < size_t(terms_); ++i) {
       TileRow weighed;
-      for (size_t x = 0; x < kTile; ++x) weighed[x] = weight[x] * term[i][x];
+      for (size_t x = 0; x < tile_size; ++x) weighed[x] = weight[x] * term[i][x];
       for (size_t j = i; j < size_t(terms_) + 3; ++j) {
         TileRow& sum = equations_.sum[i][j];
-        for (size_t x = 0; x < kTile; ++x) sum[x] += weighed[x] * term[j][x];
+        for (size_t x = 0; x < tile_size; ++x) sum[x] += weighed[x] * term[j][x];
       }
     }
   }
@@ -300,25 +304,11 @@ void smooth_variance(NoisyPicture& picture) {
   }
 }
 
-}  // namespace
-
-NoisyPicture noisy_picture(const std::vector<PixelSum>& pixels) {
-  NoisyPicture picture;
-  for (const PixelSum& pixel : pixels)
-    for (int c = 0; c < 3; ++c) {
-      for (int h = 0; h < 2; ++h) picture.half[h][c].push_back(pixel.half(h, c));
-      picture.variance[c].push_back(2 * pixel.variance(c));
-    }
-  return picture;
-}
-
-namespace {
-
 /// The picture itself, the frames before it and those after it.
 class Sources {
  public:
   Sources(const NoisyPicture& picture, const Neighbours& neighbours)
-      : list_{{&picture, nullptr, kReach}} {
+      : list_{{&picture, nullptr, window_radius}} {
     const size_t before = neighbours.before.size(), after = neighbours.after.size();
     matches_.reserve(before + after);
     add(picture, neighbours.before, Side::before);
@@ -332,7 +322,7 @@ class Sources {
     for (const NoisyPicture& to : frames) {
       PixelMatch step = match_pixels(*from, to, side);
       matches_.push_back(from == &picture ? std::move(step) : chained(matches_.back(), step));
-      list_.push_back({&to, &matches_.back(), kReachBeside});
+      list_.push_back({&to, &matches_.back(), beside_radius});
       from = &to;
     }
   }
@@ -345,11 +335,11 @@ class Sources {
 /// picture's edge its edge pixels, which count nothing there.
 struct GuidePlanes {
   GuidePlanes(const NoisyPicture& picture, const Source& source, size_t f)
-      : stride(picture.width + 2 * kGuidePad) {
+      : stride(picture.width + 2 * guide_padding) {
     const NoisyPicture& from = *source.picture;
     const float scale = from.unit(f) / picture.unit(f);
-    for (int v = -kGuidePad; v < picture.height + kGuidePad; ++v)
-      for (int u = -kGuidePad; u < picture.width + kGuidePad; ++u) {
+    for (int v = -guide_padding; v < picture.height + guide_padding; ++v)
+      for (int u = -guide_padding; u < picture.width + guide_padding; ++u) {
         const int x = std::clamp(u, 0, picture.width - 1), y = std::clamp(v, 0, picture.height - 1);
         const size_t p = size_t(y) * size_t(picture.width) + size_t(x);
         const size_t q = source.match ? size_t(source.match->pixel[p]) : p;
@@ -360,7 +350,7 @@ struct GuidePlanes {
       }
   }
   size_t at(int x, int y) const {
-    return size_t(y + kGuidePad) * size_t(stride) + size_t(x + kGuidePad);
+    return size_t(y + guide_padding) * size_t(stride) + size_t(x + guide_padding);
   }
 
   int stride;
@@ -384,7 +374,7 @@ struct GuideRow {
       for (size_t x = 0; x < unlike.size(); ++x) {
         const float d = a[x] - b[x];
         unlike[x] += (d * d - (va[x] + std::min(va[x], vb[x]))) /
-                     (9 * (kLeastGuideVariance + kBandwidth2 * (va[x] + vb[x])));
+                     (9 * (min_guide_variance + bandwidth2 * (va[x] + vb[x])));
       }
     }
     const size_t q = there.at(dx, y + dy);
@@ -414,8 +404,8 @@ std::pair<Plane, Plane> smooth_guide(const std::vector<Source>& sources, size_t 
   tbb::parallel_for(0, picture.height, [&](int y) {
     GuideRow row(picture.width);
     for (const GuidePlanes& there : planes)
-      for (int dy = -kReachGuide; dy <= kReachGuide; ++dy)
-        for (int dx = -kReachGuide; dx <= kReachGuide; ++dx) row.add(planes[0], there, y, dx, dy);
+      for (int dy = -guide_radius; dy <= guide_radius; ++dy)
+        for (int dx = -guide_radius; dx <= guide_radius; ++dx) row.add(planes[0], there, y, dx, dy);
     const size_t first = size_t(y) * size_t(picture.width);
     for (size_t x = 0; x < row.total.size(); ++x) {
       out.first[first + x] = row.mean[x] / row.total[x];
@@ -446,7 +436,7 @@ void smooth_guides(const std::vector<Source>& sources, NoisyPicture& picture,
 
 /// @return glints, which are not in it any more
 std::vector<Plane> prepare(NoisyPicture& picture) {
-  std::vector<Plane> glints = tame_outliers(picture);
+  std::vector<Plane> glints = suppress_fireflies(picture);
   smooth_variance(picture);
   return glints;
 }
@@ -459,16 +449,16 @@ std::vector<Plane> denoise(NoisyPicture picture, Neighbours neighbours) {
     for (NoisyPicture& frame : *side) prepare(frame);
   const Sources sources(picture, neighbours);
   smooth_guides(sources.list(), picture, neighbours);
-  const int columns = (picture.width + kTile - 1) / kTile;
-  const int rows = (picture.height + kTile - 1) / kTile;
+  const int columns = (picture.width + tile_size - 1) / tile_size;
+  const int rows = (picture.height + tile_size - 1) / tile_size;
   tbb::parallel_for(
       tbb::blocked_range<int>(0, columns * rows, 1),
       [&](const tbb::blocked_range<int>& range) {
         for (int t = range.begin(); t < range.end(); ++t)
-          TileDenoiser(sources.list(), t % columns * kTile, t / columns * kTile).run(out);
+          TileDenoiser(sources.list(), t % columns * tile_size, t / columns * tile_size).run(out);
       },
       tbb::simple_partitioner{});
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

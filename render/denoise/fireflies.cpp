@@ -3,42 +3,42 @@
 #include <cmath>
 #include <functional>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 using Plane = NoisyPicture::Plane;
 
-/// Luck is this many times brighter than all but a few of the 24 pixels around it, and its own
-/// samples do not know its brightness to this part. Many may lie together that one or two samples
-/// found each: these are held against half of what is around them, and brought down to it.
-constexpr float kLuck = 4, kUnsure = 0.25f, kOneSample = 0.9f;
-constexpr size_t kFew = 3, kHalf = 12;
+/// A firefly is this many times brighter than all but a few of the 24 pixels around it, and its own
+/// samples do not know its brightness to this relative error. Many may lie together that one or two
+/// samples found each: these are compared with the median around them, and brought down to it.
+constexpr float firefly_ratio = 4, firefly_error = 0.25f, one_sample_error = 0.9f;
+constexpr size_t few = 3, half_of_window = 12;
 /// A glint is this many times brighter than half of what is around it, with its noise; if few of
 /// its samples found it, which then lie loosely together, than half of what is farther around. So
 /// it is over the mean of the picture: before black anything would be. It and the 24 pixels around
 /// it know their brightness to this part, which takes seven samples; or one within that reach is
 /// such a glint: the ends of a streak, where its pixels are few.
-constexpr float kGlint = 16, kSeen = 0.4f;
-constexpr int kReach = 2;
+constexpr float glint_ratio = 16, glint_error = 0.4f;
+constexpr int window_radius = 2;
 /// What a pixel of a glint shows stays there if noise is less than this part of it in the squares
 /// of 25 pixels, which takes three samples of each. Else it is spread to the pixels beside it by a
-/// normal distribution of so many pixels: more would blur edges more than it fills holes
-/// (docs/benchmarks.md).
-constexpr float kShape = 0.5f, kSpread = 0.65f;
-constexpr int kBlock = 8;  // pixels a side; 3 x 3 blocks are what is farther around
+/// normal distribution of so many pixels: more would blur edges more than it fills holes (decision
+/// 0105).
+constexpr float shape_noise = 0.5f, spread_deviation = 0.65f;
+constexpr int block_size = 8;  // pixels a side; 3 x 3 blocks are what is farther around
 
-/// The value that only `few` of a list are above.
-float beyond(std::vector<float>& list, size_t few) {
-  std::nth_element(list.begin(), list.begin() + long(few), list.end(), std::greater<>());
-  return std::max(list[few], 0.f);
+/// The value that only `count` of a list are above.
+float beyond(std::vector<float>& list, size_t count) {
+  std::nth_element(list.begin(), list.begin() + long(count), list.end(), std::greater<>());
+  return std::max(list[count], 0.f);
 }
 
-struct Outlier {
+struct Firefly {
   float factor = 1;     // takes it down to what is around it
   bool bright = false;  // as a glint is
   bool glint = false;
-  bool stays = false;  // its place is known
+  bool localized = false;  // its position is known
 };
 
 class Brightness {
@@ -46,7 +46,7 @@ class Brightness {
   explicit Brightness(const NoisyPicture& picture)
       : width_(picture.width),
         height_(picture.height),
-        columns_((width_ + kBlock - 1) / kBlock),
+        columns_((width_ + block_size - 1) / block_size),
         mean_(picture.variance[0].size(), 0.f),
         scatter_(mean_) {
     for (size_t p = 0; p < mean_.size(); ++p) {
@@ -55,29 +55,35 @@ class Brightness {
       for (const Plane& variance : picture.variance) scatter_[p] += variance[p] / 3;
       scatter_[p] = std::sqrt(scatter_[p]);
     }
-    for (int y = 0; y < height_; y += kBlock)
-      for (int x = 0; x < width_; x += kBlock) block_.push_back(median_of_block(x, y));
+    for (int y = 0; y < height_; y += block_size)
+      for (int x = 0; x < width_; x += block_size) block_.push_back(median_of_block(x, y));
     for (const float median : block_) picture_ += median / float(block_.size());
   }
 
-  Outlier judge(size_t p, const std::vector<size_t>& window) {
-    if (window.size() <= kHalf + 1) return {};
+  Firefly classify(size_t p, const std::vector<size_t>& window) {
+    if (window.size() <= half_of_window + 1) return {};
     around_.clear(), noisy_.clear();
     for (const size_t q : window) {
       if (q == p) continue;
       around_.push_back(mean_[q]);
       noisy_.push_back(mean_[q] + scatter_[q]);
     }
-    const bool one_sample = !(scatter_[p] < kOneSample * mean_[p]);
-    const float usual = beyond(around_, kHalf);
-    if (!one_sample && mean_[p] > kGlint * std::max(beyond(noisy_, kHalf), picture_))
-      return {usual / mean_[p], true, seen(window), knows_shape(window)};
-    if (scatter_[p] < kUnsure * mean_[p]) return {};
+    const bool one_sample = !(scatter_[p] < one_sample_error * mean_[p]);
+    const float usual = beyond(around_, half_of_window);
+    if (!one_sample && mean_[p] > glint_ratio * std::max(beyond(noisy_, half_of_window), picture_))
+      return {.factor = usual / mean_[p],
+              .bright = true,
+              .glint = seen(window),
+              .localized = knows_shape(window)};
+    if (scatter_[p] < firefly_error * mean_[p]) return {};
     const float far = std::max(farther_around(p), picture_);
-    if (mean_[p] > kGlint * far)
-      return {std::min(usual, far) / mean_[p], true, seen(window), knows_shape(window)};
-    if (one_sample) return {mean_[p] > kLuck * usual ? usual / mean_[p] : 1};
-    const float most = kLuck * beyond(around_, kFew);
+    if (mean_[p] > glint_ratio * far)
+      return {.factor = std::min(usual, far) / mean_[p],
+              .bright = true,
+              .glint = seen(window),
+              .localized = knows_shape(window)};
+    if (one_sample) return {mean_[p] > firefly_ratio * usual ? usual / mean_[p] : 1};
+    const float most = firefly_ratio * beyond(around_, few);
     return {mean_[p] > most ? most / mean_[p] : 1};
   }
 
@@ -89,7 +95,7 @@ class Brightness {
       sum += mean_[q];
       square += scatter_[q] * scatter_[q];
     }
-    return square < kSeen * kSeen * sum * sum;
+    return square < glint_error * glint_error * sum * sum;
   }
 
   /// Whether what pixels differ by is more than their noise.
@@ -99,24 +105,25 @@ class Brightness {
       light += mean_[q] * mean_[q];
       noise += scatter_[q] * scatter_[q];
     }
-    return noise < kShape * light;
+    return noise < shape_noise * light;
   }
 
   float median_of_block(int x0, int y0) {
     noisy_.clear();
-    for (int y = y0; y < std::min(y0 + kBlock, height_); ++y)
-      for (int x = x0; x < std::min(x0 + kBlock, width_); ++x) {
+    for (int y = y0; y < std::min(y0 + block_size, height_); ++y)
+      for (int x = x0; x < std::min(x0 + block_size, width_); ++x) {
         const size_t p = size_t(y) * size_t(width_) + size_t(x);
         noisy_.push_back(mean_[p] + scatter_[p]);
       }
     return beyond(noisy_, noisy_.size() / 2);
   }
   float farther_around(size_t p) {
-    const int column = int(p % size_t(width_)) / kBlock, row = int(p / size_t(width_)) / kBlock;
+    const int column = int(p % size_t(width_)) / block_size,
+              row = int(p / size_t(width_)) / block_size;
     noisy_.clear();
     for (int r = row - 1; r <= row + 1; ++r)
       for (int c = column - 1; c <= column + 1; ++c)
-        if (r >= 0 && c >= 0 && c < columns_ && r * kBlock < height_)
+        if (r >= 0 && c >= 0 && c < columns_ && r * block_size < height_)
           noisy_.push_back(block_[size_t(r * columns_ + c)]);
     return beyond(noisy_, noisy_.size() / 2);
   }
@@ -129,16 +136,16 @@ class Brightness {
 };
 
 /// Makes glints of what is as bright and hangs together with one.
-void follow_glints(int width, int height, std::vector<Outlier>& outliers) {
+void grow_glints(int width, int height, std::vector<Firefly>& fireflies) {
   std::vector<size_t> found;
-  for (size_t p = 0; p < outliers.size(); ++p)
-    if (outliers[p].glint) found.push_back(p);
+  for (size_t p = 0; p < fireflies.size(); ++p)
+    if (fireflies[p].glint) found.push_back(p);
   while (!found.empty()) {
     const size_t p = found.back();
     found.pop_back();
-    for_each_near(width, height, p, kReach, [&](size_t q) {
-      if (outliers[q].glint || !outliers[q].bright) return;
-      outliers[q].glint = true;
+    for_each_near(width, height, p, window_radius, [&](size_t q) {
+      if (fireflies[q].glint || !fireflies[q].bright) return;
+      fireflies[q].glint = true;
       found.push_back(q);
     });
   }
@@ -150,7 +157,7 @@ void spread(int width, int height, size_t p, const V3f& lost, std::vector<Plane>
   const auto weight = [&](size_t q) {
     const float x = float(q % size_t(width)) - float(p % size_t(width));
     const float y = float(q / size_t(width)) - float(p / size_t(width));
-    return std::exp(-(x * x + y * y) / (2 * kSpread * kSpread));
+    return std::exp(-(x * x + y * y) / (2 * spread_deviation * spread_deviation));
   };
   float sum = 0;
   for_each_near(width, height, p, 1, [&](size_t q) { sum += weight(q); });
@@ -161,15 +168,15 @@ void spread(int width, int height, size_t p, const V3f& lost, std::vector<Plane>
 
 }  // namespace
 
-std::vector<Plane> tame_outliers(NoisyPicture& picture) {
+std::vector<Plane> suppress_fireflies(NoisyPicture& picture) {
   Brightness bright(picture);
-  std::vector<Outlier> outliers(picture.variance[0].size());
-  for_each_window(picture.width, picture.height, kReach,
-                  [&](size_t p, const auto& window) { outliers[p] = bright.judge(p, window); });
-  follow_glints(picture.width, picture.height, outliers);
-  std::vector<Plane> glints(3, Plane(outliers.size(), 0.f));
-  for (size_t p = 0; p < outliers.size(); ++p) {
-    const Outlier& o = outliers[p];
+  std::vector<Firefly> fireflies(picture.variance[0].size());
+  for_each_window(picture.width, picture.height, window_radius,
+                  [&](size_t p, const auto& window) { fireflies[p] = bright.classify(p, window); });
+  grow_glints(picture.width, picture.height, fireflies);
+  std::vector<Plane> glints(3, Plane(fireflies.size(), 0.f));
+  for (size_t p = 0; p < fireflies.size(); ++p) {
+    const Firefly& o = fireflies[p];
     if (o.factor == 1) continue;
     V3f lost(0);
     for (size_t c = 0; c < 3; ++c) {
@@ -178,7 +185,7 @@ std::vector<Plane> tame_outliers(NoisyPicture& picture) {
       first[p] *= o.factor, second[p] *= o.factor;
       picture.variance[c][p] *= o.factor * o.factor;
     }
-    if (o.stays)
+    if (o.localized)
       for (size_t c = 0; c < 3; ++c) glints[c][p] += lost[int(c)];
     else if (o.glint)
       spread(picture.width, picture.height, p, lost, glints);
@@ -186,4 +193,4 @@ std::vector<Plane> tame_outliers(NoisyPicture& picture) {
   return glints;
 }
 
-}  // namespace drench
+}  // namespace drench::render

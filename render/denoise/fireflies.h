@@ -7,7 +7,7 @@
 
 #include "render/denoise/denoise.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Calls with the pixels within `reach` of one.
 template <class Visit>
@@ -34,6 +34,6 @@ void for_each_window(int width, int height, int reach, const Visit& visit) {
 /// its window either would be a white square.
 /// @return what glints lost, the three colours: it belongs where it is, or around it where too few
 ///         samples of a pixel found it to tell its shape
-std::vector<NoisyPicture::Plane> tame_outliers(NoisyPicture& picture);
+std::vector<NoisyPicture::Plane> suppress_fireflies(NoisyPicture& picture);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -10,12 +10,12 @@
 #include "pipeline/contract/error.h"
 #include "render/denoise/oidn.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr std::string_view kPrefix = "denoise_";
-constexpr const char* kUnits = "denoise_units";  // entry of the header
+constexpr std::string_view layer_prefix = "denoise_";
+constexpr const char* units_entry = "denoise_units";  // entry of the header
 
 using Plane = NoisyPicture::Plane;
 using Precision = FilmLayer::Precision;
@@ -53,8 +53,8 @@ std::vector<StoredLayer> layout_of(NoisyPicture& picture) {
 }
 
 float as_half(float value) {
-  constexpr float kLargest = HALF_MAX;
-  return Imath::half(std::clamp(value, -kLargest, kLargest));
+  constexpr float max_half = HALF_MAX;
+  return Imath::half(std::clamp(value, -max_half, max_half));
 }
 
 [[noreturn]] void fail(const std::string& why) {
@@ -71,7 +71,7 @@ const FilmLayer& layer_of(const Film& film, const std::string& name) {
 std::vector<float> units_of(const Film& film) {
   std::vector<float> units;
   for (const auto& [name, text] : film.header) {
-    if (name != kUnits) continue;
+    if (name != units_entry) continue;
     std::istringstream words(text);
     for (std::string word; words >> word;) units.push_back(std::strtof(word.c_str(), nullptr));
   }
@@ -125,7 +125,7 @@ void add_picture(Film& film, NoisyPicture picture) {
   std::string units;
   for (size_t f = 0; f < picture.feature.size(); ++f)
     units += fmt::format("{}{:.9g}", units.empty() ? "" : " ", picture.unit(f));
-  film.header.emplace_back(kUnits, units);
+  film.header.emplace_back(units_entry, units);
 }
 
 NoisyPicture picture_of(const Film& film) {
@@ -162,10 +162,11 @@ Film denoised_film(const std::filesystem::path& frame,
     neighbours.before.push_back(read_picture(file, film.width, film.height));
   for (const std::filesystem::path& file : after)
     neighbours.after.push_back(read_picture(file, film.width, film.height));
-  std::erase_if(film.layer, [](const FilmLayer& layer) { return layer.name.starts_with(kPrefix); });
-  std::erase_if(film.header, [](const auto& entry) { return entry.first == kUnits; });
+  std::erase_if(film.layer,
+                [](const FilmLayer& layer) { return layer.name.starts_with(layer_prefix); });
+  std::erase_if(film.header, [](const auto& entry) { return entry.first == units_entry; });
   put_clean(film, denoised_by(denoiser, std::move(picture), std::move(neighbours)));
   return film;
 }
 
-}  // namespace drench
+}  // namespace drench::render

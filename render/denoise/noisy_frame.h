@@ -9,10 +9,11 @@
 #include <filesystem>
 #include <vector>
 
+#include "pipeline/contract/shot/shot.h"
 #include "render/denoise/denoise.h"
-#include "render/renderer.h"
+#include "render/film/film.h"
 
-namespace drench {
+namespace drench::render {
 
 /// @throws Error if Open Image Denoise is asked for and not there; it leaves out the neighbours.
 std::vector<NoisyPicture::Plane> denoised_by(Denoiser denoiser, NoisyPicture picture,
@@ -38,4 +39,4 @@ Film denoised_film(const std::filesystem::path& frame,
                    const std::vector<std::filesystem::path>& after,
                    Denoiser denoiser = Denoiser::regression);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,13 +5,13 @@
 
 #include "pipeline/contract/error.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 using Plane = NoisyPicture::Plane;
 
-constexpr int kCpuDevice = 1, kFloat3 = 3;
+constexpr int cpu_device = 1, float3 = 3;
 
 /// Three planes as one, pixel by pixel.
 std::vector<float> packed(const Plane* const (&planes)[3]) {
@@ -117,7 +117,7 @@ OpenImageDenoise::OpenImageDenoise(const std::string& file) : library_(new Libra
                     "\"regression\"",
                     dlerror()));
   library_->find_all();
-  library_->device = library_->new_device(kCpuDevice);
+  library_->device = library_->new_device(cpu_device);
   library_->check();
   // Threads that it ties to cores would be those that render the next frame.
   library_->set_device_flag(library_->device, "setAffinity", false);
@@ -138,7 +138,7 @@ std::vector<Plane> OpenImageDenoise::denoise(const NoisyPicture& picture) const 
       library_->new_filter(library_->device, "RT"), library_->release_filter);
   library_->check();
   const auto image = [&](const char* name, std::vector<float>& pixels) {
-    library_->set_image(filter.get(), name, pixels.data(), kFloat3, size_t(picture.width),
+    library_->set_image(filter.get(), name, pixels.data(), float3, size_t(picture.width),
                         size_t(picture.height), 0, 0, 0);
   };
   image("color", colour);
@@ -154,4 +154,4 @@ std::vector<Plane> OpenImageDenoise::denoise(const NoisyPicture& picture) const 
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

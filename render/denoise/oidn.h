@@ -8,7 +8,7 @@
 
 #include "render/denoise/denoise.h"
 
-namespace drench {
+namespace drench::render {
 
 class OpenImageDenoise {
  public:
@@ -31,4 +31,4 @@ class OpenImageDenoise {
   std::unique_ptr<Library> library_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -1,5 +1,5 @@
 #pragma once
-// Memory to a file or back: what a class says once holds for both ways.
+// Memory to a file or back: what a class says once holds for both directions.
 
 #include <filesystem>
 #include <fstream>
@@ -8,14 +8,14 @@
 
 #include "pipeline/contract/hash.h"
 
-namespace drench {
+namespace drench::render {
 
 class CheckpointArchive {
  public:
-  enum class Way { write, read };
+  enum class Mode { write, read };
 
   /// @throws Error if the file cannot be opened.
-  CheckpointArchive(const std::filesystem::path& file, Way way);
+  CheckpointArchive(const std::filesystem::path& file, Mode mode);
 
   void bytes(void* data, size_t size);
   /// Plain numbers, though Imath's vectors do not say so of themselves.
@@ -31,11 +31,11 @@ class CheckpointArchive {
   bool finish();
 
  private:
-  Way way_;
+  Mode mode_;
   std::filesystem::path file_;
   std::fstream stream_;
   uint64_t size_ = 0;  // bytes so far
   Hasher hasher_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

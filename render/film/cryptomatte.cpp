@@ -6,7 +6,7 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
-namespace drench {
+namespace drench::render {
 
 uint32_t murmur3(std::string_view name) {
   constexpr uint32_t c1 = 0xcc9e2d51u, c2 = 0x1b873593u;
@@ -65,18 +65,18 @@ void CryptomattePixel::archive(CheckpointArchive& file) {
   for (auto& [thing, count] : counts_) file.value(thing), file.value(count);
 }
 
-std::array<float, 2 * CryptomattePixel::kRanks> CryptomattePixel::ranked(
+std::array<float, 2 * CryptomattePixel::ranks> CryptomattePixel::ranked(
     const std::vector<float>& ids, int samples) const {
   std::vector<std::pair<int, int>> sorted = counts_;
   std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
     return a.second != b.second ? a.second > b.second : a.first < b.first;
   });
-  std::array<float, 2 * kRanks> out{};
-  for (size_t k = 0; k < std::min(sorted.size(), size_t(kRanks)); ++k) {
+  std::array<float, 2 * ranks> out{};
+  for (size_t k = 0; k < std::min(sorted.size(), size_t(ranks)); ++k) {
     out[2 * k] = ids[size_t(sorted[k].first)];
     out[2 * k + 1] = float(sorted[k].second) / float(samples);
   }
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

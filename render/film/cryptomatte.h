@@ -12,7 +12,7 @@
 
 #include "render/film/checkpoint_archive.h"
 
-namespace drench {
+namespace drench::render {
 
 /// MurmurHash3, 32 bits, x86 variant, seed 0, of a name's UTF-8 bytes.
 uint32_t murmur3(std::string_view name);
@@ -28,16 +28,16 @@ std::vector<std::pair<std::string, std::string>> cryptomatte_header(
 /// What one pixel shows, by counting camera samples.
 class CryptomattePixel {
  public:
-  static constexpr int kRanks = 6;
+  static constexpr int ranks = 6;
 
   /// @param thing  index of a name, negative: nothing
   void add(int thing);
   void archive(CheckpointArchive& file);
-  /// Pairs of id and share, the largest first, of equals the lower index; zeros after the last.
-  std::array<float, 2 * kRanks> ranked(const std::vector<float>& ids, int samples) const;
+  /// Pairs of id and coverage, the largest first, of equals the lower index; zeros after the last.
+  std::array<float, 2 * ranks> ranked(const std::vector<float>& ids, int samples) const;
 
  private:
   std::vector<std::pair<int, int>> counts_;  // of a thing, in the order they were met
 };
 
-}  // namespace drench
+}  // namespace drench::render

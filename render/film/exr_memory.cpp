@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <new>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -26,7 +26,7 @@ class MemoryStream final : public Imf::OStream {
     at_ = end;
   }
   uint64_t tellp() override { return at_; }
-  void seekp(uint64_t place) override { at_ = size_t(place); }
+  void seekp(uint64_t offset) override { at_ = size_t(offset); }
 
   bool whole() const { return whole_; }
   std::string take() { return std::move(bytes_); }
@@ -50,4 +50,4 @@ std::string exr_bytes(const Imf::Header& header, const Imf::FrameBuffer& pixels)
   return stream.take();
 }
 
-}  // namespace drench
+}  // namespace drench::render

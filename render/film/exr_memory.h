@@ -7,10 +7,10 @@
 
 #include <string>
 
-namespace drench {
+namespace drench::render {
 
 /// The file of one picture: the header's data window, all of its lines.
 /// @throws std::exception of the library; std::bad_alloc where the library would have swallowed it.
 std::string exr_bytes(const Imf::Header& header, const Imf::FrameBuffer& pixels);
 
-}  // namespace drench
+}  // namespace drench::render

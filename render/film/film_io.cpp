@@ -19,17 +19,17 @@
 #include "pipeline/contract/log.h"
 #include "render/color/color.h"
 #include "render/film/exr_memory.h"
-#include "render/renderer.h"
+#include "render/film/film.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr uint64_t kLargestPixels = uint64_t(1) << 27;  // 2 GiB as float RGBA
+constexpr uint64_t max_pixels = uint64_t(1) << 27;  // 2 GiB as float RGBA
 /// No codec of OpenEXR packs much tighter than deflate's 1032 to 1, so a header that promises far
 /// more pixels than the file could hold is refused before memory is taken for them.
-constexpr uint64_t kLargestPacking = 4096;
-constexpr float kLargestHalf = 65504;
+constexpr uint64_t max_compression_ratio = 4096;
+constexpr float max_half = 65504;
 
 [[noreturn]] void fail_read(const std::filesystem::path& path, const std::string& why) {
   throw Error(fmt::format("{}: cannot read this EXR: {}; write it again or give another",
@@ -41,9 +41,9 @@ std::vector<half> to_half(const std::vector<float>& values, uint64_t& clamped) {
   std::vector<half> out(values.size());
   for (size_t k = 0; k < values.size(); ++k) {
     const float value = values[k];
-    const bool fits = std::abs(value) <= kLargestHalf;
+    const bool fits = std::abs(value) <= max_half;
     clamped += fits ? 0 : 1;
-    out[k] = fits ? value : std::isnan(value) ? 0.f : std::copysign(kLargestHalf, value);
+    out[k] = fits ? value : std::isnan(value) ? 0.f : std::copysign(max_half, value);
   }
   return out;
 }
@@ -128,9 +128,9 @@ Imath::Box2i checked_window(const std::filesystem::path& path, const Imf::Header
   const int64_t width = int64_t(window.max.x) - window.min.x + 1;
   const int64_t height = int64_t(window.max.y) - window.min.y + 1;
   if (width <= 0 || height <= 0 || width > 1 << 20 || height > 1 << 20 ||
-      uint64_t(width * height) > kLargestPixels)
-    fail_read(path, fmt::format("{} x {} pixels (at most {})", width, height, kLargestPixels));
-  if (uint64_t(width * height) / kLargestPacking > std::filesystem::file_size(path))
+      uint64_t(width * height) > max_pixels)
+    fail_read(path, fmt::format("{} x {} pixels (at most {})", width, height, max_pixels));
+  if (uint64_t(width * height) / max_compression_ratio > std::filesystem::file_size(path))
     fail_read(path, fmt::format("{} x {} pixels cannot come from {} bytes", width, height,
                                 std::filesystem::file_size(path)));
   return window;
@@ -140,7 +140,9 @@ Film read_pixels(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
-  Film film{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, {}};
+  Film film{.width = window.max.x - window.min.x + 1,
+            .height = window.max.y - window.min.y + 1,
+            .rgba = {}};
   for (const char* name : {"R", "G", "B"}) {
     const Imf::Channel* channel = header.channels().findChannel(name);
     if (!channel) fail_read(path, fmt::format("it has no channel {}", name));
@@ -178,7 +180,10 @@ Film read_all(const std::filesystem::path& path) {
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
   const Imath::Box2i window = checked_window(path, header);
-  Film film{window.size().x + 1, window.size().y + 1, {}, film_window(header)};
+  Film film{.width = window.size().x + 1,
+            .height = window.size().y + 1,
+            .rgba = {},
+            .window = film_window(header)};
   const size_t pixels = size_t(film.width) * size_t(film.height);
   film.rgba.resize(4 * pixels);
   film.layer = layers_of(header, pixels);
@@ -278,4 +283,4 @@ WrittenFile write_png(const std::filesystem::path& path, int width, int height,
   return write_file_whole(path, bytes);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,12 +6,12 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Blackman-Harris window of 3 pixels.
 class PixelFilter {
  public:
-  static constexpr float kWidth = 3;  // pixels
+  static constexpr float width = 3;  // pixels
 
   PixelFilter();
 
@@ -19,13 +19,13 @@ class PixelFilter {
   V2f offset(const V2f& u) const { return {inverse(u.x), inverse(u.y)}; }
 
  private:
-  static constexpr int kSize = 1024;
+  static constexpr int table_size = 1024;
   float inverse(float u) const {
-    const float x = u * kSize;
-    const int k = std::min(int(x), kSize - 1);
+    const float x = u * table_size;
+    const int k = std::min(int(x), table_size - 1);
     return inverse_[k] + (inverse_[k + 1] - inverse_[k]) * (x - float(k));
   }
-  std::array<float, kSize + 1> inverse_;  // quantiles of the window
+  std::array<float, table_size + 1> inverse_;  // quantiles of the window
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -104,7 +104,7 @@ V3f LayerFilm::motion_of(const PathRecord& record, const CameraPose& eye, float 
 V3f LayerFilm::motion_of_sky(size_t pixel, const CameraPose& eye) const {
   const V2f film(float(corner_.x + int(pixel % size_t(width_))) + 0.5f,
                  float(corner_.y + int(pixel / size_t(width_))) + 0.5f);
-  const Ray ray = frame_camera_.ray<false, false>(film, V2f(0), 0);
+  const Ray ray = frame_camera_.ray<CameraMotion::still, Lens::pinhole>(film, V2f(0), 0);
   const V2f to = frame_camera_.project(eye, eye.position + ray.direction);
   return {to.x - film.x, film.y - to.y, 0};
 }
@@ -116,7 +116,8 @@ void LayerFilm::add_light(size_t pixel, const PathRecord& record) {
     caught_[pixel * groups + g] += Imath::V3d(record.matte.light[g]);
 }
 
-/// A group's part of the beauty: of what catchers have of it the share that the beauty has of all.
+/// A group's part of the beauty: of what catchers have of it the fraction that the beauty has of
+/// all.
 Imath::V3d LayerFilm::light(size_t pixel, size_t group, int samples, const PlateFilm& plate) const {
   const size_t k = pixel * groups_.size() + group;
   Imath::V3d sum = light_[k];
@@ -135,9 +136,9 @@ void LayerFilm::add(size_t pixel, const PathRecord& record) {
   p.albedo2 += record.albedo * record.albedo;
   const int object = record.first.kind == Hit::Kind::ground   ? int(scene_->object_count())
                      : record.first.kind == Hit::Kind::object ? int(record.first.index)
-                                                              : kSky;
+                                                              : no_object;
   if (features_) vote(p.usual, object, record);
-  if (object == kSky) return;
+  if (object == no_object) return;
   p.normal += record.normal;
   p.normal2 += record.normal * record.normal;
   const CameraPose& eye = frame_camera_.open();
@@ -159,7 +160,7 @@ void LayerFilm::vote(Usual& usual, int object, const PathRecord& record) const {
     return;
   }
   usual = {object, 1};
-  if (object == kSky) return;
+  if (object == no_object) return;
   usual.after = motion_of(record, frame_camera_.close(), 1);
   usual.before = motion_of(record, before_camera_.open(), -1);
 }
@@ -184,9 +185,9 @@ std::vector<FilmLayer> LayerFilm::finish(const std::vector<PixelSum>& pixels,
       for (size_t c = 0; c < n; ++c) out.back().value[n * p + c] = float(v[int(c)]);
     }
   };
-  const auto share = [&](const V3f& sum, size_t p) { return sum * (1.f / pixels[p].samples()); };
-  if (want_.albedo) fill("albedo", rgb, half, [&](size_t p) { return share(pixel_[p].albedo, p); });
-  if (want_.normal) fill("N", xyz, half, [&](size_t p) { return share(pixel_[p].normal, p); });
+  const auto mean = [&](const V3f& sum, size_t p) { return sum * (1.f / pixels[p].samples()); };
+  if (want_.albedo) fill("albedo", rgb, half, [&](size_t p) { return mean(pixel_[p].albedo, p); });
+  if (want_.normal) fill("N", xyz, half, [&](size_t p) { return mean(pixel_[p].normal, p); });
   if (want_.depth) fill("depth", {"Z"}, full, [&](size_t p) { return &pixel_[p].nearest.depth; });
   if (want_.position) fill("P", xyz, full, [&](size_t p) { return pixel_[p].nearest.position; });
   if (want_.motion) fill("motion", xyz, full, [&](size_t p) { return pixel_[p].nearest.motion; });
@@ -215,7 +216,7 @@ void LayerFilm::add_matte(std::vector<FilmLayer>& out, const std::string& name,
                           const std::vector<PixelSum>& pixels) const {
   const std::vector<float> ids = ids_of(things);
   const size_t first = out.size();
-  for (int part = 0; part < CryptomattePixel::kRanks / 2; ++part)
+  for (int part = 0; part < CryptomattePixel::ranks / 2; ++part)
     out.push_back(
         layer(name + "0" + std::to_string(part), {"R", "G", "B", "A"}, FilmLayer::Precision::full));
   for (size_t p = 0; p < pixels.size(); ++p) {
@@ -256,7 +257,7 @@ void LayerFilm::add_motion(NoisyPicture& picture) const {
   for (auto& side : picture.motion)
     for (NoisyPicture::Plane& plane : side) plane.resize(pixel_.size());
   for (size_t p = 0; p < pixel_.size(); ++p) {
-    const bool sky = pixel_[p].usual.object == kSky;
+    const bool sky = pixel_[p].usual.object == no_object;
     const V3f before = sky ? motion_of_sky(p, before_camera_.open()) : pixel_[p].usual.before;
     const V3f after = sky ? motion_of_sky(p, frame_camera_.close()) : pixel_[p].usual.after;
     picture.motion[0][0][p] = before.x, picture.motion[0][1][p] = -before.y;
@@ -272,4 +273,4 @@ std::vector<std::pair<std::string, std::string>> LayerFilm::header() const {
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

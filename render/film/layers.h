@@ -4,15 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "render/denoise/denoise.h"
 #include "render/film/checkpoint_archive.h"
 #include "render/film/cryptomatte.h"
+#include "render/film/film.h"
+#include "render/film/matte.h"
+#include "render/film/noisy_picture.h"
+#include "render/film/path_record.h"
 #include "render/film/pixel_sum.h"
-#include "render/integrator/path.h"
-#include "render/renderer.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Names without repetition, with a number for each of a list that may repeat them.
 struct NameIndex {
@@ -44,22 +45,22 @@ class LayerFilm {
   /// And where what is seen is in the frames before and after.
   void add_motion(NoisyPicture& picture) const;
   /// Whether a camera sample of a pixel met the ground or an object that is no matte.
-  bool saw_something(size_t pixel) const { return pixel_[pixel].nearest.depth < kNothing; }
+  bool saw_something(size_t pixel) const { return pixel_[pixel].nearest.depth < no_depth; }
   /// Header entries that belong to them.
   std::vector<std::pair<std::string, std::string>> header() const;
 
  private:
   /// What is nearest to the camera in a pixel: depths of an edge's two sides must not be mixed.
   struct Nearest {
-    float depth = kNothing;
+    float depth = no_depth;
     V3f position{0, 0, 0};
     V3f motion{0, 0, 0};  // to the next frame
   };
-  static constexpr int kSky = -1;
+  static constexpr int no_object = -1;
   /// What most samples of a pixel see, by majority vote (Boyer and Moore 1991): a streak of spray
   /// that few see does not take along what lies behind.
   struct Usual {
-    int object = kSky, votes = 0;
+    int object = no_object, votes = 0;
     V3f after{0, 0, 0}, before{0, 0, 0};  // motion to the frames beside
   };
   struct Pixel {
@@ -70,7 +71,7 @@ class LayerFilm {
     Usual usual;
     CryptomattePixel object, material;
   };
-  static constexpr float kNothing = 1e10f;
+  static constexpr float no_depth = 1e10f;
 
   void vote(Usual& usual, int object, const PathRecord& record) const;
   void add_light(size_t pixel, const PathRecord& record);
@@ -97,8 +98,8 @@ class LayerFilm {
   std::vector<Pixel> pixel_;
   std::vector<Imath::V3d> light_;       // by pixel, then group
   std::vector<Imath::V3d> caught_;      // that of shadow catchers in it; empty without any
-  std::vector<Imath::V3d> background_;  // shares of light from it; empty: not asked for
+  std::vector<Imath::V3d> background_;  // fractions of light from it; empty: not asked for
   bool catchers_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

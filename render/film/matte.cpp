@@ -2,69 +2,37 @@
 
 #include <algorithm>
 
-#include "render/scene/scene.h"
-
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr float kWhole = 1 - 1e-3f;  // this and more is what smoothing leaves of 1
-
-}  // namespace
-
-bool Scene::has_mattes() const {
-  return (has_ground_ && ground_matte_ != Matte::none) ||
-         std::any_of(objects_.begin(), objects_.end(),
-                     [](const SceneObject& o) { return o.matte != Matte::none; });
-}
-
-bool Scene::has_catchers() const {
-  return (has_ground_ && ground_matte_ == Matte::shadow_catcher) ||
-         std::any_of(objects_.begin(), objects_.end(),
-                     [](const SceneObject& o) { return o.matte == Matte::shadow_catcher; });
-}
-
-Bodies Scene::plate_bodies() const {
-  Bodies in = 0;
-  for (const SceneObject& object : objects_)
-    if (object.matte != Matte::none) in |= object.body;
-  return in;
-}
-
-bool Scene::in_plate(const LightSample& light) const {
-  return light.mesh < 0 ||
-         std::none_of(objects_.begin(), objects_.end(), [&](const SceneObject& o) {
-           return o.light == light.mesh && o.matte == Matte::none;
-         });
-}
-
-namespace {
+constexpr float almost_one = 1 - 1e-3f;  // this and more is what smoothing leaves of 1
 
 float ratio(float with, float without) { return without > 0 ? std::min(1.f, with / without) : 1.f; }
 
 }  // namespace
 
-V3f PlateFilm::noisy_light_left(size_t pixel) const {
+V3f PlateFilm::noisy_shadow_ratio(size_t pixel) const {
   V3f left;
   for (int c = 0; c < 3; ++c) left[c] = ratio(with_[pixel].mean(c), without_[pixel].mean(c));
   return left;
 }
 
-V3f PlateFilm::light_left(size_t pixel) const {
+V3f PlateFilm::shadow_ratio(size_t pixel) const {
   if (!has_catchers()) return V3f(1);
-  return smooth_shadows_.empty() ? noisy_light_left(pixel) : at(smooth_shadows_, pixel);
+  return smooth_shadows_.empty() ? noisy_shadow_ratio(pixel) : at(smooth_shadows_, pixel);
 }
 
 V3f PlateFilm::seen(size_t pixel) const {
   if (caught_.empty()) return V3f(0);
-  const V3f here = mean_of(caught_[pixel]) * light_left(pixel);
+  const V3f here = mean_of(caught_[pixel]) * shadow_ratio(pixel);
   return smooth_plate_.empty() ? here : here + at(smooth_plate_, pixel) - mean_of(plate(pixel));
 }
 
 std::vector<PixelSum> PlateFilm::beauty(const std::vector<PixelSum>& all) const {
   std::vector<PixelSum> out;
   out.reserve(all.size());
-  for (size_t p = 0; p < all.size(); ++p) out.push_back(all[p].less(without_[p], light_left(p)));
+  for (size_t p = 0; p < all.size(); ++p) out.push_back(all[p].less(without_[p], shadow_ratio(p)));
   return out;
 }
 
@@ -73,7 +41,7 @@ NoisyPicture PlateFilm::shadows(int width, int height) const {
   picture.width = width;
   picture.height = height;
   for (size_t p = 0; p < with_.size(); ++p) {
-    const PixelSum difference = with_[p].less(without_[p], noisy_light_left(p));
+    const PixelSum difference = with_[p].less(without_[p], noisy_shadow_ratio(p));
     for (int c = 0; c < 3; ++c) {
       for (int h = 0; h < 2; ++h)
         picture.half[h][c].push_back(ratio(with_[p].half(h, c), without_[p].half(h, c)));
@@ -85,7 +53,7 @@ NoisyPicture PlateFilm::shadows(int width, int height) const {
   return picture;
 }
 
-NoisyPicture PlateFilm::shares(int width, int height) const {
+NoisyPicture PlateFilm::coverage(int width, int height) const {
   std::vector<PixelSum> sums;
   sums.reserve(background_.size());
   for (size_t p = 0; p < background_.size(); ++p) sums.push_back(plate(p));
@@ -97,15 +65,15 @@ NoisyPicture PlateFilm::shares(int width, int height) const {
 
 void PlateFilm::smooth_shadows(std::vector<NoisyPicture::Plane> smooth) {
   for (size_t p = 0; p < with_.size(); ++p) {
-    const V3f noisy = noisy_light_left(p);
+    const V3f noisy = noisy_shadow_ratio(p);
     for (size_t c = 0; c < 3; ++c)
-      if (smooth[c][p] > kWhole && noisy[int(c)] == 1) smooth[c][p] = 1;
+      if (smooth[c][p] > almost_one && noisy[int(c)] == 1) smooth[c][p] = 1;
   }
   smooth_shadows_ = std::move(smooth);
 }
 
-void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> smooth,
-                              const std::function<bool(size_t)>& objects) {
+void PlateFilm::smooth_coverage(std::vector<NoisyPicture::Plane> smooth,
+                                const std::function<bool(size_t)>& objects) {
   for (size_t p = 0; p < background_.size(); ++p) {
     if (objects(p)) continue;
     const V3f kept = mean_of(plate(p));
@@ -114,4 +82,4 @@ void PlateFilm::smooth_shares(std::vector<NoisyPicture::Plane> smooth,
   smooth_plate_ = std::move(smooth);
 }
 
-}  // namespace drench
+}  // namespace drench::render

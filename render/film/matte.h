@@ -3,8 +3,8 @@
 //
 // A plate P stands for what the camera sees unhindered, or through smooth water and glass, of a
 // clear background, of holdouts and of shadow catchers. Of a pixel's camera samples let
-//   b  be the mean share of light that comes from the background and holdouts: 1 where nothing is
-//      before them, less, by colour, through water;
+//   b  be the mean fraction of light from the background and holdouts: 1 where nothing is before
+//      them, less, by colour, through water;
 //   c  the same of shadow catchers;
 //   W  what catchers send to the camera with all objects in place;
 //   O  what they would send in the plate's world: lights, catchers and holdouts alone;
@@ -18,40 +18,34 @@
 // catcher is, the sum is R + W: the picture itself. With alpha in place of opacity what is coloured
 // of shadows and of clear water is lost, not their brightness.
 //
-// A ratio of means is biased as one over the number of samples. W and O share theirs: where objects
-// change nothing they have the same bits, and s is 1.
+// A ratio of means is biased as one over the number of samples. W and O have the same samples:
+// where objects change nothing they have the same bits, and s is 1.
 
 #include <algorithm>
 #include <functional>
 #include <vector>
 
-#include "render/denoise/denoise.h"
 #include "render/film/checkpoint_archive.h"
+#include "render/film/noisy_picture.h"
+#include "render/film/path_record.h"
 #include "render/film/pixel_sum.h"
 
-namespace drench {
-
-/// What one camera sample met of the plate, shares of light by colour.
-struct MatteRecord {
-  V3f background{0, 0, 0}, catcher{0, 0, 0};  // b, c
-  V3f with{0, 0, 0}, without{0, 0, 0};        // W, O in W/(sr m^2)
-  std::vector<V3f> light;                     // W of each group of lights; empty: not asked for
-};
+namespace drench::render {
 
 /// Adds up samples of the plate, what of them is needed: 150 bytes a pixel each of W, O and c for
-/// shadow catchers, of b and c for shares of light that the denoiser is to smooth.
+/// shadow catchers, of b and c for fractions of light that the denoiser is to smooth.
 class PlateFilm {
  public:
   /// @param catchers  pixels; 0: the scene has no shadow catchers
-  /// @param shares    pixels; 0: b and c stay as they are
-  PlateFilm(size_t catchers, size_t shares)
+  /// @param coverage  pixels; 0: b and c stay as they are
+  PlateFilm(size_t catchers, size_t coverage)
       : with_(catchers),
         without_(catchers),
-        caught_(std::max(catchers, shares)),
-        background_(shares) {}
+        caught_(std::max(catchers, coverage)),
+        background_(coverage) {}
 
   bool has_catchers() const { return !with_.empty(); }
-  bool has_shares() const { return !background_.empty(); }
+  bool has_coverage() const { return !background_.empty(); }
   /// Before it is smoothed.
   void archive(CheckpointArchive& file) {
     for (std::vector<PixelSum>* sums : {&with_, &without_, &caught_, &background_})
@@ -63,13 +57,13 @@ class PlateFilm {
       with_[pixel].add(record.with, 0);
       without_[pixel].add(record.without, 0);
     }
-    if (has_shares()) background_[pixel].add(record.background, 0);
+    if (has_coverage()) background_[pixel].add(record.background, 0);
     if (!caught_.empty()) caught_[pixel].add(record.catcher, 0);
   }
   /// W and W - s O of a pixel's means.
   V3f with(size_t pixel) const { return mean_of(with_[pixel]); }
   V3f added(size_t pixel) const {
-    return with(pixel) - mean_of(without_[pixel]) * light_left(pixel);
+    return with(pixel) - mean_of(without_[pixel]) * shadow_ratio(pixel);
   }
   /// s c of a pixel, with what smoothing adds to b + s c.
   V3f seen(size_t pixel) const;
@@ -78,13 +72,13 @@ class PlateFilm {
 
   /// s as a picture, and b + s c with the s that is known by then, for the denoiser.
   NoisyPicture shadows(int width, int height) const;
-  NoisyPicture shares(int width, int height) const;
+  NoisyPicture coverage(int width, int height) const;
   /// Puts a smoother s in its place. What is 1 without noise stays 1 to the bit.
   void smooth_shadows(std::vector<NoisyPicture::Plane> smooth);
   /// The same for b + s c. @param objects  whether a pixel has anything but the plate; else it
   /// stays
-  void smooth_shares(std::vector<NoisyPicture::Plane> smooth,
-                     const std::function<bool(size_t)>& objects);
+  void smooth_coverage(std::vector<NoisyPicture::Plane> smooth,
+                       const std::function<bool(size_t)>& objects);
 
  private:
   static V3f mean_of(const PixelSum& sum) { return {sum.mean(0), sum.mean(1), sum.mean(2)}; }
@@ -92,14 +86,14 @@ class PlateFilm {
     return {colours[0][pixel], colours[1][pixel], colours[2][pixel]};
   }
   /// s of a pixel, as its samples have it and as it is used.
-  V3f noisy_light_left(size_t pixel) const;
-  V3f light_left(size_t pixel) const;
+  V3f noisy_shadow_ratio(size_t pixel) const;
+  V3f shadow_ratio(size_t pixel) const;
   PixelSum plate(size_t pixel) const {
-    return background_[pixel].less(caught_[pixel], -light_left(pixel));
+    return background_[pixel].less(caught_[pixel], -shadow_ratio(pixel));
   }
 
   std::vector<PixelSum> with_, without_, caught_, background_;
   std::vector<NoisyPicture::Plane> smooth_shadows_, smooth_plate_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

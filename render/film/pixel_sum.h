@@ -3,7 +3,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Sums of a pixel in the order of its samples. They are kept in 4 to 7 whole batches too, of 8
 /// samples at first; two become one when there are 8. A batch is a net of the Sobol sequence,
@@ -11,7 +11,7 @@ namespace drench {
 /// sampling; single samples would tell that of random ones, which is far larger.
 class PixelSum {
  public:
-  static constexpr int kBatch = 8;  // samples of the smallest
+  static constexpr int smallest_batch = 8;  // samples of the smallest
 
   void add(const V3f& radiance, float alpha) {
     for (int c = 0; c < 3; ++c) {
@@ -20,7 +20,7 @@ class PixelSum {
     }
     alpha_ += alpha;
     // size_ is a power of two
-    if ((++samples_ & (size_ - 1)) == 0 && ++whole_ == kMost) merge();
+    if ((++samples_ & (size_ - 1)) == 0 && ++whole_ == max_batches) merge();
   }
 
   int samples() const { return samples_; }
@@ -42,11 +42,11 @@ class PixelSum {
   float common_square(int channel) const {
     return whole_ < 2 ? 0 : mean(channel) * mean(channel) - variance(channel);
   }
-  /// This, less a share of the colours that the same samples add up to elsewhere.
-  PixelSum less(const PixelSum& other, const V3f& share) const {
+  /// This, less a fraction of the colours that the same samples add up to elsewhere.
+  PixelSum less(const PixelSum& other, const V3f& fraction) const {
     PixelSum out = *this;
-    for (int c = 0; c < 3; ++c) out.sum_[c] -= double(share[c]) * other.sum_[c];
-    for (int b = 0; b < kMost; ++b) out.batch_[b] -= other.batch_[b] * share;
+    for (int c = 0; c < 3; ++c) out.sum_[c] -= double(fraction[c]) * other.sum_[c];
+    for (int b = 0; b < max_batches; ++b) out.batch_[b] -= other.batch_[b] * fraction;
     return out;
   }
   /// Means of a colour by every second batch: two pictures of independent errors. From two batches
@@ -59,18 +59,18 @@ class PixelSum {
   }
 
  private:
-  static constexpr int kMost = 8;
+  static constexpr int max_batches = 8;
 
   void merge() {
-    for (int b = 0; b < kMost; ++b)
-      batch_[b] = b < kMost / 2 ? batch_[2 * b] + batch_[2 * b + 1] : V3f(0);
-    whole_ = kMost / 2;
+    for (int b = 0; b < max_batches; ++b)
+      batch_[b] = b < max_batches / 2 ? batch_[2 * b] + batch_[2 * b + 1] : V3f(0);
+    whole_ = max_batches / 2;
     size_ *= 2;
   }
 
   double sum_[3] = {0, 0, 0}, alpha_ = 0;
-  V3f batch_[kMost] = {V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0)};
-  int samples_ = 0, size_ = kBatch, whole_ = 0;
+  V3f batch_[max_batches] = {V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0), V3f(0)};
+  int samples_ = 0, size_ = smallest_batch, whole_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -1,25 +1,25 @@
 #include "render/integrator/guide.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Half angle, in air, that waves add to a lamp's own. A slope s turns a ray by about (n - 1) s.
-constexpr float kWaveAngle = 0.08f;
+constexpr float wave_angle = 0.08f;
 /// Aimed directions fall off as (core + h)^-2 in h = 1 - cos, out to a right angle: steep waves
 /// send a lamp's light far off the level course, and a lobe that ends would leave it to chance.
-constexpr float kReach = 1;
-/// Share aimed where lamps give all the light. The rest finds what the lobes miss.
-constexpr float kLargestShare = 0.8f;
+constexpr float lobe_extent = 1;
+/// Fraction aimed where lamps give all the light. The rest finds what the lobes miss.
+constexpr float max_guided = 0.8f;
 
 float lobe_density(float core, float h) {
-  const float all = kReach / (core + kReach);
-  return h < kReach ? core / ((core + h) * (core + h) * all * 2 * kPi) : 0;
+  const float all = lobe_extent / (core + lobe_extent);
+  return h < lobe_extent ? core / ((core + h) * (core + h) * all * 2 * pi) : 0;
 }
 
 V3f sample_lobe(float core, const V2f& u) {
-  const float t = u.x * kReach / (core + kReach), h = core * t / (1 - t);
-  const float sin = std::sqrt(std::max(0.f, h * (2 - h))), phi = 2 * kPi * u.y;
+  const float t = u.x * lobe_extent / (core + lobe_extent), h = core * t / (1 - t);
+  const float sin = std::sqrt(std::max(0.f, h * (2 - h))), phi = 2 * pi * u.y;
   return {sin * std::cos(phi), sin * std::sin(phi), 1 - h};
 }
 
@@ -28,7 +28,7 @@ V3f sample_lobe(float core, const V2f& u) {
 /// Aimed at a ball of the given radius; none at what is not above.
 RefractedLightGuide::Lobe RefractedLightGuide::lobe_at(const V3f& to, float reach) const {
   Lobe out;
-  const float cos_wave = std::cos(kWaveAngle), sin_wave = std::sin(kWaveAngle);
+  const float cos_wave = std::cos(wave_angle), sin_wave = std::sin(wave_angle);
   const float distance = std::sqrt(dot(to, to));
   if (!(to.y > 0) || !(distance > 0)) return out;
   const float sin = std::min(reach / distance, 0.95f), cos = std::sqrt(1 - sin * sin);
@@ -46,7 +46,7 @@ RefractedLightGuide::Lobe RefractedLightGuide::lobe(size_t light, const V3f& poi
     out.importance *= mesh.importance(point);
     return out;
   }
-  const float cos_wave = std::cos(kWaveAngle), sin_wave = std::sin(kWaveAngle);
+  const float cos_wave = std::cos(wave_angle), sin_wave = std::sin(wave_angle);
   if (light >= lights_.shapes().size()) {
     const SunLight& sun = lights_.suns()[light - lights_.shapes().size()];
     if (sun.toward.y <= 0) return out;
@@ -64,7 +64,7 @@ RefractedLightGuide::Lobe RefractedLightGuide::lobe(size_t light, const V3f& poi
   if (!(facing > 0)) return out;
   const float reach = shape.type == LightType::sphere
                           ? shape.radius
-                          : std::sqrt(shape.area * std::max(facing, 0.1f) / kPi);
+                          : std::sqrt(shape.area * std::max(facing, 0.1f) / pi);
   out = lobe_at(to, reach);
   out.importance *= shape.importance(point);
   return out;
@@ -76,9 +76,9 @@ float RefractedLightGuide::total_importance(const V3f& point) const {
   return total;
 }
 
-float RefractedLightGuide::share(const V3f& point) const {
+float RefractedLightGuide::probability(const V3f& point) const {
   const float lamps = total_importance(point);
-  return lamps > 0 ? kLargestShare * lamps / (lamps + lights_.environment_importance()) : 0;
+  return lamps > 0 ? max_guided * lamps / (lamps + lights_.environment_importance()) : 0;
 }
 
 DirectionSample RefractedLightGuide::sample(const V3f& point, float u_light, const V2f& u) const {
@@ -115,4 +115,4 @@ float RefractedLightGuide::pdf(const V3f& point, const V3f& direction) const {
   return density > 0 ? density / total * ior_ * ior_ * direction.y / air.y : 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

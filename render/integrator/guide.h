@@ -7,7 +7,7 @@
 #include "render/bsdf/bsdf.h"
 #include "render/light/lights.h"
 
-namespace drench {
+namespace drench::render {
 
 class RefractedLightGuide {
  public:
@@ -17,8 +17,8 @@ class RefractedLightGuide {
   RefractedLightGuide(const Lights& lights, float ior, Aim aim = Aim::all)
       : lights_(lights), ior_(ior), first_(aim == Aim::meshes ? lights.lamps() : 0) {}
 
-  /// Share of the rays from `point` to aim, by what lamps and sky give there: 0 without lamps.
-  float share(const V3f& point) const;
+  /// Fraction of the rays from `point` to aim, by what lamps and sky give there: 0 without lamps.
+  float probability(const V3f& point) const;
   /// A direction in the water, with its density; density 0 if the draw leads nowhere.
   DirectionSample sample(const V3f& point, float u_light, const V2f& u) const;
   /// Density of `sample` for a unit direction in the water.
@@ -40,15 +40,15 @@ class RefractedLightGuide {
   size_t first_;  // light to aim at
 };
 
-/// A direction drawn from a surface, or with probability `share` from the guide. Its density is the
-/// surface's own in either case, its weight that of the mixture.
+/// A direction drawn from a surface, or with probability `probability` from the guide. Its density
+/// is the surface's own in either case, its weight that of the mixture.
 template <class Bsdf>
-Scatter sample_mixed(const Bsdf& bsdf, const RefractedLightGuide& guide, float share,
+Scatter sample_mixed(const Bsdf& bsdf, const RefractedLightGuide& guide, float probability,
                      const V3f& position, float u, const V2f& uv) {
   Scatter out;
   float guide_pdf = 0;
-  if (u < share) {
-    const DirectionSample aimed = guide.sample(position, u / share, uv);
+  if (u < probability) {
+    const DirectionSample aimed = guide.sample(position, u / probability, uv);
     if (!(aimed.pdf > 0)) return {};
     out.direction = aimed.direction;
     guide_pdf = aimed.pdf;
@@ -59,8 +59,8 @@ Scatter sample_mixed(const Bsdf& bsdf, const RefractedLightGuide& guide, float s
   }
   const V3f value = bsdf.value(out.direction, out.pdf);
   if (!(out.pdf > 0)) return {};
-  out.weight = value * (1 / (share * guide_pdf + (1 - share) * out.pdf));
+  out.weight = value * (1 / (probability * guide_pdf + (1 - probability) * out.pdf));
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,30 +4,30 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr int kMostSteps = 5;
-constexpr int kMostMet = 16;           // contact faces that a ray passes one after the other
-constexpr float kArrived = 0.03f;      // of the lamp's extent: so near its point a walk ends
-constexpr float kSameWay = 0.15f;      // of it: so near each other two ways arrive that are one
-constexpr float kLongStep = 0.3f;      // rad
-constexpr float kMostFocus = 2;        // times the light that would come straight: more is photons'
-constexpr float kIsSmooth = 0.99995f;  // cosine between two unit normals that are one
+constexpr int max_steps = 5;
+constexpr int max_contacts = 16;            // contact faces that a ray passes one after the other
+constexpr float arrival_tolerance = 0.03f;  // of the lamp's extent: so near its point a walk ends
+constexpr float same_path = 0.15f;  // of it: so near each other two paths arrive that are one
+constexpr float max_step = 0.3f;    // rad
+constexpr float max_focus = 2;      // times the light that would come straight: more is photons'
+constexpr float smooth_cosine = 0.99995f;  // cosine between two unit normals that are one
 
 /// Where a ray meets the interface and, bent there, the lamp's plane.
 struct Arrival {
   Hit hit;
   Surface face;
-  float way = 0, beyond = 0;              // m, before the interface and after it; 1 to a sun
+  float distance = 0, beyond = 0;         // m, before the interface and after it; 1 to a sun
   float index = 1, cos = 0, cos_out = 0;  // of the body, in air; of both directions and the normal
   Packed normal{V3f(0)}, bent{V3f(0)};    // unit; the normal that bends, on the ray's side
   V2f miss;                               // from there to the lamp's point
-  Packed slope[2] = {normal, normal};     // see BentWay
+  Packed slope[2] = {normal, normal};     // see RefractedPath
 };
 
-/// How a body's smooth normal turns along a triangle.
+/// How a body's smooth normal changes along a triangle.
 class SmoothNormal {
  public:
   SmoothNormal(const Corners& at, const Hit& hit)
@@ -52,10 +52,10 @@ class SmoothNormal {
   Packed ab_, ac_, nab_, nac_, unit_, flat_;
 };
 
-class Walk {
+class ManifoldWalk {
  public:
-  Walk(const Scene& scene, const Surface& surface, float time, Bodies in, const LampPoint& lamp,
-       uint64_t& rays)
+  ManifoldWalk(const Scene& scene, const Surface& surface, float time, Bodies in,
+               const LampPoint& lamp, uint64_t& rays)
       : scene_(scene),
         surface_(surface),
         time_(time),
@@ -92,15 +92,15 @@ class Walk {
   bool meet_interface(const V3f& direction, Arrival& out) const {
     Ray ray{surface_.leave(direction), direction, time_};
     Bodies in = in_;
-    out.way = 0;
-    for (int met = 0; met < kMostMet; ++met) {
+    out.distance = 0;
+    for (int met = 0; met < max_contacts; ++met) {
       out.hit = scene_.intersect(ray, Coherence::incoherent);
       ++rays_;
       if (out.hit.kind != Hit::Kind::object) return false;
       out.face = scene_.surface(ray, out.hit);
       const Surface& face = out.face;
       if (!face.body || face.material->alpha > 0) return false;
-      out.way += out.hit.distance;
+      out.distance += out.hit.distance;
       in |= face.body;
       if (!face.contact) return in == face.body && dot(direction, face.geometric_normal) > 0;
       ray.origin = face.leave(direction);
@@ -115,7 +115,7 @@ class Walk {
     const SceneObject& object = scene_.object(out.hit.index);
     if (!object.sphere.empty()) return false;
     const SmoothNormal smooth(object.corners(out.hit.triangle, time_), out.hit);
-    if (!(dot(smooth.unit(), out.normal) < -kIsSmooth)) return false;
+    if (!(dot(smooth.unit(), out.normal) < -smooth_cosine)) return false;
     for (int k = 0; k < 2; ++k) {
       const Packed to_plane = axis_[k] - normal_ * (dot(axis_[k], out.bent) * inverse);
       out.slope[k] = slope_before(direction, flat, to_plane, smooth, out);
@@ -123,19 +123,19 @@ class Walk {
     return true;
   }
 
-  /// How a component of the place on the lamp's plane changes with the direction of the ray: taken
+  /// How a component of the point on the lamp's plane changes with the direction of the ray: taken
   /// from the lamp back to the interface, and from there to the surface.
-  /// @param there  its change with the place in space, along bent rays none
+  /// @param there  its change with the point in space, along bent rays none
   Packed slope_before(const Packed& direction, const Packed& flat, const Packed& there,
                       const SmoothNormal& smooth, const Arrival& at) const {
     const Packed &n = at.normal, bend = there * at.beyond;
-    const float turn = at.index * at.cos - at.cos_out,
-                with_cos = -at.index * turn / at.cos_out * dot(n, bend);
-    const Packed with_normal = bend * turn - direction * with_cos;
+    const float bending = at.index * at.cos - at.cos_out,
+                with_cos = -at.index * bending / at.cos_out * dot(n, bend);
+    const Packed with_normal = bend * bending - direction * with_cos;
     const Packed by_normal = smooth.slope(with_normal - n * dot(n, with_normal));
-    const Packed with_place = (lamp_.sun ? Packed(V3f(0)) : there) - by_normal;
-    const float along = dot(direction, with_place) / dot(direction, flat);
-    return bend * at.index - n * with_cos + (with_place - flat * along) * at.way;
+    const Packed with_point = (lamp_.sun ? Packed(V3f(0)) : there) - by_normal;
+    const float along = dot(direction, with_point) / dot(direction, flat);
+    return bend * at.index - n * with_cos + (with_point - flat * along) * at.distance;
   }
 
   const Scene& scene_;
@@ -163,15 +163,15 @@ float distance_to(const Lights& lights, const LampPoint& lamp, const Arrival& at
 
 }  // namespace
 
-std::optional<BentWay> walk_to_lamp(const Scene& scene, const Surface& surface, float time,
-                                    Bodies in, const LampPoint& lamp, uint64_t& rays) {
-  const Walk walk(scene, surface, time, in, lamp, rays);
-  const V3f way = lamp.sun ? lamp.at : lamp.at - surface.position;
-  const float distance2 = dot(way, way), arrived = kArrived * lamp.extent;
-  const V3f to = way * (1 / std::sqrt(distance2));
+std::optional<RefractedPath> manifold_walk(const Scene& scene, const Surface& surface, float time,
+                                           Bodies in, const LampPoint& lamp, uint64_t& rays) {
+  const ManifoldWalk walk(scene, surface, time, in, lamp, rays);
+  const V3f to_lamp = lamp.sun ? lamp.at : lamp.at - surface.position;
+  const float distance2 = dot(to_lamp, to_lamp), arrived = arrival_tolerance * lamp.extent;
+  const V3f to = to_lamp * (1 / std::sqrt(distance2));
   Packed direction(level_direction(to, scene.medium(in ? in : scene.fluid()).ior));
   Arrival at;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < max_steps; ++step) {
     if (!walk.shoot(direction, at)) return {};
     const Packed &a = at.slope[0], &b = at.slope[1];
     const float area = dot(direction, cross(a, b));
@@ -179,28 +179,32 @@ std::optional<BentWay> walk_to_lamp(const Scene& scene, const Surface& surface, 
       const float density = 1 / std::abs(area);
       const float straight = lamp.sun ? 1 : -dot(to, lamp.normal) / distance2;
       const V3f &n = surface.geometric_normal, along = direction.unpacked();
-      if (!(density < kMostFocus * straight && dot(along, n) * dot(to, n) > 0)) return {};
-      const V3f absorbed = scene.medium(at.face.body).absorption * at.way,
+      if (!(density < max_focus * straight && dot(along, n) * dot(to, n) > 0)) return {};
+      const V3f absorbed = scene.medium(at.face.body).absorption * at.distance,
                 bent = at.bent.unpacked();
-      return BentWay{along,
-                     V3f(std::exp(-absorbed.x), std::exp(-absorbed.y), std::exp(-absorbed.z)) *
-                         (1 - fresnel_reflectance(at.cos, at.cos_out, 1 / at.index)),
-                     density,
-                     {at.face.leave(bent), bent, time},
-                     distance_to(scene.lights(), lamp, at),
-                     {a.unpacked(), b.unpacked()}};
+      const V3f transmittance(std::exp(-absorbed.x), std::exp(-absorbed.y), std::exp(-absorbed.z));
+      return RefractedPath{
+          .direction = along,
+          .transmittance =
+              transmittance * (1 - fresnel_reflectance(at.cos, at.cos_out, 1 / at.index)),
+          .density = density,
+          .beyond = {at.face.leave(bent), bent, time},
+          .distance = distance_to(scene.lights(), lamp, at),
+          .slope = {a.unpacked(), b.unpacked()}};
     }
-    Packed turn = (cross(b, direction) * at.miss.x + cross(direction, a) * at.miss.y) * (1 / area);
-    const float angle2 = dot(turn, turn);
+    Packed step_angle =
+        (cross(b, direction) * at.miss.x + cross(direction, a) * at.miss.y) * (1 / area);
+    const float angle2 = dot(step_angle, step_angle);
     if (!std::isfinite(angle2)) return {};
-    if (angle2 > kLongStep * kLongStep) turn = turn * (kLongStep / std::sqrt(angle2));
-    direction = normalized(direction + turn);
+    if (angle2 > max_step * max_step) step_angle = step_angle * (max_step / std::sqrt(angle2));
+    direction = normalized(direction + step_angle);
   }
   return {};
 }
 
-std::optional<WalkedLight> walk_to_lamps(const Scene& scene, const Surface& surface, const Ray& ray,
-                                         Bodies in, float u_light, const V2f& u, uint64_t& rays) {
+std::optional<ManifoldSample> sample_manifold(const Scene& scene, const Surface& surface,
+                                              const Ray& ray, Bodies in, float u_light,
+                                              const V2f& u, uint64_t& rays) {
   const LampPoint lamp = scene.lights().sample_lamp_point(surface.position, u_light, u);
   if (!(lamp.density > 0)) return {};
   const V3f to = lamp.sun ? lamp.at : lamp.at - surface.position;
@@ -209,25 +213,25 @@ std::optional<WalkedLight> walk_to_lamps(const Scene& scene, const Surface& surf
     in &= ~scene.fluid();  // of a sheet's other side its contact says what is there
   else if (in == 0)
     return {};
-  const std::optional<BentWay> way = walk_to_lamp(scene, surface, ray.time, in, lamp, rays);
-  if (!way) return {};
+  const std::optional<RefractedPath> path = manifold_walk(scene, surface, ray.time, in, lamp, rays);
+  if (!path) return {};
   ++rays;
-  const float open = scene.transmitted(way->beyond, {way->distance, int(lamp.lamp)});
+  const float open = scene.transmitted(path->beyond, {path->distance, int(lamp.lamp)});
   if (open == 0) return {};
-  return WalkedLight{way->direction,
-                     way->share * lamp.radiance * (open * way->density / lamp.density)};
+  return ManifoldSample{
+      path->direction, path->transmittance * lamp.radiance * (open * path->density / lamp.density)};
 }
 
-bool walk_finds(const Scene& scene, const Surface& surface, float time, Bodies in,
-                const LampPoint& lamp, const V3f& flight, uint64_t& rays) {
+bool manifold_walk_finds(const Scene& scene, const Surface& surface, float time, Bodies in,
+                         const LampPoint& lamp, const V3f& flight, uint64_t& rays) {
   if (!(lamp.density > 0)) return false;
-  const std::optional<BentWay> way = walk_to_lamp(scene, surface, time, in, lamp, rays);
-  if (!way) return false;
-  const V3f& to = way->direction;
+  const std::optional<RefractedPath> path = manifold_walk(scene, surface, time, in, lamp, rays);
+  if (!path) return false;
+  const V3f& to = path->direction;
   const float along = -dot(flight, to);
   const V3f off = -flight - to * along;
-  const V2f apart(dot(off, way->slope[0]), dot(off, way->slope[1]));
-  return apart.length() < kSameWay * lamp.extent && along > 0;
+  const V2f apart(dot(off, path->slope[0]), dot(off, path->slope[1]));
+  return apart.length() < same_path * lamp.extent && along > 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

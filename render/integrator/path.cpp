@@ -9,7 +9,7 @@
 
 #include "render/integrator/path_tracer.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -35,15 +35,15 @@ void trace(const Scene& scene, const PathSettings& settings, std::span<CameraSam
            uint64_t& rays) {
   using Path = PathTracer<features>;
   static_assert(std::is_trivially_destructible_v<Path>);
-  alignas(Path) std::byte place[kPathsAtOnce][sizeof(Path)];
-  std::array<Path*, kPathsAtOnce> paths, going;
+  alignas(Path) std::byte storage[paths_in_flight][sizeof(Path)];
+  std::array<Path*, paths_in_flight> paths, going;
   size_t left = 0;
   const auto keep = [&](Path* path) {  // without a branch, which nothing foretells
     going[left] = path;
     left += path->going();
   };
   for (size_t k = 0; k < samples.size(); ++k)
-    keep(paths[k] = new (place[k]) Path(scene, settings, samples[k]));
+    keep(paths[k] = new (storage[k]) Path(scene, settings, samples[k]));
   while (const size_t n = left) {
     for (size_t k = 0; k < n; ++k) going[k]->find();
     for (size_t k = 0; k < n; ++k) going[k]->fetch();
@@ -64,9 +64,9 @@ constexpr std::array<PathFunction, sizeof...(features)> table(std::index_sequenc
 }  // namespace
 
 PathFunction path_function(unsigned features) {
-  static constexpr auto functions = table(std::make_index_sequence<kFeatureCount>{});
-  if (features & kMattes) return &trace<kMattes | (kFeatureCount - 1)>;
-  return functions[features % kFeatureCount];
+  static constexpr auto functions = table(std::make_index_sequence<Feature::combinations>{});
+  if (features & Feature::mattes) return &trace<Feature::mattes | (Feature::combinations - 1)>;
+  return functions[features % Feature::combinations];
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,41 +5,20 @@
 #include <span>
 #include <vector>
 
-#include "render/film/matte.h"
+#include "render/film/path_record.h"
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
+#include "render/scene/features.h"
 
-namespace drench {
-
-/// What the loop must be able to do for a frame. What is absent costs no branch.
-enum Feature : unsigned {
-  kMotionBlur = 1,     // something, or the camera, moves in the shutter
-  kDielectric = 2,     // water: refraction, absorption, medium on the path
-  kSampledLights = 4,  // lights are sampled, with multiple importance sampling
-  kThinLens = 8,
-  kGlossy = 16,        // metal, coats, rough dielectrics, fabric
-  kFeatureCount = 32,  // combinations of these
-  kMattes = 32,        // a plate goes behind; such frames have all the others switched on
-};
+namespace drench::render {
 
 /// Sampling dimensions of the camera; those of the path's vertices follow from 8 on.
-enum CameraDimension : uint32_t { kFilterDimension, kLensDimension, kTimeDimension };
+enum CameraDimension : uint32_t { filter_dimension, lens_dimension, time_dimension };
 
 struct PathSample {
   V3f radiance;     // W/(sr m^2)
   float alpha = 1;  // less where the camera sees the background or a holdout
   V3f split{0.f};   // of what photons bring: GatheredLight
-};
-
-/// What a camera sample met, for the layers of a film.
-struct PathRecord {
-  std::vector<V3f> light;  // W/(sr m^2), what each group of lights gave; empty: not asked for
-  Hit first;               // the ground or object met first, if any
-  V3f position, normal;    // of it; normal to the side seen
-  float time = 0;          // in the shutter
-  V3f albedo;              // of the first diffuse surfaces, through water and glass
-  bool shaded = false;     // whether there was one on this branch
-  MatteRecord matte;
 };
 
 struct PathSettings {
@@ -51,7 +30,7 @@ struct PathSettings {
   Background background = Background::sky;
   RefractionAlpha refraction_alpha = RefractionAlpha::opaque;
   const PhotonMap* photons = nullptr;  // with it, paths leave out what lamps send through bodies
-  Walks walks = Walks::none;           // which find what the photons leave out
+  ManifoldWalks walks = ManifoldWalks::none;  // which find what the photons leave out
 };
 
 /// A camera sample to trace.
@@ -62,8 +41,8 @@ struct CameraSample {
   PathSample found;
 };
 
-/// Camera samples that are on their way at once.
-inline constexpr size_t kPathsAtOnce = 4;
+/// Camera samples that are traced at once.
+inline constexpr size_t paths_in_flight = 4;
 
 /// Traces that many samples or fewer; `rays` counts rays traced.
 using PathFunction = void (*)(const Scene&, const PathSettings&, std::span<CameraSample>,
@@ -72,4 +51,4 @@ using PathFunction = void (*)(const Scene&, const PathSettings&, std::span<Camer
 /// @param features  any of Feature, combined
 PathFunction path_function(unsigned features);
 
-}  // namespace drench
+}  // namespace drench::render

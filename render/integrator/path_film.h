@@ -8,7 +8,7 @@
 #include "render/integrator/path.h"
 #include "render/integrator/path_state.h"
 
-namespace drench {
+namespace drench::render {
 
 template <bool has_plate>
 class PathFilm {
@@ -25,15 +25,15 @@ class PathFilm {
 
   /// Whether a plate stands for what this path meets.
   bool sees_plate(const PathState& state) const {
-    return state.clear && dot(state.ray.direction, plate.view) > kMostBend;
+    return state.clear && dot(state.ray.direction, plate.view) > max_bend_cosine;
   }
 
   /// Ends the path on the plate.
   bool show_plate(const PathState& state) {
-    const V3f& share = state.throughput;
-    alpha_ -= (share.x + share.y + share.z) / 3;
+    const V3f& weight = state.throughput;
+    alpha_ -= (weight.x + weight.y + weight.z) / 3;
     if (!record_) return false;
-    record_->matte.background += share;
+    record_->matte.background += weight;
     record_->shaded = true;
     return false;
   }
@@ -73,7 +73,7 @@ class PathFilm {
     record_->shaded = true;
   }
 
-  /// The mirrored branch has an albedo of its own share.
+  /// The mirrored branch has an albedo of its own throughput.
   void begin_branch() {
     if constexpr (has_plate) plate.on_catcher = false;
     if (record_) record_->shaded = false;
@@ -98,7 +98,7 @@ class PathFilm {
   /// By how much one half of the photons adds more to that than the other.
   void split(const V3f& found) { split_ += found; }
 
-  [[no_unique_address]] std::conditional_t<has_plate, PlateWalk, std::monostate> plate;
+  [[no_unique_address]] std::conditional_t<has_plate, PlateState, std::monostate> plate;
 
  private:
   PathRecord* record_;
@@ -106,4 +106,4 @@ class PathFilm {
   float alpha_ = 1;
 };
 
-}  // namespace drench
+}  // namespace drench::render

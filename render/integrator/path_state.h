@@ -1,45 +1,46 @@
 #pragma once
-// A path on its way, for path.cpp.
+// The state of a path, for path.cpp.
 
 #include <array>
 
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Vertices before roulette may end a path: few are worth ending that may still leave the water for
-/// the sky (a start at 3 halves the efficiency, `./bench render_vs_cycles`). And the share that
-/// survives it at most on long specular paths: total reflection alone would go on for ever. It is
-/// high because the few that last would otherwise come out of a glass as bright dots.
-inline constexpr int kRouletteStart = 10, kLongPath = 64;
-inline constexpr float kLongSurvival = 0.99f;
+/// the sky (decision 0100). And the probability of survival at most on long specular paths: total
+/// reflection alone would go on for ever. It is high because the few that last would otherwise come
+/// out of a glass as bright dots.
+inline constexpr int roulette_start = 10, long_path = 64;
+inline constexpr float long_path_survival = 0.99f;
 
 /// What a camera sample's first interface mirrors is followed beside what it lets through, where it
 /// is less than this by roulette: water from above mirrors 2 %, of which one sample in twelve knows
-/// nearly as much as all (docs/benchmarks.md).
-inline constexpr float kSmallBranch = 0.25f;
+/// nearly as much as all (decision 0101).
+inline constexpr float small_branch = 0.25f;
 
-/// The share of a path's second and later diffuse vertices that gather photons: they are all over
-/// the scene, where each waits for memory, and light of light that a sample adds to many others.
-inline constexpr float kLaterGathers = 0.25f;
+/// The fraction of a path's second and later diffuse vertices that gather photons: they are all
+/// over the scene, where each waits for memory, and find indirect light that many samples add up
+/// (decision 0102).
+inline constexpr float later_gather_probability = 0.25f;
 
 /// Of a sample: more go round in a circle that rounding has closed, and would for ever.
-inline constexpr uint64_t kMostRays = 1u << 16;
+inline constexpr uint64_t max_rays = 1u << 16;
 
 /// Sampling dimensions after those of the camera: a block for every vertex of a branch.
 enum VertexDimension : uint32_t {
-  kLightChoice,
-  kLightPoint,
-  kScatterSide,
-  kScatterDirection,
-  kRoulette,
-  kVertexDimensions
+  light_choice,
+  light_point,
+  scatter_side,
+  scatter_direction,
+  roulette,
+  vertex_dimensions
 };
-inline constexpr uint32_t kFirstVertexDimension = 8, kBranchStride = 1u << 16;
+inline constexpr uint32_t first_vertex_dimension = 8, branch_stride = 1u << 16;
 /// The points of all of them but roulette's, of which it is rarely asked.
-using VertexNumbers = std::array<V2f, kRoulette>;
+using VertexNumbers = std::array<V2f, roulette>;
 /// One for every sheet with gaps, apart from those, so that gaps shift nothing.
-inline constexpr uint32_t kFirstGapDimension = 1u << 24;
+inline constexpr uint32_t first_gap_dimension = 1u << 24;
 
 /// Where a path stands: the ray about to be traced and what it carries.
 struct PathState {
@@ -59,24 +60,30 @@ struct PathState {
   bool dry_gap = false;
   int interfaces = 0;        // since the last diffuse surface
   bool has_photons = false;  // that surface, and nothing but smooth bodies since
-  bool clear = false;        // nothing but smooth bodies on the way, none of them a mirror
+  bool clear = false;        // nothing but smooth bodies on the path, none of them a mirror
   uint32_t branch = 0;
+
+  /// Of its next vertex.
+  uint32_t dimension(VertexDimension which) const {
+    return first_vertex_dimension + branch * branch_stride +
+           uint32_t(vertices) * vertex_dimensions + which;
+  }
 };
 
 /// Cosine of the most that smooth bodies may bend the view for a plate to stand for what is seen
-/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate is another
-/// place; drops show the sky there.
-inline constexpr float kMostBend = 0.9659258f;
+/// through them: 15 degrees, a third of a usual lens's picture. Farther away the plate shows
+/// something else; drops show the sky there.
+inline constexpr float max_bend_cosine = 0.9659258f;
 
 /// What a path must remember that may meet the plate.
-struct PlateWalk {
+struct PlateState {
   V3f view;                 // where the camera looks along this sample
   bool on_catcher = false;  // what is found comes from a shadow catcher
   bool caught = false;      // there was one:
-  PathState start;          // where the walk in the plate's world begins
+  PathState start;          // where the path in the plate's world begins
   Surface surface;
   Hit hit;
   World world = World::whole;  // now
 };
 
-}  // namespace drench
+}  // namespace drench::render

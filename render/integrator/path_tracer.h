@@ -1,5 +1,5 @@
 #pragma once
-// A path: one camera sample, traced ray by ray. For path.cpp, which has several on their way.
+// A path: one camera sample, traced ray by ray. For path.cpp, which has several in flight.
 //
 // Radiance inside water is carried divided by the squared index (basic radiance), which stays
 // constant through interfaces. So lights inside water are given as basic radiance, and a camera
@@ -14,31 +14,33 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/bsdf_metal.h"
 #include "render/bsdf/bsdf_rough.h"
-#include "render/bsdf/fabric.h"
 #include "render/integrator/guide.h"
 #include "render/integrator/manifold.h"
 #include "render/integrator/path_film.h"
+#include "render/scene/fabric.h"
 
-namespace drench {
+namespace drench::render {
 
 template <unsigned features>
 class PathTracer {
-  static constexpr bool kMoving = features & kMotionBlur;
-  static constexpr bool kWater = features & kDielectric;
-  static constexpr bool kLights = features & kSampledLights;
-  static constexpr bool kFacets = features & kGlossy;
-  static constexpr bool kPlate = features & kMattes;
+  static constexpr bool has_motion = features & Feature::motion_blur;
+  static constexpr bool has_water = features & Feature::dielectric;
+  static constexpr bool has_sampled_lights = features & Feature::sampled_lights;
+  static constexpr bool has_facets = features & Feature::glossy;
+  static constexpr bool has_plate = features & Feature::mattes;
+  static constexpr CameraMotion motion = has_motion ? CameraMotion::moving : CameraMotion::still;
+  static constexpr Lens lens = features & Feature::thin_lens ? Lens::thin : Lens::pinhole;
 
  public:
   PathTracer(const Scene& scene, const PathSettings& settings, const CameraSample& sample)
       : scene_(scene), settings_(settings), sampler_(sample.sampler), film_(sample.record) {
     const V2f& at = sample.film;
-    const float time = kMoving ? scene_.camera().time(sampler_.one(kTimeDimension), at) : 0.f;
-    const V2f lens = (features & kThinLens) ? sampler_.two(kLensDimension) : V2f(0);
-    state_.ray = scene_.camera().template ray<kMoving, (features & kThinLens) != 0>(at, lens, time);
+    const float time = has_motion ? scene_.camera().time(sampler_.one(time_dimension), at) : 0.f;
+    const V2f on_lens = lens == Lens::thin ? sampler_.two(lens_dimension) : V2f(0);
+    state_.ray = scene_.camera().template ray<motion, lens>(at, on_lens, time);
     state_.vertex = state_.ray.origin;
-    if (kWater) state_.in = settings_.camera_in;
-    if constexpr (kPlate) {
+    if (has_water) state_.in = settings_.camera_in;
+    if constexpr (has_plate) {
       state_.clear = true;
       film_.plate.view = state_.ray.direction;
     }
@@ -49,10 +51,10 @@ class PathTracer {
   PathSample sample() const { return film_.sample(); }
   uint64_t rays() const { return rays_; }
 
-  /// Traces the next ray, and then asks for what it met: others have their turn meanwhile.
+  /// Traces the next ray, and then asks for what it met: others are traced meanwhile.
   void find() {
     const Coherence coherence = state_.vertices == 0 ? Coherence::coherent : Coherence::incoherent;
-    // In its place: a copy of what is just being written would wait for it.
+    // Constructed in place: a copy of what is just being written would wait for it.
     new (&hit_) Hit(scene_.intersect(state_.ray, coherence, film_.world()));
     ++rays_;
     scene_.prefetch_triangle(hit_);
@@ -61,7 +63,7 @@ class PathTracer {
 
   /// Goes on from there.
   void shade() {
-    going_ = rays_ < kMostRays && meet(state_, hit_);
+    going_ = rays_ < max_rays && meet(state_, hit_);
     ++state_.vertices;
     while (!(going_ &= finite(state_.ray.direction + state_.ray.origin)))
       if (!(going_ = begin_next())) return;
@@ -70,32 +72,32 @@ class PathTracer {
  private:
   bool meet(PathState& state, const Hit& hit) {
     if (hit.kind == Hit::Kind::nothing || hit.kind == Hit::Kind::light) {
-      if constexpr (kWater)
+      if constexpr (has_water)
         if (hit.kind == Hit::Kind::light) absorb(state, hit.distance);
       add_emission(state, hit);
       return false;
     }
     const Surface surface = scene_.surface(state.ray, hit);
-    if (kWater && surface.contact && !enters_by_gap(state, surface)) {
+    if (has_water && surface.contact && !enters_by_gap(state, surface)) {
       pass_contact(state, surface, hit.distance);
       return true;
     }
-    if (kFacets && surface.material->gap > 0 && meets_gap(state, surface))
+    if (has_facets && surface.material->gap > 0 && meets_gap(state, surface))
       return pass_gap(state, surface, hit);
     return scatter(state, surface, hit) && survives(state);
   }
 
-  /// What is left to walk of the sample: the mirrored branch, or from the catcher on by the same
+  /// What is left to trace of the sample: the mirrored branch, or from the catcher on by the same
   /// numbers, in the plate's world.
   bool begin_next() {
-    if constexpr (kWater)
+    if constexpr (has_water)
       if (mirrored_) {
         state_ = *mirrored_;
         mirrored_.reset();
         film_.begin_branch();
         return true;
       }
-    if constexpr (kPlate)
+    if constexpr (has_plate)
       if (film_.plate.caught && film_.plate.world == World::whole) {
         film_.plate.world = World::plate;
         state_ = film_.plate.start;
@@ -108,8 +110,8 @@ class PathTracer {
   }
 
   bool scatter(PathState& state, const Surface& surface, const Hit& hit) {
-    if constexpr (kWater) {
-      // The side that was hit says for certain where the way leads on from. It led through the body
+    if constexpr (has_water) {
+      // The side that was hit says for certain where the path goes on from. It led through the body
       // only if the path had come in, too: a film that the shutter turns inside out is met from
       // within by rays from far away.
       const bool outwards = dot(state.ray.direction, surface.geometric_normal) > 0;
@@ -117,29 +119,29 @@ class PathTracer {
       absorb(state, hit.distance);
       if (outwards) state.in |= surface.body;
     }
-    if constexpr (kPlate)
+    if constexpr (has_plate)
       if (film_.sees_plate(state)) {
         const Matte matte = scene_.matte(hit);
         if (matte == Matte::holdout) return film_.show_plate(state);
         if (matte == Matte::shadow_catcher && film_.records())
           film_.start_catching(state, surface, hit, scene_.plate_bodies());
       }
-    if constexpr (kWater) {
+    if constexpr (has_water) {
       if (surface.body) {
         if (inside_higher_body(state, surface)) return true;
         film_.record_first(state, surface, hit);
         return scatter_interface(state, surface);
       }
     }
-    if constexpr (kPlate) state.clear = false;
+    if constexpr (has_plate) state.clear = false;
     film_.record_first(state, surface, hit);
     return scatter_surface(state, surface, hit);
   }
 
   bool scatter_surface(PathState& state, const Surface& surface, const Hit& hit) {
-    if constexpr (kLights)
+    if constexpr (has_sampled_lights)
       if (surface.light >= 0) add_own_light(state, surface, hit.distance);
-    if constexpr (kFacets) {
+    if constexpr (has_facets) {
       if (surface.material->type == MaterialType::metal) return scatter_metal(state, surface);
       if (surface.material->type == MaterialType::coated) return scatter_coated(state, surface);
       if (surface.material->type == MaterialType::cloth) {
@@ -168,13 +170,13 @@ class PathTracer {
   }
 
   bool meets_gap(PathState& state, const Surface& surface) const {
-    const uint32_t dimension = kFirstGapDimension + state.branch * kBranchStride + state.sheets++;
+    const uint32_t dimension = first_gap_dimension + state.branch * branch_stride + state.sheets++;
     return sampler_.one(dimension) < surface.material->gap;
   }
 
   /// Whether water that lies on a sheet is met through a gap: there it has a surface.
   static bool enters_by_gap(PathState& state, const Surface& surface) {
-    if (!kFacets || !state.dry_gap) return false;
+    if (!has_facets || !state.dry_gap) return false;
     if (!(dot(state.ray.direction, surface.geometric_normal) < 0)) return false;
     state.has_photons = false;  // no photon goes there
     return true;
@@ -184,7 +186,7 @@ class PathTracer {
   /// density of the direction stay. Where water ends at the sheet it has its surface in the gap.
   bool pass_gap(PathState& state, const Surface& surface, const Hit& hit) {
     const V3f& d = state.ray.direction;
-    if constexpr (kWater) {
+    if constexpr (has_water) {
       absorb(state, hit.distance);
       const bool in_fluid = scene_.in_fluid(state.in);
       if (in_fluid && !scene_.fluid_beyond({surface.leave(d), d, state.ray.time})) {
@@ -208,7 +210,7 @@ class PathTracer {
 
   /// From the vertex that a light would be sampled at.
   static float flown(const PathState& state, float distance) {
-    return kFacets ? state.before + distance : distance;
+    return has_facets ? state.before + distance : distance;
   }
 
   /// Straight on through what is no vertex: no light sample does, so light beyond counts whole.
@@ -242,13 +244,13 @@ class PathTracer {
 
   /// Whether photons bring what lamps send along this path.
   bool left_to_photons(const PathState& state) const {
-    return kWater && state.has_photons && state.interfaces > 0;
+    return has_water && state.has_photons && state.interfaces > 0;
   }
 
   void add_emission(const PathState& state, const Hit& hit) {
     const Lights& lights = scene_.lights();
     const V3f& direction = state.ray.direction;
-    if constexpr (kPlate)
+    if constexpr (has_plate)
       if (settings_.background == Background::clear && hit.kind == Hit::Kind::nothing &&
           film_.sees_plate(state)) {
         film_.show_plate(state);
@@ -258,7 +260,7 @@ class PathTracer {
     if (state.vertices > 0 || hit.kind == Hit::Kind::light) film_.record_albedo(state.survival);
     if (hit.kind == Hit::Kind::light) {
       if (left_to_photons(state)) return;
-      const float pdf = kLights && state.bsdf_pdf > 0
+      const float pdf = has_sampled_lights && state.bsdf_pdf > 0
                             ? lights.shape_pdf(int(hit.index), state.vertex, direction,
                                                flown(state, hit.distance))
                             : 0.f;
@@ -268,7 +270,7 @@ class PathTracer {
     } else {
       if (state.vertices == 0 && !lights.has_environment()) film_.show_nothing();
       lights.for_each_infinite(
-          state.vertex, direction, state.bsdf_pdf > 0,
+          state.vertex, direction, state.bsdf_pdf,
           left_to_photons(state) ? Lights::Suns::hidden : Lights::Suns::seen,
           [&](const V3f& radiance, float pdf, uint32_t group) {
             film_.deposit(state.throughput * radiance * emission_weight(state, pdf), group);
@@ -292,7 +294,7 @@ class PathTracer {
   /// Whether lights are sampled from a point in these bodies: light from outside reaches it only
   /// by refraction, which surface samples find.
   bool samples_lights(Bodies in) const {
-    return kLights && !(kWater && in && !scene_.lights_in_bodies());
+    return has_sampled_lights && !(has_water && in && !scene_.lights_in_bodies());
   }
 
   /// Continues the path along `direction` from the surface.
@@ -305,9 +307,10 @@ class PathTracer {
 
   bool scatter_interface(PathState& state, const Surface& surface) {
     const V3f d = state.ray.direction;
-    if constexpr (kPlate) state.clear &= settings_.refraction_alpha == RefractionAlpha::transparent;
+    if constexpr (has_plate)
+      state.clear &= settings_.refraction_alpha == RefractionAlpha::transparent;
     const float eta = scene_.medium(state.in ^ surface.body).ior / scene_.medium(state.in).ior;
-    if constexpr (kFacets)
+    if constexpr (has_facets)
       if (surface.material->alpha > 0) {
         state.has_photons = state.clear = false;  // photons pass smooth bodies only
         const AlbedoTable* albedo = scene_.interface_albedo(surface, state.in);
@@ -322,11 +325,11 @@ class PathTracer {
     ++state.interfaces;
     // Only mirrors that are within a body which the path has entered.
     const bool clear_mirror =
-        kPlate && state.clear && (state.in & ~settings_.camera_in & surface.body) != 0;
+        has_plate && state.clear && (state.in & ~settings_.camera_in & surface.body) != 0;
     bool reflect = split.reflectance >= 1;
     if (!reflect && settings_.first_interface == FirstInterface::both && state.vertices == 0) {
-      const float follow = std::min(split.reflectance / kSmallBranch, 1.f);
-      if (follow == 1 || number(state, kRoulette) < follow) {
+      const float follow = std::min(split.reflectance / small_branch, 1.f);
+      if (follow == 1 || number(state, roulette) < follow) {
         mirrored_ = state;
         mirrored_->throughput *= split.reflectance / follow;
         mirrored_->survival *= split.reflectance / follow;
@@ -338,7 +341,7 @@ class PathTracer {
       state.throughput *= 1 - split.reflectance;
       state.survival *= 1 - split.reflectance;
     } else if (!reflect) {
-      reflect = number(state, kScatterSide) < split.reflectance;
+      reflect = number(state, scatter_side) < split.reflectance;
     }
     depart(state, surface, reflect ? split.reflected : split.refracted);
     if (reflect) state.clear = clear_mirror;
@@ -354,7 +357,7 @@ class PathTracer {
     film_.record_albedo(state.survival);
     const VertexNumbers u = numbers(state);
     add_direct(state, surface, beyond, u, bsdf);
-    const Scatter next = bsdf.sample(u[kScatterDirection], u[kScatterSide].x);
+    const Scatter next = bsdf.sample(u[scatter_direction], u[scatter_side].x);
     return follow(state, surface, next, bsdf.through(next.direction) ? beyond : state.in);
   }
 
@@ -369,7 +372,7 @@ class PathTracer {
     add_direct(state, surface, state.in, u, bsdf);
     state.survival *= bsdf.albedo();
     if (material.alpha > 0) film_.record_albedo(state.survival);  // else it shows other things
-    return follow(state, surface, bsdf.sample(u[kScatterDirection]), state.in);
+    return follow(state, surface, bsdf.sample(u[scatter_direction]), state.in);
   }
 
   /// One lobe is followed; lights are sampled for both, and photons gathered by the diffuse one.
@@ -387,12 +390,12 @@ class PathTracer {
     const VertexNumbers u = numbers(state);
     if (photons) add_caustics(state, surface, u, base);
     add_direct(state, surface, state.in, u, coat, base);
-    const bool follow_coat = u[kScatterSide].x < bsdf.coat_share();
+    const bool follow_coat = u[scatter_side].x < bsdf.coat_probability();
     state.interfaces = 0;
     state.has_photons = photons && !follow_coat;
     state.survival *= bsdf.albedo();
     film_.record_albedo(state.survival);
-    const V2f& to = u[kScatterDirection];
+    const V2f& to = u[scatter_direction];
     return follow(state, surface, follow_coat ? coat.sample(to) : base.sample(to), state.in);
   }
 
@@ -435,11 +438,11 @@ class PathTracer {
     const VertexNumbers u = numbers(state);
     if (photons) add_caustics(state, surface, u, bsdf.soft());
     add_direct(state, surface, state.in, u, bsdf.soft(), bsdf.glints());
-    const bool glint = u[kScatterSide].x < bsdf.glint_share();
+    const bool glint = u[scatter_side].x < bsdf.glint_probability();
     state.interfaces = 0;
     state.has_photons = photons && !glint;
     state.survival *= bsdf.albedo();
-    const V2f& to = u[kScatterDirection];
+    const V2f& to = u[scatter_direction];
     return follow_from_sheet(state, surface,
                              glint ? bsdf.glints().sample(to) : bsdf.soft().sample(to));
   }
@@ -450,7 +453,7 @@ class PathTracer {
     const bool sample_lights = samples_lights(state.in);
     // What goes through a sheet leaves the water on this side; contact on the other says if it
     // enters some there.
-    if constexpr (kWater)
+    if constexpr (has_water)
       if (!surface.passes_over(next.direction) &&
           dot(next.direction, surface.geometric_normal) *
                   dot(state.ray.direction, surface.geometric_normal) >
@@ -466,8 +469,8 @@ class PathTracer {
   /// density is the surface's own in either case: light samples are weighed against that one.
   Scatter sample_scatter(const PathState& state, const Surface& surface, const VertexNumbers& u,
                          const ClothBsdf& bsdf) const {
-    const V2f& uv = u[kScatterDirection];
-    if constexpr (!kWater) return bsdf.sample(uv);
+    const V2f& uv = u[scatter_direction];
+    if constexpr (!has_water) return bsdf.sample(uv);
     if (state.in != scene_.fluid() || state.in == 0 ||
         (state.has_photons && scene_.lights().meshes().empty()) ||
         settings_.water_guide == WaterGuide::off)
@@ -475,45 +478,45 @@ class PathTracer {
     using Aim = RefractedLightGuide::Aim;
     const RefractedLightGuide guide(scene_.lights(), scene_.medium(state.in).ior,
                                     state.has_photons ? Aim::meshes : Aim::all);
-    const float share = guide.share(surface.position);
-    if (share == 0) return bsdf.sample(uv);
-    return sample_mixed(bsdf, guide, share, surface.position, u[kScatterSide].x, uv);
+    const float probability = guide.probability(surface.position);
+    if (probability == 0) return bsdf.sample(uv);
+    return sample_mixed(bsdf, guide, probability, surface.position, u[scatter_side].x, uv);
   }
 
   bool gathers_photons(const Surface& surface) const {
-    return kWater && settings_.photons && !surface.small && film_.world() == World::whole;
+    return has_water && settings_.photons && !surface.small && film_.world() == World::whole;
   }
 
   template <class Bsdf>
   void add_caustics(const PathState& state, const Surface& surface, const VertexNumbers& u,
                     const Bsdf& bsdf) {
-    const float gathers = state.diffuse > 1 ? kLaterGathers : 1.f;
-    if (!(u[kLightChoice].y < gathers)) return;
+    const float gathers = state.diffuse > 1 ? later_gather_probability : 1.f;
+    if (!(u[light_choice].y < gathers)) return;
     GatheredLight light;
     const V3f &at = surface.position, &normal = surface.geometric_normal;
-    const unsigned hand = settings_.photons->hand_at(sampler_.one(kTimeDimension));
+    const unsigned subset = settings_.photons->subset_at(sampler_.one(time_dimension));
     if constexpr (std::is_same_v<Bsdf, ClothBsdf>)
-      light = settings_.photons->irradiance(hand, at, normal, bsdf.front());
+      light = settings_.photons->irradiance(subset, at, normal, bsdf.front());
     else
       settings_.photons->for_each_near(
-          hand, at, normal, [&](const V3f& flight, const V3f& power, float share, float half) {
+          subset, at, normal, [&](const V3f& flight, const V3f& power, float weight, float half) {
             Irradiance one;
-            bsdf.receive(one, -flight, power * share);
+            bsdf.receive(one, -flight, power * weight);
             light.all.add(one, 1);
             light.split.add(one, half);
           });
     film_.split(state.throughput * bsdf.radiance(light.split) * (1 / gathers));
     V3f found = bsdf.radiance(light.all);
-    if (settings_.walks == Walks::some) found += walked_light(state, surface, u, bsdf);
+    if (settings_.walks == ManifoldWalks::some) found += manifold_light(state, surface, u, bsdf);
     film_.deposit(state.throughput * found * (1 / gathers), scene_.lights().caustics_group());
   }
 
-  /// What comes from a lamp by the way that a walk finds.
+  /// What comes from a lamp by the path that a manifold walk finds.
   template <class Bsdf>
-  V3f walked_light(const PathState& state, const Surface& surface, const VertexNumbers& u,
-                   const Bsdf& bsdf) {
-    const auto light = walk_to_lamps(scene_, surface, state.ray, state.in, u[kLightChoice].x,
-                                     u[kLightPoint], rays_);
+  V3f manifold_light(const PathState& state, const Surface& surface, const VertexNumbers& u,
+                     const Bsdf& bsdf) {
+    const auto light = sample_manifold(scene_, surface, state.ray, state.in, u[light_choice].x,
+                                       u[light_point], rays_);
     float pdf = 0;
     const V3f found = light ? bsdf.value(light->direction, pdf) * light->radiance : V3f(0);
     return finite(found) ? found : V3f(0);
@@ -526,11 +529,11 @@ class PathTracer {
     if (settings_.estimator == Estimator::bsdf_only) return;
     if (!samples_lights(state.in) && !samples_lights(beyond)) return;
     const LightSample light =
-        scene_.lights().sample(surface.position, state.ray.time, u[kLightChoice].x, u[kLightPoint]);
+        scene_.lights().sample(surface.position, state.ray.time, u[light_choice].x, u[light_point]);
     if (!(light.pdf > 0)) return;
     if (film_.world() == World::plate && !scene_.in_plate(light)) return;
     Bodies in = state.in;
-    if constexpr (kFacets) {
+    if constexpr (has_facets) {
       const V3f& n = surface.geometric_normal;
       if (dot(light.direction, n) * dot(state.ray.direction, n) > 0) in = beyond;
       if (!samples_lights(in)) return;
@@ -550,13 +553,13 @@ class PathTracer {
     surface.send(shadow, light.direction);
     shadow.time = state.ray.time;
     ++rays_;
-    if constexpr (kFacets) {
+    if constexpr (has_facets) {
       found *= scene_.transmitted(shadow, {light.distance, light.lamp}, film_.world());
       if (is_black(found)) return;
     } else if (scene_.occluded(shadow, {light.distance, light.lamp}, film_.world())) {
       return;
     }
-    if constexpr (kWater)
+    if constexpr (has_water)
       if (in && std::isfinite(light.distance)) {
         const V3f& a = scene_.medium(in).absorption;
         for (int c = 0; c < 3; ++c) found[c] *= std::exp(-a[c] * light.distance);
@@ -565,31 +568,27 @@ class PathTracer {
   }
 
   bool survives(PathState& state) {
-    if (state.vertices < kRouletteStart) return true;
+    if (state.vertices < roulette_start) return true;
     float keep = std::min(largest(state.survival), 1.f);
-    if (state.vertices >= kLongPath) keep = std::min(keep, kLongSurvival);
+    if (state.vertices >= long_path) keep = std::min(keep, long_path_survival);
     if (keep >= 1) return true;
-    if (!(number(state, kRoulette) < keep)) return false;
+    if (!(number(state, roulette) < keep)) return false;
     state.throughput *= 1 / keep;
     state.survival *= 1 / keep;
     return true;
   }
 
-  uint32_t dimension(const PathState& state, VertexDimension which) const {
-    return kFirstVertexDimension + state.branch * kBranchStride +
-           uint32_t(state.vertices) * kVertexDimensions + which;
-  }
   float number(const PathState& state, VertexDimension which) const {
-    return sampler_.one(dimension(state, which));
+    return sampler_.one(state.dimension(which));
   }
   VertexNumbers numbers(const PathState& state) const {
-    return sampler_.four(dimension(state, kLightChoice));
+    return sampler_.four(state.dimension(light_choice));
   }
 
   const Scene& scene_;
   const PathSettings& settings_;
   const Sampler& sampler_;
-  PathFilm<kPlate> film_;
+  PathFilm<has_plate> film_;
   PathState state_;
   std::optional<PathState> mirrored_;  // the other branch of the first interface
   Hit hit_;
@@ -597,4 +596,4 @@ class PathTracer {
   bool going_ = false;
 };
 
-}  // namespace drench
+}  // namespace drench::render

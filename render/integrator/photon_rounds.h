@@ -11,7 +11,7 @@
 #include "render/integrator/photons.h"
 #include "render/options.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The rounds of a pass over the picture (SamplePlan).
 class PhotonRounds {
@@ -22,8 +22,8 @@ class PhotonRounds {
   PhotonRounds(double photons, double most_photons, int samples);
 
   /// Rounds begin that the samples of this pass have brought, or the last one goes on.
-  /// @param share  of all samples that there will be after it
-  void begin_pass(double share);
+  /// @param fraction  of all samples that there will be after it
+  void begin_pass(double fraction);
   void archive(CheckpointArchive& file);
   int first() const { return first_; }
   int end() const { return end_; }
@@ -41,14 +41,15 @@ class PhotonRounds {
       0;  // sum over rounds of the squared radius of their pass, where that of one is 1
 };
 
-/// The photons of the round at hand.
+/// The photons of the current round.
 class FramePhotons {
  public:
-  FramePhotons(const Scene& scene, const RenderSettings& settings, Walks walks, uint32_t seed);
+  FramePhotons(const Scene& scene, const RenderSettings& settings, ManifoldWalks walks,
+               uint32_t seed);
 
   /// Traces the photons of a round, where they are not there.
   /// @param rays  counts rays traced
-  void turn_to(int round, const PhotonRounds& rounds, uint64_t& rays);
+  void trace_round(int round, const PhotonRounds& rounds, uint64_t& rays);
   /// Whether the frame has any.
   bool any() const { return any_; }
   PhotonRounds rounds(const RenderSettings& settings, double most_photons) const;
@@ -58,9 +59,9 @@ class FramePhotons {
   const Scene& scene_;
   bool any_;
   int samples_, round_ = -1;
-  Walks walks_;
+  ManifoldWalks walks_;
   uint32_t seed_;
   Caustics caustics_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

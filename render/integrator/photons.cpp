@@ -8,40 +8,43 @@
 
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/integrator/manifold.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/embree.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Sampling dimensions of a photon; each interface takes two.
-enum PhotonDimension : uint32_t {
-  kStart,  // within its stretch of the area
-  kStartPoint,
-  kLamp,
-  kLampPoint,
-  kTime,
-  kInterfaces,
-  kRow = kInterfaces,  // free: interfaces count from 1
-  kFirstGap = 1u << 16
+struct PhotonDimension {
+  enum : uint32_t {
+    start,  // within its stretch of the area
+    start_point,
+    lamp,
+    lamp_point,
+    time,
+    interfaces,
+    row = interfaces,  // free: interfaces count from 1
+    first_gap = 1u << 16
+  };
 };
-constexpr int kMostInterfaces = 64, kLongFlight = 8;
-constexpr float kLongSurvival = 0.8f;
-constexpr int kMostMet = 1 << 12;   // contact faces and gaps that it passes one after the other
-constexpr float kMostPower = 2;     // of one that falls straight on a body, where discs hold few
-constexpr double kDotShare = 0.1;   // of a disc's light that one may bring where they hold many
-constexpr float kCrowd = 4;         // times the photons of the median one's disc
-constexpr uint32_t kFewest = 400;   // photons of a crowded cell: noise above blur
-constexpr unsigned kMostHands = 3;  // log2: any eight samples in a row see all photons
-// Rounds after which hands are twice as many, log2: time is divided ever finer, and noise still
+constexpr int max_interfaces = 64, long_flight = 8;
+constexpr float long_flight_survival = 0.8f;
+constexpr int max_crossings = 1 << 12;  // contact faces and gaps that it passes one after the other
+constexpr float max_power = 2;  // of one that falls straight on a body, where discs hold few
+/// Of a disc's light that one may bring where they hold many.
+constexpr double max_disc_fraction = 0.1;
+constexpr float crowd_factor = 4;         // times the photons of the median one's disc
+constexpr uint32_t min_crowd = 400;       // photons of a crowded cell: noise above blur
+constexpr unsigned max_subsets_log2 = 3;  // log2: any eight samples in a row see all photons
+// Rounds after which subsets are twice as many, log2: time is divided ever finer, and noise still
 // falls where eight samples in a row then miss photons of a round.
-constexpr unsigned kMoreHands = 4;
-constexpr double kHand = 4;  // photons of the median one's disc in a hand, at least
-// Share of the light that walks must find to be taken: each costs a path four rays, and where much
-// is left to photons the error is theirs (render_walks).
-constexpr double kCalm = 0.8;
-constexpr uint32_t kSeed = 0x70686f74u;  // photons and camera paths draw apart
+constexpr unsigned rounds_per_doubling_log2 = 4;
+constexpr double min_subset_photons = 4;  // photons of the median one's disc in a subset, at least
+// Fraction of the light that walks must find to be taken: each costs a path four rays, and where
+// much is left to photons the error is theirs (decision 0103).
+constexpr double calm_fraction = 0.8;
+constexpr uint32_t photon_seed = 0x70686f74u;  // photons and camera paths draw apart
 
 /// Photons that the disc around the median one shall hold: 20 of 1e5, and more of more.
 double wanted_count(double photons) { return 20 * std::sqrt(photons / 1e5); }
@@ -65,7 +68,7 @@ class InterfacePoints {
   /// m^2, at shutter open
   float area() const { return upto_.empty() ? 0.f : float(upto_.back()); }
 
-  /// The triangle at a share of the area.
+  /// The triangle at a fraction of the area.
   size_t triangle_at(double u) const {
     const auto found = std::upper_bound(upto_.begin(), upto_.end(), u * upto_.back());
     return std::min(size_t(found - upto_.begin()), upto_.size() - 1);
@@ -74,7 +77,7 @@ class InterfacePoints {
     Hit hit;
     float area_ratio;  // of the triangle at this time over shutter open
   };
-  /// @param u     share of the area
+  /// @param u     fraction of the area
   /// @param from  where the search begins: no triangle behind that of u. Becomes that of u
   Start sample(double u, const V2f& uv, float time, size_t& from) const {
     while (from + 1 < upto_.size() && upto_[from] <= u * upto_.back()) ++from;
@@ -84,7 +87,11 @@ class InterfacePoints {
     const SceneObject& body = scene_.object(index);
     const float root = std::sqrt(uv.x);  // uniform on the triangle
     const float at_open = area_of(body, triangle, 0);
-    return {{Hit::Kind::object, 0, index, uint32_t(triangle), root * (1 - uv.y), root * uv.y},
+    return {{.kind = Hit::Kind::object,
+             .index = index,
+             .triangle = uint32_t(triangle),
+             .u = root * (1 - uv.y),
+             .v = root * uv.y},
             at_open > 0 ? area_of(body, triangle, time) / at_open : 0.f};
   }
 
@@ -108,23 +115,23 @@ struct Flight {
   uint32_t gaps = 0;    // and gaps that it fell through
   int lamp = 0;
   V3f start, lit_from;  // where it met the body, and from which direction
-  float most_gain = 0;  // of flux, that smooth normals in place of the real ones may still add
+  float most_gain = 0;  // of flux, that smooth normals instead of the real ones may still add
 };
 
 class PhotonTracer {
  public:
   PhotonTracer(const Scene& scene, const InterfacePoints& starts, uint32_t count, int rounds,
-               Walks walks)
+               ManifoldWalks walks)
       : scene_(scene),
         starts_(starts),
         count_(count),
         walks_(walks),
-        most_power_(std::max(kMostPower, float(kDotShare * wanted_count(double(count) * rounds)))) {
-  }
+        most_power_(
+            std::max(max_power, float(max_disc_fraction * wanted_count(double(count) * rounds)))) {}
 
   enum class Fate { lost, lies, walked };
 
-  /// A photon, if it starts and comes to lie on something, and whether a walk finds its way. In
+  /// A photon, if it starts and comes to lie on something, and whether a walk finds its path. In
   /// their order they start along the bodies' surface: an even spread, and neighbours in memory one
   /// after the other.
   /// @param from  triangle of the photon before, or one before that of this
@@ -143,7 +150,7 @@ class PhotonTracer {
       // Those that fell through gaps are missing on the yarns, which get what others do.
       const float yarns = 1 - surface.material->gap;
       photon = {surface.position, flight.ray.direction, surface.geometric_normal,
-                flight.power * (1 / (n * n * yarns)), sampler.one(kTime)};
+                flight.power * (1 / (n * n * yarns)), sampler.one(PhotonDimension::time)};
       if (!finite(photon.power)) return Fate::lost;
       return is_walked(flight, surface, rays) ? Fate::walked : Fate::lies;
     }
@@ -155,42 +162,45 @@ class PhotonTracer {
   bool start(uint32_t number, const Sampler& sampler, size_t& from, Flight& flight,
              Surface& surface, uint64_t& rays) const {
     const ShutterCurve& curve = scene_.camera().curve();
-    flight.ray.time = curve.time(sampler.one(kTime), curve.rolls() ? sampler.one(kRow) : 0.f);
-    const auto [hit, area_ratio] = starts_.sample((number + double(sampler.one(kStart))) / count_,
-                                                  sampler.two(kStartPoint), flight.ray.time, from);
+    flight.ray.time = curve.time(sampler.one(PhotonDimension::time),
+                                 curve.rolls() ? sampler.one(PhotonDimension::row) : 0.f);
+    const auto [hit, area_ratio] =
+        starts_.sample((number + double(sampler.one(PhotonDimension::start))) / count_,
+                       sampler.two(PhotonDimension::start_point), flight.ray.time, from);
     surface = scene_.surface(flight.ray, hit);
     const LightSample light =
-        scene_.lights().sample_lamps(surface.position, sampler.one(kLamp), sampler.two(kLampPoint));
+        scene_.lights().sample_lamps(surface.position, sampler.one(PhotonDimension::lamp),
+                                     sampler.two(PhotonDimension::lamp_point));
     const float facing = dot(light.direction, surface.geometric_normal);
     if (!(light.pdf > 0) || !(facing > 0)) return false;
     ++rays;
-    const float share =
+    const float transmittance =
         scene_.transmitted({surface.leave(light.direction), light.direction, flight.ray.time},
                            {light.distance, light.lamp});
-    if (share == 0) return false;
+    if (transmittance == 0) return false;
     flight.ray.direction = -light.direction;
     flight.most_gain = most_power_ / facing;
     flight.lamp = light.lamp, flight.start = surface.position, flight.lit_from = light.direction;
-    flight.power = light.radiance *
-                   (share * facing * area_ratio * starts_.area() / (light.pdf * float(count_)));
+    flight.power = light.radiance * (transmittance * facing * area_ratio * starts_.area() /
+                                     (light.pdf * float(count_)));
     return true;
   }
 
   bool is_walked(const Flight& flight, const Surface& surface, uint64_t& rays) const {
-    if (walks_ == Walks::none || flight.interfaces > 1 || flight.gaps > 0) return false;
+    if (walks_ == ManifoldWalks::none || flight.interfaces > 1 || flight.gaps > 0) return false;
     if (!std::has_single_bit(flight.in)) return false;
     const LampPoint lamp = scene_.lights().lamp_point_of(size_t(flight.lamp), surface.position,
                                                          flight.start, flight.lit_from);
-    return walk_finds(scene_, surface, flight.ray.time, flight.in, lamp, flight.ray.direction,
-                      rays);
+    return manifold_walk_finds(scene_, surface, flight.ray.time, flight.in, lamp,
+                               flight.ray.direction, rays);
   }
 
   /// Reflects or refracts at a body's surface. Snell's law keeps n^2 cos dw about the normal
   /// that bends the light; flux through the real surface has the cosine with that one's, so where
-  /// the two differ it takes the ratio, and photons carry what paths find the other way.
+  /// the two differ it takes the ratio, and photons carry what paths find in reverse.
   bool cross_interface(const Sampler& sampler, Flight& flight, const Surface& surface) const {
-    if (++flight.interfaces > kMostInterfaces) return false;
-    const uint32_t dimension = kInterfaces + 2 * uint32_t(flight.interfaces);
+    if (++flight.interfaces > max_interfaces) return false;
+    const uint32_t dimension = PhotonDimension::interfaces + 2 * uint32_t(flight.interfaces);
     const V3f d = flight.ray.direction;
     const Medium &before = scene_.medium(flight.in),
                  &after = scene_.medium(flight.in ^ surface.body);
@@ -223,9 +233,9 @@ class PhotonTracer {
     }
     flight.power *= gain;
     flight.most_gain /= gain;
-    if (flight.interfaces > kLongFlight) {
-      if (!(sampler.one(dimension + 1) < kLongSurvival)) return false;
-      flight.power *= 1 / kLongSurvival;
+    if (flight.interfaces > long_flight) {
+      if (!(sampler.one(dimension + 1) < long_flight_survival)) return false;
+      flight.power *= 1 / long_flight_survival;
     }
     if (!reflect) flight.in ^= surface.body;
     flight.ray.origin = surface.leave(out);
@@ -237,7 +247,7 @@ class PhotonTracer {
   /// it falls through. Where water has a surface in their gaps paths keep what comes through.
   Hit next(const Sampler& sampler, Flight& flight, Surface& surface, uint64_t& rays) const {
     bool dry_gap = false;
-    for (int met = 0; met < kMostMet; ++met) {
+    for (int met = 0; met < max_crossings; ++met) {
       const Hit hit = scene_.intersect(flight.ray, Coherence::incoherent);
       ++rays;
       if (hit.kind != Hit::Kind::ground && hit.kind != Hit::Kind::object) return hit;
@@ -247,7 +257,7 @@ class PhotonTracer {
       absorb(flight, hit.distance);  // as paths do
       if (outwards) flight.in |= surface.body;
       const float gap = surface.material->gap;
-      if (gap > 0 && sampler.one(kFirstGap + flight.sheets++) < gap) {
+      if (gap > 0 && sampler.one(PhotonDimension::first_gap + flight.sheets++) < gap) {
         ++flight.gaps;
         flight.ray.origin = surface.leave(flight.ray.direction);
         dry_gap = !scene_.in_fluid(flight.in);
@@ -271,7 +281,7 @@ class PhotonTracer {
   const Scene& scene_;
   const InterfacePoints& starts_;
   uint32_t count_;
-  Walks walks_;
+  ManifoldWalks walks_;
   float most_power_;
 };
 
@@ -311,7 +321,7 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
   for (int round = 0; round < 4; ++round) {
     const float edge = 2 * radius;
     const double density = typical_count(photons, edge) / (double(edge) * edge);
-    radius = float(std::sqrt(wanted / (double(kPi) * density)));
+    radius = float(std::sqrt(wanted / (double(pi) * density)));
     radius = std::clamp(radius, least, std::max(least, diagonal / 10));
   }
   return radius;
@@ -326,15 +336,16 @@ PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, int rounds) {
   radius_ = choose_radius(photons, reach_) / std::sqrt(std::sqrt(float(rounds)));
   reach_.min -= V3f(2 * radius_), reach_.max += V3f(2 * radius_);
   inverse_edge_ = 1 / (2 * radius_);
-  const unsigned most_hands =
-      kMostHands + unsigned(std::bit_width(unsigned(rounds)) - 1) / kMoreHands;
+  const unsigned max_log2 =
+      max_subsets_log2 + unsigned(std::bit_width(unsigned(rounds)) - 1) / rounds_per_doubling_log2;
   const double wanted = wanted_count(double(size_) * rounds);
-  while (hands_log2_ < most_hands && int(2 * hands()) <= samples && wanted >= kHand * 2 * hands())
-    ++hands_log2_;
+  while (subsets_log2_ < max_log2 && int(2 * subsets()) <= samples &&
+         wanted >= min_subset_photons * 2 * subsets())
+    ++subsets_log2_;
   mask_ = 63;  // the least with which neighbouring rows stay apart
-  while ((size_t{mask_} + 1) * hands() < size_) mask_ = 2 * mask_ + 1;
+  while ((size_t{mask_} + 1) * subsets() < size_) mask_ = 2 * mask_ + 1;
   choose_radii(photons, rounds);
-  deal(photons);
+  sort_into_buckets(photons);
 }
 
 void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
@@ -342,25 +353,25 @@ void PhotonMap::choose_radii(const std::vector<Photon>& photons, int rounds) {
   for (const Photon& p : photons) ++count[bucket_of(cell_of(p.position))];
   const double wanted = wanted_count(double(size_) * rounds) / rounds;
   const uint32_t crowd =
-      std::max({1u, kFewest / uint32_t(rounds), uint32_t(kCrowd * 4 / kPi * wanted)});
+      std::max({1u, min_crowd / uint32_t(rounds), uint32_t(crowd_factor * 4 / pi * wanted)});
   for (const uint32_t c : count)
     radius2_.push_back(radius_ * radius_ * (c > crowd ? float(crowd) / float(c) : 1.f));
 }
 
-void PhotonMap::deal(const std::vector<Photon>& photons) {
+void PhotonMap::sort_into_buckets(const std::vector<Photon>& photons) {
   const auto bucket = [&](size_t k) {
-    return hand_at(photons[k].turn) * buckets() + bucket_of(cell_of(photons[k].position));
+    return subset_at(photons[k].time_sample) * buckets() + bucket_of(cell_of(photons[k].position));
   };
-  first_.assign(hands() * buckets() + 1, 0);
+  first_.assign(subsets() * buckets() + 1, 0);
   for (size_t k = 0; k < size_; ++k) ++first_[bucket(k) + 1];
   for (size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
   std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
   pack_.resize((size_ + 7) / 8);
   for (size_t j = 0; j < size_; ++j) {
     const Photon& p = photons[j];
-    const V3f power = p.power * float(hands());
-    const uint32_t place = next[bucket(j)]++, k = place % 8;
-    PhotonPack& pack = pack_[place / 8];
+    const V3f power = p.power * float(subsets());
+    const uint32_t slot = next[bucket(j)]++, k = slot % 8;
+    PhotonPack& pack = pack_[slot / 8];
     pack.x[k] = p.position.x, pack.y[k] = p.position.y, pack.z[k] = p.position.z;
     pack.red[k] = power.x, pack.green[k] = power.y, pack.blue[k] = power.z;
     pack.normal[k] = pack_unit(p.normal);
@@ -368,17 +379,17 @@ void PhotonMap::deal(const std::vector<Photon>& photons) {
   }
 }
 
-GatheredLight PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& normal,
+GatheredLight PhotonMap::irradiance(unsigned subset, const V3f& point, const V3f& normal,
                                     const V3f& front) const {
   __m256 sum[2][3] = {};
-  for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
+  for_each_pack_near(subset, point, normal, [&](const PhotonPack& p, __m256 weight) {
     const __m256 along = unpack_unit<0>(p.flight) * front.x + unpack_unit<1>(p.flight) * front.y +
                          unpack_unit<2>(p.flight) * front.z;
     const __m256 there = _mm256_cmp_ps(along, _mm256_setzero_ps(), _CMP_LT_OQ);
-    const __m256 shares[2] = {_mm256_and_ps(there, share), _mm256_andnot_ps(there, share)};
+    const __m256 weights[2] = {_mm256_and_ps(there, weight), _mm256_andnot_ps(there, weight)};
     const std::array<float, 8>* const power[3] = {&p.red, &p.green, &p.blue};
     for (int side = 0; side < 2; ++side)
-      for (int c = 0; c < 3; ++c) sum[side][c] += shares[side] * _mm256_load_ps(power[c]->data());
+      for (int c = 0; c < 3; ++c) sum[side][c] += weights[side] * _mm256_load_ps(power[c]->data());
   });
   const auto total = [&](int side, const auto& factor) {
     V3f out(0);
@@ -387,7 +398,7 @@ GatheredLight PhotonMap::irradiance(unsigned hand, const V3f& point, const V3f& 
     return out;
   };
   const auto all = [](int) { return 1.f; };
-  const auto half = [](int k) { return kHalf[k]; };
+  const auto half = [](int k) { return half_sign[k]; };
   return {{total(0, all), total(1, all)}, {total(0, half), total(1, half)}};
 }
 
@@ -395,13 +406,13 @@ bool can_trace_photons(const Scene& scene) {
   return !scene.bodies().empty() && scene.lights().lamps() > 0 && !scene.lamps_in_bodies();
 }
 
-Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
-                       uint64_t& rays, const PhotonRound& round) {
+Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
+                       ManifoldWalks walks, uint64_t& rays, const PhotonRound& round) {
   constexpr uint32_t chunk = 4096;
   const InterfacePoints starts(scene);
   if (!(starts.area() > 0)) return {};
   const uint32_t index = uint32_t(round.index), slot = index & ((1u << round.slots_log2) - 1);
-  const uint32_t round_seed = seed ^ kSeed ^ hash_bits(index >> round.slots_log2);
+  const uint32_t round_seed = seed ^ photon_seed ^ hash_bits(index >> round.slots_log2);
   const PhotonTracer tracer(scene, starts, count, round.rounds, walks);
   struct Found {
     Photon photon;
@@ -434,14 +445,15 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
     }
   Caustics out;
   if (light > 0) out.walked = float(walked / light);
-  if (walks == Walks::if_calm) walks = out.walked > kCalm ? Walks::some : Walks::none;
+  if (walks == ManifoldWalks::if_calm)
+    walks = out.walked > calm_fraction ? ManifoldWalks::some : ManifoldWalks::none;
   out.walks = walks;
   std::vector<Photon> left;
   for (const std::vector<Found>& part : found)
     for (const Found& f : part)
-      if (walks == Walks::none || !f.walked) left.push_back(f.photon);
+      if (walks == ManifoldWalks::none || !f.walked) left.push_back(f.photon);
   out.photons = PhotonMap(std::move(left), samples, round.rounds);
   return out;
 }
 
-}  // namespace drench
+}  // namespace drench::render

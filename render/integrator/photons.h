@@ -5,14 +5,14 @@
 //
 // A photon starts at a point of a smooth body's surface that a lamp reaches unhindered, so that
 // none misses the body, goes on through it and lies where it first meets a diffuse surface; rough
-// bodies and metal end it, and paths keep what they find by way of those. Of N photons the map's
+// bodies and metal end it, and paths keep what they find over those. Of N photons the map's
 // radius falls as N^(-1/4) and the number within it grows as N^(1/2), so that both its blur, as
 // N^(-1/2), and its noise, as N^(-1/4), vanish.
 //
-// Where a disc holds many, no sample needs to see them all: they are dealt out to the samples of a
-// pixel, each of which finds its own hand, a map of its own with as much light. Together they see
-// what each would have seen, at a fraction of the cost. They are dealt by their time in the
-// shutter, so that a sample of what moves finds those of about its own time.
+// Where a disc holds many, no sample needs to see them all: they are divided among the samples of
+// a pixel, each of which looks up one subset, a map of its own with as much light. Together they
+// see what each would have seen, at a fraction of the cost. They are divided by their time in the
+// shutter, so that a sample of what moves finds those of about its own time (decision 0106).
 //
 // More photons than fit into memory come in rounds, each a map of its own that lights a part of
 // every pixel's samples (photon_rounds.h). Radius and power are those of all rounds together, whose
@@ -32,14 +32,14 @@
 #include "render/bsdf/bsdf_cloth.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Photon {
-  V3f position;    // m
-  V3f direction;   // unit, of flight
-  V3f normal;      // unit, of the surface it lies on
-  V3f power;       // W; of one that came through water divided by the squared index, as radiance is
-  float turn = 0;  // from 0 to 1: of its time among those of the others
+  V3f position;   // m
+  V3f direction;  // unit, of flight
+  V3f normal;     // unit, of the surface it lies on
+  V3f power;      // W; of one that came through water divided by the squared index, as radiance is
+  float time_sample = 0;  // in [0, 1), of which its time in the shutter was drawn
 };
 
 /// What photons bring, and by how much one half of them brings more than the other.
@@ -69,44 +69,46 @@ __m256 unpack_unit(const std::array<uint32_t, 8>& packed) {
 class PhotonMap {
  public:
   PhotonMap() = default;
-  /// @param samples  of a pixel, which may share the photons
+  /// @param samples  of a pixel, which may divide the photons
   /// @param rounds   maps of as many photons whose light is averaged
   explicit PhotonMap(std::vector<Photon> photons, int samples = 1, int rounds = 1);
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
   float radius() const { return radius_; }  // m
-  unsigned hands() const { return 1u << hands_log2_; }
-  /// The hand of those whose turn it is.
-  unsigned hand_at(float turn) const { return std::min(unsigned(turn * hands()), hands() - 1); }
+  unsigned subsets() const { return 1u << subsets_log2_; }
+  /// The subset of those drawn with it.
+  unsigned subset_at(float time_sample) const {
+    return std::min(unsigned(time_sample * subsets()), subsets() - 1);
+  }
 
-  /// Calls f(direction of flight, power, share, half) for photons of a hand near a point of a
-  /// surface: the sum of share x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel
+  /// Calls f(direction of flight, power, weight, half) for photons of a subset near a point of a
+  /// surface: the sum of weight x power is the irradiance, W/m^2. Weighed by Epanechnikov's kernel
   /// over a disc, which is smaller where photons crowd: there fewer do, and its blur shows most.
   /// The half is 1 or -1.
   template <class F>
-  void for_each_near(unsigned hand, const V3f& point, const V3f& normal, const F& f) const {
-    for_each_pack_near(hand, point, normal, [&](const PhotonPack& p, __m256 share) {
-      alignas(32) float shares[8], flight[3][8];
-      _mm256_store_ps(shares, share);
+  void for_each_near(unsigned subset, const V3f& point, const V3f& normal, const F& f) const {
+    for_each_pack_near(subset, point, normal, [&](const PhotonPack& p, __m256 weight) {
+      alignas(32) float weights[8], flight[3][8];
+      _mm256_store_ps(weights, weight);
       _mm256_store_ps(flight[0], unpack_unit<0>(p.flight) * (1 / 511.f));
       _mm256_store_ps(flight[1], unpack_unit<1>(p.flight) * (1 / 511.f));
       _mm256_store_ps(flight[2], unpack_unit<2>(p.flight) * (1 / 511.f));
       for (unsigned k = 0; k < 8; ++k)
-        if (shares[k] > 0)
+        if (weights[k] > 0)
           f(V3f(flight[0][k], flight[1][k], flight[2][k]), V3f(p.red[k], p.green[k], p.blue[k]),
-            shares[k], kHalf[k]);
+            weights[k], half_sign[k]);
     });
   }
 
   /// What they sum up to on the side that `front` points to and on the other.
-  GatheredLight irradiance(unsigned hand, const V3f& point, const V3f& normal,
+  GatheredLight irradiance(unsigned subset, const V3f& point, const V3f& normal,
                            const V3f& front) const;
 
  private:
-  static constexpr float kSameSurface = 0.7f;  // cosine between normals
-  static constexpr float kThickness = 0.5f;    // of the disc, radii: curved surfaces count whole
-  static constexpr float kHalf[8] = {1, -1, 1, -1, 1, -1, 1, -1};  // by place in a pack
+  static constexpr float same_surface = 0.7f;    // cosine between normals
+  static constexpr float disc_thickness = 0.5f;  // of the disc, radii: curved surfaces count whole
+  static constexpr float half_sign[8] = {1, -1, 1, -1, 1, -1, 1, -1};  // by index in a pack
 
   /// Also false for a point that is not finite.
   bool reaches(const V3f& p) const {
@@ -115,8 +117,8 @@ class PhotonMap {
            p.z <= high.z;
   }
   void choose_radii(const std::vector<Photon>& photons, int rounds);
-  /// Sorts them by hand and by bucket.
-  void deal(const std::vector<Photon>& photons);
+  /// Sorts them by subset and by bucket.
+  void sort_into_buckets(const std::vector<Photon>& photons);
   /// From 0 on within `reach_`.
   Imath::V3i cell_of(const V3f& p) const { return Imath::V3i((p - reach_.min) * inverse_edge_); }
   size_t buckets() const { return radius2_.size(); }
@@ -128,12 +130,12 @@ class PhotonMap {
     return row_of(cell.y, cell.z) + uint32_t(cell.x);
   }
 
-  /// Calls f(pack, shares) with a share of 0 for photons that are not near.
+  /// Calls f(pack, weights) with a weight of 0 for photons that are not near.
   template <class F>
-  void for_each_pack_near(unsigned hand, const V3f& point, const V3f& normal, const F& f) const {
+  void for_each_pack_near(unsigned subset, const V3f& point, const V3f& normal, const F& f) const {
     if (!reaches(point)) return;
     const float r2 = radius2_[bucket_of(cell_of(point))], r = std::sqrt(r2);
-    const uint32_t* const first = first_.data() + size_t{hand} * buckets();
+    const uint32_t* const first = first_.data() + size_t{subset} * buckets();
     const Imath::V3i low = cell_of(point - V3f(r)), high = cell_of(point + V3f(r));
     for (int z = low.z; z <= high.z; ++z)
       for (int y = low.y; y <= high.y; ++y) {
@@ -148,9 +150,9 @@ class PhotonMap {
   void for_each_pack_of(uint32_t first, uint32_t last, const V3f& point, const V3f& normal,
                         float radius2, const F& f) const {
     const __m256 one = _mm256_set1_ps(1), inverse_r2 = one / radius2;
-    const __m256 scale = _mm256_set1_ps(2 / (kPi * radius2));
-    const __m256 thick = _mm256_set1_ps(kThickness * kThickness * radius2);
-    const __m256 same = _mm256_set1_ps(511 * kSameSurface * 511 * kSameSurface);
+    const __m256 scale = _mm256_set1_ps(2 / (pi * radius2));
+    const __m256 thick = _mm256_set1_ps(disc_thickness * disc_thickness * radius2);
+    const __m256 same = _mm256_set1_ps(511 * same_surface * 511 * same_surface);
     for (uint32_t at = first & ~7u; at < last; at += 8) {
       const PhotonPack& p = pack_[at / 8];
       const __m256 x = _mm256_load_ps(p.x.data()) - point.x;
@@ -160,11 +162,11 @@ class PhotonMap {
       const __m256 off = x * normal.x + y * normal.y + z * normal.z;
       const __m256 near = _mm256_and_ps(_mm256_cmp_ps(square, one, _CMP_LT_OQ),
                                         _mm256_cmp_ps(off * off, thick, _CMP_LE_OQ));
-      const __m256i place = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
+      const __m256i index = _mm256_add_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
                                              _mm256_set1_epi32(int(at - first)));
       const __m256i here =
-          _mm256_andnot_si256(_mm256_srai_epi32(place, 31),
-                              _mm256_cmpgt_epi32(_mm256_set1_epi32(int(last - first)), place));
+          _mm256_andnot_si256(_mm256_srai_epi32(index, 31),
+                              _mm256_cmpgt_epi32(_mm256_set1_epi32(int(last - first)), index));
       const __m256 counts = _mm256_and_ps(near, _mm256_castsi256_ps(here));
       if (_mm256_testz_ps(counts, counts)) continue;
       const __m256 cosine = unpack_unit<0>(p.normal) * normal.x +
@@ -178,11 +180,11 @@ class PhotonMap {
   Imath::Box3f reach_;  // of the photons and two radii around them; empty without any
   float radius_ = 0, inverse_edge_ = 0;  // cells are two radii wide
   uint32_t mask_ = 0;
-  unsigned hands_log2_ = 0;
+  unsigned subsets_log2_ = 0;
   size_t size_ = 0;               // number of photons
   std::vector<float> radius2_;    // m^2, of discs around points of each bucket
-  std::vector<uint32_t> first_;   // of each hand's buckets, and the number of photons
-  std::vector<PhotonPack> pack_;  // of all photons by hand and bucket
+  std::vector<uint32_t> first_;   // of each subset's buckets, and the number of photons
+  std::vector<PhotonPack> pack_;  // of all photons by subset and bucket
 };
 
 /// Whether photons find the light that lamps send through dielectric bodies: there are lamps, none
@@ -201,8 +203,8 @@ struct PhotonRound {
 /// leave out.
 struct Caustics {
   PhotonMap photons;
-  Walks walks = Walks::none;
-  float walked = 0;  // share of the light that walks find, if they were tried
+  ManifoldWalks walks = ManifoldWalks::none;
+  float walked = 0;  // fraction of the light that walks find, if they were tried
 };
 
 /// The same bits for any thread count.
@@ -210,7 +212,7 @@ struct Caustics {
 /// @param samples  of a pixel
 /// @param walks    which are tried
 /// @param rays     counts rays traced
-Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples, Walks walks,
-                       uint64_t& rays, const PhotonRound& round = {});
+Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int samples,
+                       ManifoldWalks walks, uint64_t& rays, const PhotonRound& round = {});
 
-}  // namespace drench
+}  // namespace drench::render

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace drench {
+namespace drench::render {
 
 float relative_error(const PixelSum& pixel) {
   float sum = 0;
@@ -38,7 +38,7 @@ std::vector<float> SamplePlan::deviations(const std::vector<PixelSum>& pixels) c
   for (size_t p = 0; p < pixels.size(); ++p)
     one[p] = relative_error(pixels[p]) * float(pixels[p].samples());
   const auto mean_around = [](int k, int count, auto&& value) {
-    const int from = std::max(k - kReach, 0), to = std::min(k + kReach, count - 1);
+    const int from = std::max(k - radius, 0), to = std::min(k + radius, count - 1);
     float sum = 0;
     for (int j = from; j <= to; ++j) sum += value(j);
     return sum / float(to - from + 1);
@@ -62,7 +62,7 @@ void SamplePlan::archive(CheckpointArchive& file) {
   file.column(wanted_);
 }
 
-double SamplePlan::share() const {
+double SamplePlan::fraction() const {
   if (wanted_.empty()) return 1;
   double sum = 0;
   for (const int wanted : wanted_) sum += wanted;
@@ -71,7 +71,8 @@ double SamplePlan::share() const {
 
 bool SamplePlan::next(const std::vector<PixelSum>& pixels, double photon_error) {
   if (passes_++ == 0) {
-    if (target_ > 0 && most_ > kFirst) wanted_.assign(size_t(width_) * height_, kFirst);
+    if (target_ > 0 && most_ > first_samples)
+      wanted_.assign(size_t(width_) * height_, first_samples);
     return true;
   }
   if (wanted_.empty()) return false;
@@ -99,11 +100,11 @@ bool SamplePlan::next(const std::vector<PixelSum>& pixels, double photon_error) 
     const double all = samples(p, high);
     expected_ += all;
     const int now = pixels[p].samples();
-    const int whole = int(std::ceil(all / PixelSum::kBatch)) * PixelSum::kBatch;
+    const int whole = int(std::ceil(all / PixelSum::smallest_batch)) * PixelSum::smallest_batch;
     wanted_[p] = std::min({whole, 2 * now, most_});
     more |= wanted_[p] > now;
   }
   return more;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 #include "render/film/checkpoint_archive.h"
 #include "render/film/pixel_sum.h"
 
-namespace drench {
+namespace drench::render {
 
 /// The relative error of a pixel as its samples tell: mean over the colours of variance of the mean
 /// / (mean^2 + 0.01). Its mean over a picture is the picture's relative MSE.
@@ -36,13 +36,13 @@ class SamplePlan {
   int wanted(size_t pixel) const { return wanted_.empty() ? most_ : wanted_[pixel]; }
   void archive(CheckpointArchive& file);
   /// Samples that all pixels will have after this pass, over the most.
-  double share() const;
+  double fraction() const;
   /// How many all pixels are expected to have at the end.
   double expected() const { return expected_; }
 
  private:
-  static constexpr int kFirst = 32;  // samples before the scatter is trusted
-  static constexpr int kReach = 3;   // pixels around one that tell its scatter with it
+  static constexpr int first_samples = 32;  // samples before the scatter is trusted
+  static constexpr int radius = 3;          // pixels around one that tell its scatter with it
 
   std::vector<float> deviations(const std::vector<PixelSum>& pixels) const;
 
@@ -52,4 +52,4 @@ class SamplePlan {
   std::vector<int> wanted_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,12 +5,12 @@
 #include "render/color/color.h"
 #include "render/texture/texture.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Cells of the sampling table of an environment without a map.
-constexpr int kGradientColumns = 1, kGradientRows = 64;
+constexpr int gradient_columns = 1, gradient_rows = 64;
 
 float row_cosine(int row, int rows) { return float(std::cos(std::numbers::pi * row / rows)); }
 
@@ -21,20 +21,20 @@ AliasTable::AliasTable(const std::vector<float>& weights)
   const size_t n = weights.size();
   double total = 0;
   for (float w : weights) total += w;
-  std::vector<double> share(n);
+  std::vector<double> scaled(n);
   std::vector<uint32_t> small, large;
   for (size_t k = 0; k < n; ++k) {
     const double p = total > 0 ? weights[k] / total : 1.0 / double(n);
     probability_[k] = float(p);
-    share[k] = p * double(n);
-    (share[k] < 1 ? small : large).push_back(uint32_t(k));
+    scaled[k] = p * double(n);
+    (scaled[k] < 1 ? small : large).push_back(uint32_t(k));
   }
   while (!small.empty() && !large.empty()) {
     const uint32_t low = small.back(), high = large.back();
     small.pop_back();
-    bins_[low] = {float(share[low]), high};
-    share[high] -= 1 - share[low];
-    if (share[high] < 1) {
+    bins_[low] = {float(scaled[low]), high};
+    scaled[high] -= 1 - scaled[low];
+    if (scaled[high] < 1) {
       large.pop_back();
       small.push_back(high);
     }
@@ -46,13 +46,13 @@ AliasTable::AliasTable(const std::vector<float>& weights)
 uint32_t AliasTable::sample(float& u) const {
   const float scaled = u * float(bins_.size());
   const uint32_t bin = std::min(uint32_t(scaled), uint32_t(bins_.size() - 1));
-  const float within = std::min(scaled - float(bin), kOneMinusEpsilon);
+  const float within = std::min(scaled - float(bin), one_minus_epsilon);
   const Bin& b = bins_[bin];
   if (within < b.keep) {
-    u = std::min(within / b.keep, kOneMinusEpsilon);
+    u = std::min(within / b.keep, one_minus_epsilon);
     return bin;
   }
-  u = std::min((within - b.keep) / (1 - b.keep), kOneMinusEpsilon);
+  u = std::min((within - b.keep) / (1 - b.keep), one_minus_epsilon);
   return b.other;
 }
 
@@ -63,19 +63,19 @@ Environment::Environment(const Light& light, Sampling sampling, PictureMemory& m
       rotation_(float(light.rotation_deg / 360 - std::floor(light.rotation_deg / 360))) {
   if (!light.map.empty()) {
     read_map(light, memory);
-    if (light.split_suns) suns_ = split_suns(map_, rotation_);
-    for (MapSun& sun : suns_) sun.irradiance *= scale_;
+    if (light.split_suns) suns_ = extract_suns(map_, rotation_);
+    for (ExtractedSun& sun : suns_) sun.irradiance *= scale_;
   }
-  const int columns = is_map() ? map_.width : kGradientColumns;
-  const int rows = is_map() ? map_.height : kGradientRows;
+  const int columns = is_map() ? map_.width : gradient_columns;
+  const int rows = is_map() ? map_.height : gradient_rows;
   V3f sum(0);
   for (int r = 0; r < rows; ++r) {
-    const float share = (row_cosine(r, rows) - row_cosine(r + 1, rows)) / 2 / float(columns);
+    const float weight = (row_cosine(r, rows) - row_cosine(r + 1, rows)) / 2 / float(columns);
     V3f row(0);
     for (int c = 0; c < columns; ++c)
       row += is_map() ? map_.texel[size_t(r) * columns + c] * scale_
                       : radiance(from_map({0.5f, (float(r) + 0.5f) / float(rows)}));
-    sum += row * share;
+    sum += row * weight;
   }
   mean_ = sum;
   if (sampling == Sampling::on) build_tables(columns, rows);
@@ -89,7 +89,7 @@ void Environment::read_map(const Light& light, PictureMemory& memory) {
   memory.take(
       light.map,
       fmt::format("{} x {} texels of light '{}'", picture.width(), picture.height(), light.name),
-      picture.texels() * (sizeof(V3f) + AliasTable::kBytesAnEntry));
+      picture.texels() * (sizeof(V3f) + AliasTable::bytes_per_entry));
   map_ = {picture.width(), picture.height(), {}};
   map_.texel.resize(picture.texels());
   for (size_t p = 0; p < map_.texel.size(); ++p) {
@@ -127,14 +127,14 @@ void Environment::build_tables(int columns, int rows) {
 }
 
 V2f Environment::to_map(const V3f& d) const {
-  const float u = std::atan2(d.x, -d.z) / (2 * kPi) + 0.5f + rotation_;
-  return {u - std::floor(u), std::acos(std::clamp(d.y, -1.f, 1.f)) / kPi};
+  const float u = std::atan2(d.x, -d.z) / (2 * pi) + 0.5f + rotation_;
+  return {u - std::floor(u), std::acos(std::clamp(d.y, -1.f, 1.f)) / pi};
 }
 
 V3f Environment::from_map(const V2f& uv) const {
-  const float phi = (uv.x - rotation_ - 0.5f) * 2 * kPi;
-  const float sin = std::sin(uv.y * kPi);
-  return {sin * std::sin(phi), std::cos(uv.y * kPi), -sin * std::cos(phi)};
+  const float phi = (uv.x - rotation_ - 0.5f) * 2 * pi;
+  const float sin = std::sin(uv.y * pi);
+  return {sin * std::sin(phi), std::cos(uv.y * pi), -sin * std::cos(phi)};
 }
 
 V3f Environment::radiance(const V3f& d) const {
@@ -163,9 +163,9 @@ DirectionSample Environment::sample(const V2f& u) const {
   const int column = int(column_tables_[row].sample(in_column));
   const float top = row_cosine(row, rows_), bottom = row_cosine(row + 1, rows_);
   const float y = top + (bottom - top) * in_row;
-  const float phi = ((float(column) + in_column) / float(columns_) - rotation_ - 0.5f) * 2 * kPi;
+  const float phi = ((float(column) + in_column) / float(columns_) - rotation_ - 0.5f) * 2 * pi;
   const float sin = std::sqrt(std::max(0.f, 1 - y * y));
-  const float solid_angle = 2 * kPi / float(columns_) * (top - bottom);
+  const float solid_angle = 2 * pi / float(columns_) * (top - bottom);
   return {{sin * std::sin(phi), y, -sin * std::cos(phi)},
           row_table_.probability(row) * column_tables_[row].probability(column) / solid_angle};
 }
@@ -175,8 +175,8 @@ float Environment::pdf(const V3f& direction) const {
   const int row = std::min(int(uv.y * float(rows_)), rows_ - 1);
   const int column = std::min(int(uv.x * float(columns_)), columns_ - 1);
   const float solid_angle =
-      2 * kPi / float(columns_) * (row_cosine(row, rows_) - row_cosine(row + 1, rows_));
+      2 * pi / float(columns_) * (row_cosine(row, rows_) - row_cosine(row + 1, rows_));
   return row_table_.probability(row) * column_tables_[row].probability(column) / solid_angle;
 }
 
-}  // namespace drench
+}  // namespace drench::render

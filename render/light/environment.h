@@ -3,6 +3,7 @@
 // map.
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "pipeline/contract/shot/shot.h"
@@ -10,7 +11,7 @@
 #include "render/light/sky_map.h"
 #include "render/texture/picture.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Draws from a discrete distribution in constant time. Walker's alias method in Vose's form.
 class AliasTable {
@@ -29,7 +30,7 @@ class AliasTable {
   };
 
  public:
-  static constexpr size_t kBytesAnEntry = sizeof(Bin) + sizeof(float);
+  static constexpr size_t bytes_per_entry = sizeof(Bin) + sizeof(float);
 
  private:
   std::vector<Bin> bins_;
@@ -57,7 +58,7 @@ class Environment {
   /// Mean radiance over the sphere.
   V3f mean() const { return mean_; }
   /// Suns that were taken out, as they stand in the sky.
-  const std::vector<MapSun>& suns() const { return suns_; }
+  const std::vector<ExtractedSun>& suns() const { return suns_; }
   bool is_map() const { return map_.width > 0; }
 
  private:
@@ -69,10 +70,18 @@ class Environment {
   V3f scale_, horizon_, ground_, mean_;
   float rotation_ = 0;  // turns of the map, 0..1
   SkyMap map_;
-  std::vector<MapSun> suns_;
+  std::vector<ExtractedSun> suns_;
   int columns_ = 0, rows_ = 0;
   AliasTable row_table_;
   std::vector<AliasTable> column_tables_;
 };
 
-}  // namespace drench
+/// Where lights take their environment from, so that frames may share one.
+class EnvironmentSource {
+ public:
+  virtual ~EnvironmentSource() = default;
+  virtual std::shared_ptr<const Environment> environment(const Light& light,
+                                                         Environment::Sampling sampling) = 0;
+};
+
+}  // namespace drench::render

@@ -6,17 +6,17 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Radiance, in means of what is no brighter, from which light may be a sun's: one path of 64 that
 /// meets less by chance adds at most half to its pixel.
-constexpr double kBright = 32;
+constexpr double min_contrast = 32;
 /// sr, a disc of 6.5 degrees: of directions that leave a surface one in 600 meets what is larger.
-constexpr double kLargest = 0.01;
+constexpr double max_solid_angle = 0.01;
 /// Of all light of the map. There are so at most a hundred suns, which every light sample weighs.
-constexpr double kLeastShare = 0.01;
+constexpr double min_fraction = 0.01;
 
 /// Integrals of a row's tent, which a bilinear lookup weighs its texels with, over the polar angle.
 struct RowMoments {
@@ -44,24 +44,24 @@ RowMoments moments_of_row(int row, int rows) {
 
 using Region = std::vector<uint32_t>;  // texels
 
-class SunFinder {
+class SunExtractor {
  public:
-  SunFinder(SkyMap& map, float rotation) : map_(map), rotation_(rotation) {
+  SunExtractor(SkyMap& map, float rotation) : map_(map), rotation_(rotation) {
     for (int r = 0; r < map.height; ++r) rows_.push_back(moments_of_row(r, map.height));
     total_ = sum_below(std::numeric_limits<double>::infinity()).light;
   }
 
-  std::vector<MapSun> split() {
-    const double threshold = kBright * background();
+  std::vector<ExtractedSun> extract() {
+    const double threshold = min_contrast * background();
     Region bright;
     for (uint32_t t = 0; t < map_.texel.size(); ++t)
       if (luminance(map_.texel[t]) > threshold) bright.push_back(t);
-    std::vector<MapSun> suns;
+    std::vector<ExtractedSun> suns;
     if (bright.empty()) return suns;
     state_.resize(map_.texel.size());
     std::vector<Region> regions;
     find_regions(bright, threshold, regions);
-    for (const Region& region : regions) suns.push_back(take_out(region));
+    for (const Region& region : regions) suns.push_back(extract_sun(region));
     return suns;
   }
 
@@ -91,11 +91,11 @@ class SunFinder {
     return sum;
   }
 
-  /// Mean of all that is at most kBright times as bright as it.
+  /// Mean of all that is at most min_contrast times as bright as it.
   double background() const {
     double mean = total_ / (4 * std::numbers::pi);
     for (int round = 0; round < 64; ++round) {
-      const Sum sum = sum_below(kBright * mean);
+      const Sum sum = sum_below(min_contrast * mean);
       const double next = sum.solid_angle > 0 ? sum.light / sum.solid_angle : 0;
       if (!(next < mean)) break;
       mean = next;
@@ -118,15 +118,16 @@ class SunFinder {
   /// it, above a higher threshold.
   void find_regions(const Region& among, double threshold, std::vector<Region>& suns) {
     std::vector<Region> too_large;
-    for (const uint32_t t : among) state_[t] = luminance(map_.texel[t]) > threshold ? waits : out;
+    for (const uint32_t t : among)
+      state_[t] = luminance(map_.texel[t]) > threshold ? waiting : outside;
     for (const uint32_t seed : among) {
-      if (state_[seed] != waits) continue;
+      if (state_[seed] != waiting) continue;
       Region region{seed};
-      state_[seed] = out;
+      state_[seed] = outside;
       for (size_t k = 0; k < region.size(); ++k)
         for_each_beside(region[k], [&](uint32_t t) {
-          if (state_[t] != waits) return;
-          state_[t] = out;
+          if (state_[t] != waiting) return;
+          state_[t] = outside;
           region.push_back(t);
         });
       double size = 0, light = 0;
@@ -134,8 +135,8 @@ class SunFinder {
         size += solid_angle(t);
         light += solid_angle(t) * luminance(map_.texel[t]);
       }
-      if (light < kLeastShare * total_) continue;
-      (size <= kLargest ? suns : too_large).push_back(std::move(region));
+      if (light < min_fraction * total_) continue;
+      (size <= max_solid_angle ? suns : too_large).push_back(std::move(region));
     }
     for (const Region& region : too_large) find_regions(region, 2 * threshold, suns);
   }
@@ -151,20 +152,20 @@ class SunFinder {
         sum += Imath::V3d(map_.texel[beside]) * solid_angle(beside);
         size += solid_angle(beside);
       });
-    for (const uint32_t t : region) state_[t] = out;
+    for (const uint32_t t : region) state_[t] = outside;
     return size > 0 ? V3f(sum / size) : V3f(0);
   }
 
   /// Integral of direction over the tent of a texel.
   Imath::V3d moment(uint32_t texel) const {
     const RowMoments& row = rows_[texel / uint32_t(map_.width)];
-    const double turn = (texel % uint32_t(map_.width) + 0.5) / map_.width - rotation_ - 0.5;
-    const double half = step() / 2, phi = turn * 2 * std::numbers::pi;
+    const double angle = (texel % uint32_t(map_.width) + 0.5) / map_.width - rotation_ - 0.5;
+    const double half = step() / 2, phi = angle * 2 * std::numbers::pi;
     const double across = row.sine2 * step() * std::pow(std::sin(half) / half, 2);
     return {across * std::sin(phi), row.sine_cosine * step(), -across * std::cos(phi)};
   }
 
-  MapSun take_out(const Region& region) {
+  ExtractedSun extract_sun(const Region& region) {
     const V3f left = around(region);
     Imath::V3d vector[3] = {Imath::V3d(0), Imath::V3d(0), Imath::V3d(0)}, toward(0);
     double sum = 0, square = 0;
@@ -180,14 +181,14 @@ class SunFinder {
       square += light * light * solid_angle(t);
     }
     toward.normalize();
-    MapSun out;
+    ExtractedSun out;
     out.toward = V3f(toward);
     for (int c = 0; c < 3; ++c) out.irradiance[c] = float(std::max(vector[c].dot(toward), 0.));
     out.solid_angle = float(sum * sum / square);  // that of a disc, if it is one
     return out;
   }
 
-  enum State : uint8_t { out, waits, inside };
+  enum State : uint8_t { outside, waiting, inside };
 
   SkyMap& map_;
   double rotation_;
@@ -198,8 +199,8 @@ class SunFinder {
 
 }  // namespace
 
-std::vector<MapSun> split_suns(SkyMap& map, float rotation) {
-  return SunFinder(map, rotation).split();
+std::vector<ExtractedSun> extract_suns(SkyMap& map, float rotation) {
+  return SunExtractor(map, rotation).extract();
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -7,20 +7,20 @@
 
 #include "render/light/sky_map.h"
 
-namespace drench {
+namespace drench::render {
 
 /// What a region sends beyond its surroundings, as a disc far away.
-struct MapSun {
+struct ExtractedSun {
   V3f toward;             // unit, to its mean direction
   V3f irradiance;         // facing it; radiance of the map x sr
   float solid_angle = 0;  // sr
 };
 
 /// Takes the suns out of a map; their texels are left with the light of those around them. The
-/// irradiance that map and suns give together is the map's before, exactly for planes that see a
+/// irradiance that map and suns give together is the whole map's, exactly for planes that see a
 /// sun whole and whose texels all have one hue. A map without suns stays as it is, to the bit.
 /// @param map       latitude-longitude, as Environment reads it: bilinear, +Y at the top
 /// @param rotation  of the map, turns
-std::vector<MapSun> split_suns(SkyMap& map, float rotation);
+std::vector<ExtractedSun> extract_suns(SkyMap& map, float rotation);
 
-}  // namespace drench
+}  // namespace drench::render

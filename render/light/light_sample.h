@@ -3,7 +3,7 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Light arriving at a point from one sampled direction.
 struct LightSample {
@@ -28,4 +28,4 @@ struct LampPoint {
   size_t lamp = 0;  // which of the shapes and suns
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,19 +4,19 @@
 #include <limits>
 #include <numeric>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 using Imath::V3d;
 
-constexpr float kSlack = 1e-5f;  // of boxes, for their rounding
+constexpr float relative_slack = 1e-5f;  // of boxes, for their rounding
 
 /// What a node knows of its lights, as sums.
 struct Cluster {
   Imath::Box3f bounds;
   double power = 0, flat = 0, square = 0;
-  V3d normal = V3d(0), place = V3d(0);
+  V3d normal = V3d(0), weighted_center = V3d(0);
 
   void add(const LightTree::Light& light) {
     bounds.extendBy(light.bounds);
@@ -25,10 +25,10 @@ struct Cluster {
     power += p;
     if (!is_black(light.normal)) flat += p;
     normal += V3d(light.normal) * p;
-    place += center * p;
+    weighted_center += center * p;
     square += p * (center.length2() + double(light.bounds.size().length2()) / 8);
   }
-  V3d center() const { return power > 0 ? place / power : V3d(bounds.center()); }
+  V3d center() const { return power > 0 ? weighted_center / power : V3d(bounds.center()); }
   double spread() const {
     const double least = 1e-12 * double(bounds.size().length2());
     return power > 0 ? std::max(square / power - center().length2(), least) : 0;
@@ -49,16 +49,16 @@ LightTree::LightTree(const std::array<std::vector<Light>, 2>& kinds) {
     has_[k] = first[k] < first[k + 1];
     if (has_[k]) root_[k] = build(lights, first[k], first[k + 1], 0);
   }
-  place_.resize(order_.size());
-  for (uint32_t place = 0; place < order_.size(); ++place) place_[order_[place]] = place;
+  slot_.resize(order_.size());
+  for (uint32_t slot = 0; slot < order_.size(); ++slot) slot_[order_[slot]] = slot;
 }
 
 uint32_t LightTree::build(std::span<const Light> lights, uint32_t first, uint32_t last, int depth) {
   Cluster all;
-  for (uint32_t place = first; place < last; ++place) all.add(lights[order_[place]]);
+  for (uint32_t slot = first; slot < last; ++slot) all.add(lights[order_[slot]]);
   const uint32_t number = uint32_t(nodes_.size());
   Node node;
-  const V3f slack = (absolute(all.bounds.center()) + all.bounds.size()) * kSlack;
+  const V3f slack = (absolute(all.bounds.center()) + all.bounds.size()) * relative_slack;
   node.bounds = {all.bounds.min - slack, all.bounds.max + slack};
   node.center = V3f(all.center());
   node.spread = float(all.spread());
@@ -75,8 +75,8 @@ uint32_t LightTree::build(std::span<const Light> lights, uint32_t first, uint32_
   return number;
 }
 
-/// Orders places from `first` to `last` so that those before the returned one are the first child.
-/// Deep down in halves: 2^32 lights end above kDeepest.
+/// Orders slots from `first` to `last` so that those before the returned one are the first child.
+/// Deep down in halves: 2^32 lights end above max_depth.
 uint32_t LightTree::split(std::span<const Light> lights, uint32_t first, uint32_t last, int depth) {
   const auto begin = order_.begin() + first, end = order_.begin() + last;
   const auto sort_along = [&](int axis) {
@@ -90,7 +90,7 @@ uint32_t LightTree::split(std::span<const Light> lights, uint32_t first, uint32_
   int best_axis = 0;
   uint32_t best = count / 2;
   std::vector<double> cost_after(count);
-  for (int axis = 0; axis < 3 && depth < kDeepest / 2; ++axis) {
+  for (int axis = 0; axis < 3 && depth < max_depth / 2; ++axis) {
     sort_along(axis);
     Cluster after, before;
     for (uint32_t k = count; k-- > 1;) {
@@ -112,17 +112,17 @@ uint32_t LightTree::split(std::span<const Light> lights, uint32_t first, uint32_
 /// s)) / 2 between, where s is a quarter of what c varies by. As seen from among the lights they
 /// vary most.
 float LightTree::cluster_importance(const Node& node, const V3f& from) const {
-  constexpr float kInside = 0.55f;  // 5/9: 3 / R^2 at the middle of a ball of spread 3/5 R^2
-  constexpr float kLeast = 1e-6f;   // more than rounding
+  constexpr float inside_factor = 0.55f;  // 5/9: 3 / R^2 at the middle of a ball of spread 3/5 R^2
+  constexpr float min_variance = 1e-6f;   // more than rounding
   const V3f away = from - node.center;
   const float distance2 = dot(away, away);
   const float seen = 1 / (distance2 + node.spread);
   const float m = dot(away, node.normal) * std::sqrt(seen);
   const float parallel = dot(node.normal, node.normal) * distance2 * seen;
-  const float s = std::max(1 - parallel, kLeast) / 4;
+  const float s = std::max(1 - parallel, min_variance) / 4;
   const float root = std::sqrt(m * m + s);
   const float cosine = m > 0 ? (m + root) / 2 : s / (2 * (root - m));
-  return (node.round + node.flat * cosine) / std::max(distance2, kInside * node.spread);
+  return (node.round + node.flat * cosine) / std::max(distance2, inside_factor * node.spread);
 }
 
-}  // namespace drench
+}  // namespace drench::render

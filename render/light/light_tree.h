@@ -2,7 +2,8 @@
 // A tree over many lights: draws one of them, and finds those that a ray may meet, without asking
 // each. After Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree
 // Splitting": a cluster that a point is among is split, others are weighed whole. They weigh one by
-// a bound of what its lights give, here it is an estimate: bounds draw distant clusters too often.
+// a bound of what its lights give, here it is an estimate (decision 0104): bounds draw distant
+// clusters too often.
 
 #include <Imath/ImathBox.h>
 
@@ -12,10 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "render/scene/box_test.h"
+#include "render/box_test.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 class LightTree {
  public:
@@ -26,7 +27,7 @@ class LightTree {
   };
 
   LightTree() = default;
-  /// @param kinds  lights whose number is their place in all of these together. Draws are from all
+  /// @param kinds  lights whose number is their index in all of these together. Draws are from all
   ///               kinds or from the first alone
   explicit LightTree(const std::array<std::vector<Light>, 2>& kinds);
 
@@ -34,9 +35,9 @@ class LightTree {
 
   /// Clusters that are weighed for a point, each light in one of them.
   struct Cut {
-    static constexpr uint32_t kMost = 8;
-    std::array<uint32_t, kMost> node;
-    std::array<float, kMost> weight;
+    static constexpr uint32_t max_nodes = 8;
+    std::array<uint32_t, max_nodes> node;
+    std::array<float, max_nodes> weight;
     uint32_t size = 0;
     float total = 0;
   };
@@ -60,7 +61,7 @@ class LightTree {
   void along(const V3f& origin, const V3f& direction, float reach, const Meet& meet) const;
 
  private:
-  static constexpr int kDeepest = 64;
+  static constexpr int max_depth = 64;
 
   struct Node {
     Imath::Box3f bounds;
@@ -69,11 +70,11 @@ class LightTree {
     V3f normal = V3f(0);           // mean of those that have one
     float flat = 0;                // power of these
     float round = 0;               // power of the others
-    uint32_t first = 0, last = 0;  // its lights' places
+    uint32_t first = 0, last = 0;  // its lights' slots
     uint32_t second = 0;           // child; the other one follows the node
 
     bool is_leaf() const { return last - first == 1; }
-    bool holds(uint32_t place) const { return first <= place && place < last; }
+    bool holds(uint32_t slot) const { return first <= slot && slot < last; }
   };
 
   uint32_t build(std::span<const Light> lights, uint32_t first, uint32_t last, int depth);
@@ -85,8 +86,8 @@ class LightTree {
     const Node& n = nodes_[node];
     return n.is_leaf() ? importance(order_[n.first]) : cluster_importance(n, from);
   }
-  /// Goes down from `node`; `first(share)` tells whether by the first child, whose share it is
-  /// given.
+  /// Goes down from `node`; `first(probability)` tells whether by the first child, whose
+  /// probability it is given.
   template <class Importance, class First>
   std::pair<uint32_t, float> descend(uint32_t node, const V3f& from, const Importance& importance,
                                      const First& first) const;
@@ -94,8 +95,8 @@ class LightTree {
   std::vector<Node> nodes_;
   std::array<uint32_t, 2> root_ = {};
   std::array<bool, 2> has_ = {};
-  std::vector<uint32_t> order_;  // the light at each place
-  std::vector<uint32_t> place_;  // of each light
+  std::vector<uint32_t> order_;  // the light in each slot
+  std::vector<uint32_t> slot_;   // of each light
 };
 
 template <class Importance>
@@ -106,7 +107,7 @@ LightTree::Cut LightTree::cut(int kinds, const V3f& from, const Importance& impo
   for (uint32_t k = 0; k < cut.size;) {
     const Node& node = nodes_[cut.node[k]];
     const V3f away = from - node.center;
-    if (!node.is_leaf() && cut.size < Cut::kMost && dot(away, away) < node.spread) {
+    if (!node.is_leaf() && cut.size < Cut::max_nodes && dot(away, away) < node.spread) {
       cut.node[cut.size++] = node.second;
       ++cut.node[k];
       continue;
@@ -129,9 +130,9 @@ std::pair<uint32_t, float> LightTree::descend(uint32_t node, const V3f& from,
     const uint32_t second = nodes_[node].second;
     const float a = weight(node + 1, from, importance), b = weight(second, from, importance);
     if (!(a + b > 0)) return {0, 0.f};
-    const float share = a / (a + b);
-    const bool by_first = first(node + 1, share);
-    probability *= by_first ? share : 1 - share;
+    const float first_probability = a / (a + b);
+    const bool by_first = first(node + 1, first_probability);
+    probability *= by_first ? first_probability : 1 - first_probability;
     node = by_first ? node + 1 : second;
   }
   return {order_[nodes_[node].first], probability};
@@ -144,23 +145,22 @@ std::pair<uint32_t, float> LightTree::choose(const Cut& cut, const V3f& from, fl
   while (k + 1 < cut.size && target >= cut.weight[k]) target -= cut.weight[k++];
   if (k >= cut.size) return {0, 0.f};
   float u = target / cut.weight[k];
-  const auto [light, probability] =
-      descend(cut.node[k], from, importance, [&](uint32_t, float share) {
-        const bool first = u < share;
-        u = first ? u / share : (u - share) / (1 - share);
-        return first;
-      });
+  const auto [light, probability] = descend(cut.node[k], from, importance, [&](uint32_t, float p) {
+    const bool first = u < p;
+    u = first ? u / p : (u - p) / (1 - p);
+    return first;
+  });
   return {light, probability * cut.weight[k]};
 }
 
 template <class Importance>
 float LightTree::part(const Cut& cut, const V3f& from, uint32_t light,
                       const Importance& importance) const {
-  const uint32_t place = place_[light];
+  const uint32_t slot = slot_[light];
   for (uint32_t k = 0; k < cut.size; ++k)
-    if (nodes_[cut.node[k]].holds(place))
+    if (nodes_[cut.node[k]].holds(slot))
       return cut.weight[k] * descend(cut.node[k], from, importance, [&](uint32_t first, float) {
-                               return nodes_[first].holds(place);
+                               return nodes_[first].holds(slot);
                              }).second;
   return 0;
 }
@@ -170,7 +170,7 @@ void LightTree::along(const V3f& origin, const V3f& direction, float reach,
                       const Meet& meet) const {
   if (!has_[0]) return;
   const BoxTest box(origin, direction);
-  std::array<uint32_t, kDeepest + 1> waiting;
+  std::array<uint32_t, max_depth + 1> waiting;
   int left = 0;
   waiting[left++] = root_[0];
   while (left > 0) {
@@ -186,4 +186,4 @@ void LightTree::along(const V3f& origin, const V3f& direction, float reach,
   }
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -8,15 +8,14 @@
 #include "pipeline/contract/error.h"
 #include "render/color/color.h"
 #include "render/sampling.h"
-#include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float infinity = std::numeric_limits<float>::infinity();
 /// From so many on a tree of them is worth its steps.
-constexpr size_t kManyLights = 16;
+constexpr size_t many_lights = 16;
 
 [[noreturn]] void fail(const Light& light, const std::string& what) {
   throw Error(fmt::format("light '{}': {}", light.name, what));
@@ -60,7 +59,7 @@ ShapeLight make_sphere(const Light& light) {
   out.radiance = light.radiance;
   out.center = V3f(light.center);
   out.radius = float(light.radius);
-  out.area = 4 * kPi * out.radius * out.radius;
+  out.area = 4 * pi * out.radius * out.radius;
   return out;
 }
 
@@ -76,7 +75,7 @@ ShapeLight make_disk(const Light& light) {
   const Basis basis(out.normal);
   out.u = basis.tangent * out.radius;
   out.v = basis.bitangent * out.radius;
-  out.area = kPi * out.radius * out.radius;
+  out.area = pi * out.radius * out.radius;
   return out;
 }
 
@@ -94,12 +93,12 @@ SunLight make_sun(const Light& light) {
   return out;
 }
 
-SunLight make_sun(const MapSun& sun) {
+SunLight make_sun(const ExtractedSun& sun) {
   SunLight out;
   out.toward = sun.toward;
-  out.one_minus_cos = sun.solid_angle / (2 * kPi);
+  out.one_minus_cos = sun.solid_angle / (2 * pi);
   out.sin2 = out.one_minus_cos * (2 - out.one_minus_cos);
-  out.radiance = sun.irradiance / (kPi * out.sin2);
+  out.radiance = sun.irradiance / (pi * out.sin2);
   out.importance = luminance(sun.irradiance);
   return out;
 }
@@ -109,23 +108,23 @@ SunLight make_sun(const MapSun& sun) {
 float ShapeLight::intersect(const V3f& origin, const V3f& direction, float reach) const {
   if (type != LightType::sphere) {
     const float facing = dot(direction, normal);
-    if (!(facing < 0)) return kInfinity;  // it shines along its normal only
+    if (!(facing < 0)) return infinity;  // it shines along its normal only
     const V3f to_center = center - origin;
     const float height = dot(to_center, normal);
-    if (!(height < 0)) return kInfinity;
+    if (!(height < 0)) return infinity;
     const float t = height / facing;
-    if (!(t > 0 && t < reach)) return kInfinity;
+    if (!(t > 0 && t < reach)) return infinity;
     const V3f p = direction * t - to_center;
-    if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : kInfinity;
-    return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : kInfinity;
+    if (type == LightType::disk) return dot(p, p) <= radius * radius ? t : infinity;
+    return std::abs(dot(p, dual_u)) <= 1 && std::abs(dot(p, dual_v)) <= 1 ? t : infinity;
   }
   const V3f to_center = center - origin;
   const float along = dot(to_center, direction);
   const V3f nearest = to_center - direction * along;  // stays exact for far, small spheres
   const float inside2 = radius * radius - dot(nearest, nearest);
-  if (!(inside2 >= 0) || dot(to_center, to_center) <= radius * radius) return kInfinity;
+  if (!(inside2 >= 0) || dot(to_center, to_center) <= radius * radius) return infinity;
   const float t = along - std::sqrt(inside2);
-  return t > 0 && t < reach ? t : kInfinity;
+  return t > 0 && t < reach ? t : infinity;
 }
 
 LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
@@ -152,7 +151,7 @@ LightSample ShapeLight::sample(const V3f& from, const V2f& u2) const {
   out.direction = Basis(to * (1 / distance)).world(local);
   const float off_axis2 = distance2 * (local.x * local.x + local.y * local.y);
   out.distance = distance * local.z - std::sqrt(std::max(0.f, radius * radius - off_axis2));
-  out.pdf = 1 / (2 * kPi * one_minus_cos);
+  out.pdf = 1 / (2 * pi * one_minus_cos);
   return out;
 }
 
@@ -163,15 +162,14 @@ float ShapeLight::pdf(const V3f& from, const V3f& direction, float distance) con
   }
   const V3f to = center - from;
   const float sin2 = radius * radius / dot(to, to);
-  return sin2 < 1 ? (1 + std::sqrt(1 - sin2)) / (2 * kPi * sin2) : 0;
+  return sin2 < 1 ? (1 + std::sqrt(1 - sin2)) / (2 * pi * sin2) : 0;
 }
 
 float ShapeLight::importance(const V3f& from) const {
   const V3f away = from - center;
   const float distance2 = dot(away, away);
   if (type == LightType::sphere)
-    return distance2 > radius * radius ? luminance(radiance) * kPi * radius * radius / distance2
-                                       : 0;
+    return distance2 > radius * radius ? luminance(radiance) * pi * radius * radius / distance2 : 0;
   const float height = dot(away, normal);
   return height > 0
              ? luminance(radiance) * area * height / (std::sqrt(distance2) * (distance2 + area))
@@ -182,7 +180,7 @@ LightTree::Light ShapeLight::extent() const {
   const float intensity = luminance(radiance);
   if (type == LightType::sphere) {
     const V3f reach(radius);
-    return {{center - reach, center + reach}, V3f(0), intensity * kPi * radius * radius};
+    return {{center - reach, center + reach}, V3f(0), intensity * pi * radius * radius};
   }
   const V3f reach = absolute(u) + absolute(v);
   return {{center - reach, center + reach}, normal, intensity * area};
@@ -194,7 +192,7 @@ bool SunLight::covers(const V3f& direction) const {
 }
 
 Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
-               KeptParts& parts) {
+               EnvironmentSource& environments) {
   for (const Light& light : lights) {
     check_radiance(light);
     switch (light.type) {
@@ -219,14 +217,14 @@ Lights::Lights(const std::vector<Light>& lights, SampleEnvironment sample_enviro
         sample_environment_ =
             sample_environment == SampleEnvironment::always ||
             (sample_environment == SampleEnvironment::automatic && !light.map.empty());
-        environment_ = parts.environment(
+        environment_ = environments.environment(
             light, sample_environment_ ? Environment::Sampling::on : Environment::Sampling::off);
         environment_group_ = group_of(light);
-        for (const MapSun& sun : environment_->suns()) {
+        for (const ExtractedSun& sun : environment_->suns()) {
           suns_.push_back(make_sun(sun));
           suns_.back().group = environment_group_;
         }
-        environment_importance_ = kPi * luminance(environment_->mean());
+        environment_importance_ = pi * luminance(environment_->mean());
         break;
     }
   }
@@ -245,7 +243,7 @@ uint32_t Lights::group_named(const std::string& name) {
 }
 
 void Lights::finish() {
-  if (shapes_.size() + meshes_.size() < kManyLights) return;
+  if (shapes_.size() + meshes_.size() < many_lights) return;
   std::array<std::vector<LightTree::Light>, 2> kinds;
   for (const ShapeLight& shape : shapes_) kinds[0].push_back(shape.extent());
   for (const MeshLight& mesh : meshes_) kinds[1].push_back(mesh.extent());
@@ -302,8 +300,8 @@ float Lights::choice_probability(size_t index, const V3f& from) const {
   const bool alone =
       tree_.empty() || index >= environment_index() || (index >= shapes_.size() && index < lamps());
   if (alone) return importance(index, from) / total;
-  const size_t place = index < shapes_.size() ? index : index - suns_.size();
-  return tree_.part(cut, from, uint32_t(place), tree_importance(from)) / total;
+  const size_t number = index < shapes_.size() ? index : index - suns_.size();
+  return tree_.part(cut, from, uint32_t(number), tree_importance(from)) / total;
 }
 
 float Lights::shape_pdf(int light, const V3f& from, const V3f& direction, float distance) const {
@@ -317,8 +315,8 @@ Lights::Choice Lights::choose_of_many(size_t count, const V3f& from, float u_lig
   if (!(total > 0)) return {0, 0.f};
   float target = u_light * total;
   if (target < cut.total) {
-    const auto [place, part] = tree_.choose(cut, from, target, tree_importance(from));
-    return {place < shapes_.size() ? place : place + suns_.size(), part / total};
+    const auto [number, part] = tree_.choose(cut, from, target, tree_importance(from));
+    return {number < shapes_.size() ? number : number + suns_.size(), part / total};
   }
   target -= cut.total;
   size_t chosen = 0;
@@ -337,15 +335,25 @@ Lights::Choice Lights::choose_of_many(size_t count, const V3f& from, float u_lig
 LampPoint Lights::aim_at(size_t lamp, const V3f& from) const {
   if (lamp >= shapes_.size()) {
     const SunLight& sun = suns_[lamp - shapes_.size()];
-    const float density = 1 / (2 * kPi * sun.one_minus_cos);
-    return {sun.toward, -sun.toward, sun.radiance, density, std::sqrt(sun.sin2), true, lamp};
+    const float density = 1 / (2 * pi * sun.one_minus_cos);
+    return {.at = sun.toward,
+            .normal = -sun.toward,
+            .radiance = sun.radiance,
+            .density = density,
+            .extent = std::sqrt(sun.sin2),
+            .sun = true,
+            .lamp = lamp};
   }
   const ShapeLight& shape = shapes_[lamp];
-  LampPoint out{shape.center, shape.normal, shape.radiance, 1 / shape.area, shape.radius,
-                false,        lamp};
+  LampPoint out{.at = shape.center,
+                .normal = shape.normal,
+                .radiance = shape.radiance,
+                .density = 1 / shape.area,
+                .extent = shape.radius,
+                .lamp = lamp};
   if (shape.type == LightType::sphere) {
     out.normal = normalized(from - shape.center);
-    out.density = 1 / (kPi * shape.radius * shape.radius);
+    out.density = 1 / (pi * shape.radius * shape.radius);
   } else if (shape.type == LightType::rectangle) {
     out.extent = std::sqrt(std::max(dot(shape.u, shape.u), dot(shape.v, shape.v)));
   }
@@ -400,8 +408,13 @@ LightSample Lights::sample_shape(const Choice& choice, const V3f& from, const V2
 LightSample Lights::sample_sun(const Choice& choice, const V2f& u) const {
   const SunLight& sun = suns_[choice.light - shapes_.size()];
   const V3f direction = Basis(sun.toward).world(sample_cone(u, sun.one_minus_cos));
-  const float pdf = 1 / (2 * kPi * sun.one_minus_cos) * choice.probability;
-  return {direction, kInfinity, sun.radiance, pdf, sun.group, -1, int(choice.light)};
+  const float pdf = 1 / (2 * pi * sun.one_minus_cos) * choice.probability;
+  return {.direction = direction,
+          .distance = infinity,
+          .radiance = sun.radiance,
+          .pdf = pdf,
+          .group = sun.group,
+          .lamp = int(choice.light)};
 }
 
 LightSample Lights::sample_mesh(const Choice& choice, const V3f& from, float time,
@@ -421,8 +434,11 @@ LightSample Lights::sample_chosen(const Choice& choice, const V3f& from, float t
   if (choice.light < lamps()) return sample_sun(choice, u);
   if (choice.light < environment_index()) return sample_mesh(choice, from, time, u);
   const DirectionSample d = environment_->sample(u);
-  return {d.direction, kInfinity, environment_->radiance(d.direction), d.pdf * choice.probability,
-          environment_group_};
+  return {.direction = d.direction,
+          .distance = infinity,
+          .radiance = environment_->radiance(d.direction),
+          .pdf = d.pdf * choice.probability,
+          .group = environment_group_};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include "render/light/light_tree.h"
 #include "render/light/mesh_light.h"
 
-namespace drench {
+namespace drench::render {
 
 /// A rectangle, disk or sphere, ready to be hit and sampled.
 struct ShapeLight {
@@ -44,14 +44,13 @@ struct SunLight {
   bool covers(const V3f& direction) const;
 };
 
-class KeptParts;
-
 class Lights {
  public:
   enum class SampleEnvironment { automatic, always, never };
 
   /// @throws Error for a light without extent or with impossible numbers, or a second environment.
-  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment, KeptParts& parts);
+  Lights(const std::vector<Light>& lights, SampleEnvironment sample_environment,
+         EnvironmentSource& environments);
 
   /// Adds an object that shines. @return its number among them
   int add_mesh(const MeshLight::Faces& faces, const V3f& radiance, const std::string& group) {
@@ -98,10 +97,12 @@ class Lights {
   enum class Suns { seen, hidden };
 
   /// Calls `found(radiance, density, group)` for each light at infinity that shines along a
-  /// direction, where the density is that of `sample` at `from`; 0 if it is not asked for.
+  /// direction; the density is that of `sample` at `from`.
+  /// @param bsdf_pdf  of the direction; 0: lights were not sampled there, and no density is found
   template <class Found>
-  void for_each_infinite(const V3f& from, const V3f& direction, bool weighed, Suns suns,
+  void for_each_infinite(const V3f& from, const V3f& direction, float bsdf_pdf, Suns suns,
                          const Found& found) const {
+    const bool weighed = bsdf_pdf > 0;
     if (environment_) {
       const float pdf =
           weighed && sample_environment_
@@ -111,9 +112,9 @@ class Lights {
     }
     for (size_t s = 0; s < suns_.size() && suns == Suns::seen; ++s) {
       if (!suns_[s].covers(direction)) continue;
-      const float pdf = weighed ? choice_probability(shapes_.size() + s, from) /
-                                      (2 * kPi * suns_[s].one_minus_cos)
-                                : 0.f;
+      const float pdf =
+          weighed ? choice_probability(shapes_.size() + s, from) / (2 * pi * suns_[s].one_minus_cos)
+                  : 0.f;
       found(suns_[s].radiance, pdf, suns_[s].group);
     }
   }
@@ -154,9 +155,9 @@ class Lights {
   void for_each_alone(size_t count, const Visit& visit) const;
   LightTree::Cut cut(size_t count, const V3f& from) const;
   auto tree_importance(const V3f& from) const {
-    return [this, &from](uint32_t place) {
-      return place < shapes_.size() ? shapes_[place].importance(from)
-                                    : meshes_[place - shapes_.size()].importance(from);
+    return [this, &from](uint32_t number) {
+      return number < shapes_.size() ? shapes_[number].importance(from)
+                                     : meshes_[number - shapes_.size()].importance(from);
     };
   }
   LampPoint aim_at(size_t lamp, const V3f& from) const;
@@ -182,4 +183,4 @@ class Lights {
   float environment_importance_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -4,7 +4,7 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -33,11 +33,11 @@ MeshLight::MeshLight(const Faces& faces, const V3f& radiance) : faces_(faces), r
 MeshLight::Corners MeshLight::corners(uint32_t triangle, float time) const {
   const auto& t = faces_.triangle[triangle];
   const size_t segments = faces_.position.size() - 1;
-  const float place = time * float(segments);
-  const size_t k = segments == 0 ? 0 : std::min(size_t(place), segments - 1);
+  const float segment = time * float(segments);
+  const size_t k = segments == 0 ? 0 : std::min(size_t(segment), segments - 1);
   const auto at = [&](uint32_t v) {
     const V3f& p = faces_.position[k][v];
-    return segments == 0 ? p : p + (faces_.position[k + 1][v] - p) * (place - float(k));
+    return segments == 0 ? p : p + (faces_.position[k + 1][v] - p) * (segment - float(k));
   };
   return {at(t.x), at(t.y), at(t.z)};
 }
@@ -75,4 +75,4 @@ LightTree::Light MeshLight::extent() const {
   return {{center_ - V3f(radius_), center_ + V3f(radius_)}, {0, 0, 0}, power_};
 }
 
-}  // namespace drench
+}  // namespace drench::render

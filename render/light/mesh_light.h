@@ -9,7 +9,7 @@
 #include "render/light/light_sample.h"
 #include "render/light/light_tree.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Faces that shine from their outer side. Points of them are drawn by area; as the radiance is
 /// one, by power too.
@@ -50,4 +50,4 @@ class MeshLight {
   AliasTable by_area_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

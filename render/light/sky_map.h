@@ -5,11 +5,11 @@
 
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct SkyMap {
   int width = 0, height = 0;
   std::vector<V3f> texel;  // linear ACEScg, row-major from the top left
 };
 
-}  // namespace drench
+}  // namespace drench::render

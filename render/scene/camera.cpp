@@ -5,7 +5,7 @@
 #include "pipeline/contract/error.h"
 #include "render/sampling.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -54,7 +54,7 @@ ShutterCurve::ShutterCurve(const Camera& camera)
       closing_(float(camera.shutter_closing)),
       late_(float(camera.rolling_shutter)),
       open_(1 - (opening_ + closing_) / 2),
-      share_(1 / (1 + late_)) {
+      row_fraction_(1 / (1 + late_)) {
   if (!(opening_ >= 0 && closing_ >= 0 && opening_ + closing_ <= 1 + 1e-6f))
     throw Error(
         fmt::format("camera: shutter_opening is {} and shutter_closing is {}; neither may be "
@@ -89,7 +89,7 @@ V2f ShutterCamera::aperture(const V2f& lens) const {
   } else {
     const float along = lens.x * float(blades_), first = std::floor(along), part = along - first;
     const auto corner = [&](float k) {
-      const float angle = 2 * kPi * k / float(blades_) + blade_rotation_;
+      const float angle = 2 * pi * k / float(blades_) + blade_rotation_;
       return V2f(std::sin(angle), std::cos(angle));
     };
     p = (corner(first) * (1 - part) + corner(first + 1) * part) * std::sqrt(lens.y);
@@ -115,4 +115,4 @@ V2f ShutterCamera::project(const CameraPose& pose, const V3f& point) const {
   return {0.5f * width_ + dot(to, pose.right) * scale, 0.5f * height_ - dot(to, pose.up) * scale};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -5,7 +5,7 @@
 #include "pipeline/contract/shot/shot.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 struct Ray {
   V3f origin, direction;  // m; direction is unit
@@ -28,7 +28,7 @@ class ShutterCurve {
       t = std::sqrt(2 * opening_ * y);
     else if (y > open_ - closing_ / 2)
       t = 1 - std::sqrt(2 * closing_ * (open_ - y));
-    return (t + std::clamp(row, 0.f, 1.f) * late_) * share_;
+    return (t + std::clamp(row, 0.f, 1.f) * late_) * row_fraction_;
   }
   bool rolls() const { return late_ > 0; }
   /// Film frame at which the last row is done.
@@ -39,8 +39,8 @@ class ShutterCurve {
 
  private:
   float opening_, closing_, late_;
-  float open_;   // integral of the trapezoid
-  float share_;  // of one row's time in that of all
+  float open_;          // integral of the trapezoid
+  float row_fraction_;  // of one row's time in that of all
 };
 
 /// The camera at one instant.
@@ -50,6 +50,10 @@ struct CameraPose {
   float focus_distance = 1;          // m
   float lens_radius = 0;             // m
 };
+
+/// What a camera may do, for code that is compiled apart for each.
+enum class CameraMotion { still, moving };
+enum class Lens { pinhole, thin };
 
 class ShutterCamera {
  public:
@@ -63,12 +67,12 @@ class ShutterCamera {
 
   /// @param film  in pixels from the top left, y down
   /// @param lens  in [0, 1)^2
-  template <bool moving, bool thin_lens>
+  template <CameraMotion motion, Lens model>
   Ray ray(const V2f& film, const V2f& lens, float time) const {
-    if constexpr (moving)
-      return from_pose<thin_lens>(moves_ ? pose_at(time) : open_, film, lens, time);
+    if constexpr (motion == CameraMotion::moving)
+      return from_pose<model>(moves_ ? pose_at(time) : open_, film, lens, time);
     else
-      return from_pose<thin_lens>(open_, film, lens, time);
+      return from_pose<model>(open_, film, lens, time);
   }
 
   /// Where a point before the camera appears, in pixels from the top left, y down.
@@ -82,7 +86,7 @@ class ShutterCamera {
   float pixels_per_radian() const { return 0.5f * width_ / open_.half_width; }
 
  private:
-  template <bool thin_lens>
+  template <Lens model>
   Ray from_pose(const CameraPose& pose, const V2f& film, const V2f& lens, float time) const;
   CameraPose pose_at(float time) const;
   V2f aperture(const V2f& lens) const;
@@ -97,17 +101,17 @@ class ShutterCamera {
   bool moves_ = false;
 };
 
-template <bool thin_lens>
+template <Lens model>
 Ray ShutterCamera::from_pose(const CameraPose& pose, const V2f& film, const V2f& lens,
                              float time) const {
   const float scale = 2 * pose.half_width / width_;
   const V3f through = pose.forward + pose.right * ((film.x - 0.5f * width_) * scale) -
                       pose.up * ((film.y - 0.5f * height_) * scale);
-  if constexpr (!thin_lens) return {pose.position, normalized(through), time};
+  if constexpr (model == Lens::pinhole) return {pose.position, normalized(through), time};
   const V2f d = aperture(lens) * pose.lens_radius;
   const V3f shift = pose.right * d.x + pose.up * d.y;
   // Divided by the focus distance, so that a lens of radius 0 gives the pinhole's bits.
   return {pose.position + shift, normalized(through - shift * (1 / pose.focus_distance)), time};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include <memory>
 #include <type_traits>
 
-namespace drench {
+namespace drench::render {
 
 /// Denormals to zero while a tile is rendered: Embree asks for it, and it is per thread.
 class FlushDenormals {
@@ -67,4 +67,4 @@ inline void embree_occluded(RTCScene scene, RTCRay& ray) {
 }
 #endif
 
-}  // namespace drench
+}  // namespace drench::render

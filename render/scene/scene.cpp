@@ -8,22 +8,22 @@
 #include <optional>
 
 #include "pipeline/contract/error.h"
-#include "render/integrator/path.h"
-#include "render/scene/box_test.h"
+#include "render/box_test.h"
+#include "render/scene/features.h"
 #include "render/scene/rotation.h"
 #include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float infinity = std::numeric_limits<float>::infinity();
 /// Rounding of an interpolated point, in units of its coordinates: a few operations in float.
-constexpr float kRelativeError = 16 * 0x1p-24f;
-constexpr float kSharedError = 2 * 0x1p-24f;
-constexpr float kNearEdge = 0.01f;  // of a barycentric coordinate
+constexpr float relative_position_error = 16 * 0x1p-24f;
+constexpr float shared_position_error = 2 * 0x1p-24f;
+constexpr float near_edge = 0.01f;  // of a barycentric coordinate
 /// Indices whose ratio is so near 1 have no facets that bend light.
-constexpr float kSameIndex = 1e-3f;
+constexpr float same_index = 1e-3f;
 
 /// Written by fours, as Embree reads it at once: a read of what narrower writes left waits for
 /// them.
@@ -59,13 +59,13 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
       fps_(shot.timeline.fps),
       keeps_velocities_(shot.layers.motion || shot.render.denoise),
       camera_(shot.camera, frame + open_, frame + close_, shot.render.width, shot.render.height),
-      parts_(options.parts ? options.parts : std::make_shared<KeptParts>()),
+      cache_(options.cache ? options.cache : std::make_shared<SceneCache>()),
       lights_(shot.light,
               options.environment == EnvironmentSampling::always ? Lights::SampleEnvironment::always
               : options.environment == EnvironmentSampling::never
                   ? Lights::SampleEnvironment::never
                   : Lights::SampleEnvironment::automatic,
-              *parts_) {
+              *cache_) {
   if (!(close_ >= open_)) throw Error("camera: shutter_close lies before shutter_open; swap them");
   if (shot.ground.present) {
     has_ground_ = true;
@@ -105,7 +105,7 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
   }
   for (SceneObject& object : objects_) build(object);
   find_mesh_lights();
-  find_bodies(has_fluid);
+  find_bodies(has_fluid ? FirstObject::fluid : FirstObject::other);
   find_albedos();
   find_fabrics();
   find_features(shot.render.background);
@@ -113,11 +113,11 @@ Scene::Scene(const Shot& shot, int frame, const FrameGeometry& geometry,
 
 Scene::~Scene() {
   for (SceneObject& object : objects_)
-    if (object.contents != Digest{}) parts_->give_back(std::move(object));
+    if (object.contents != Digest{}) cache_->give_back(std::move(object));
 }
 
 uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
-  materials_.push_back(parts_->material(shot, name));
+  materials_.push_back(cache_->material(shot, name));
   material_names_.push_back(name);
   return uint32_t(materials_.size() - 1);
 }
@@ -125,22 +125,22 @@ uint32_t Scene::add_material(const Shot& shot, const std::string& name) {
 void Scene::add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle) {
   std::string material = "ground";
   Matte matte = Matte::none;
-  std::optional<Turn> turn;
+  std::optional<RotationalMotion> motion;
   for (const Obstacle& o : shot.obstacle)
     if (o.name == obstacle.name) {
       material = o.material, matte = o.matte;
-      if (o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1) turn.emplace(o, frame);
+      if (o.position.keys.size() > 1 || o.rotation_deg.keys.size() > 1) motion.emplace(o, frame);
     }
   const std::string what = fmt::format("obstacle '{}'", obstacle.name);
   add_object(obstacle.mesh, obstacle.name, what, add_material(shot, material), matte,
-             turn ? &*turn : nullptr);
+             motion ? &*motion : nullptr);
   check_yarns(objects_.back(), what);
   add_wetness(objects_.back(), obstacle.mesh, what);
 }
 
 /// Numbers the dielectric objects from the lowest priority up; of equals the fluid, which comes
 /// first, is the lowest.
-void Scene::find_bodies(bool has_fluid) {
+void Scene::find_bodies(FirstObject first) {
   for (uint32_t k = 0; k < objects_.size(); ++k)
     if (materials_[objects_[k].material].type == MaterialType::dielectric) bodies_.push_back(k);
   constexpr size_t most = std::numeric_limits<Bodies>::digits;
@@ -156,7 +156,7 @@ void Scene::find_bodies(bool has_fluid) {
     SceneObject& object = objects_[bodies_[bit]];
     object.body = Bodies{1} << bit;
     medium_.push_back({materials_[object.material].absorption, materials_[object.material].ior});
-    if (has_fluid && bodies_[bit] == 0) fluid_ = object.body;
+    if (first == FirstObject::fluid && bodies_[bit] == 0) fluid_ = object.body;
     find_lights_in(bodies_[bit]);
   }
 }
@@ -196,7 +196,7 @@ void Scene::find_mesh_lights() {
 
 /// One table for each pair of roughness and index that facets of the frame have.
 void Scene::find_albedos() {
-  const auto table = [&](float alpha, float eta) { return parts_->albedo(alpha, eta); };
+  const auto table = [&](float alpha, float eta) { return cache_->albedo(alpha, eta); };
   for (ShadingMaterial& m : materials_) {
     if (!m.has_facets()) continue;
     if (m.type == MaterialType::metal) {
@@ -209,7 +209,7 @@ void Scene::find_albedos() {
       const float eta = m.ior / medium_[k].ior;
       const bool coat = m.type == MaterialType::coated || m.type == MaterialType::cloth;
       if (coat) m.albedo_outside[k] = table(m.alpha, eta);
-      if (coat || std::abs(eta - 1) < kSameIndex) continue;
+      if (coat || std::abs(eta - 1) < same_index) continue;
       m.albedo_outside[k] = table(m.alpha, eta);
       m.albedo_inside[k] = table(m.alpha, 1 / eta);
     }
@@ -230,17 +230,18 @@ void Scene::find_features(Background background) {
                   [](const ShadingMaterial& m) { return m.has_facets() || m.is_fabric(); });
   has_gaps_ = std::any_of(materials_.begin(), materials_.end(),
                           [](const ShadingMaterial& m) { return m.gap > 0; });
-  features_ = (moving ? kMotionBlur : 0u) | (bodies_.empty() ? 0u : kDielectric) |
-              (lights_.can_sample() ? kSampledLights : 0u) | (camera_.has_lens() ? kThinLens : 0u) |
-              (facets || has_gaps_ ? kGlossy : 0u) |
-              (background == Background::clear || has_mattes() ? kMattes : 0u);
+  features_ = (moving ? Feature::motion_blur : 0u) | (bodies_.empty() ? 0u : Feature::dielectric) |
+              (lights_.can_sample() ? Feature::sampled_lights : 0u) |
+              (camera_.has_lens() ? Feature::thin_lens : 0u) |
+              (facets || has_gaps_ ? Feature::glossy : 0u) |
+              (background == Background::clear || has_mattes() ? Feature::mattes : 0u);
 }
 
 float Scene::ground_distance(const V3f& origin, const V3f& direction) const {
   const float t = (ground_center_.y - origin.y) / direction.y;
-  if (!(t > 0)) return kInfinity;  // also the ray that starts on it, at 0, and the parallel one
+  if (!(t > 0)) return infinity;  // also the ray that starts on it, at 0, and the parallel one
   const V3f p = origin + direction * t - ground_center_;
-  return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : kInfinity;
+  return std::max(std::abs(p.x), std::abs(p.z)) <= ground_half_size_ ? t : infinity;
 }
 
 void Scene::meet(uint32_t object, const Ray& ray, Coherence coherence, Hit& nearest) const {
@@ -266,13 +267,14 @@ Hit Scene::meet(uint32_t object, const Ray& ray, float reach) const {
 
 Hit Scene::intersect(const Ray& ray, Coherence coherence, World world) const {
   Hit hit;
-  hit.distance = kInfinity;
+  hit.distance = infinity;
   if (has_ground_ && (world == World::whole || ground_matte_ != Matte::none)) {
     hit.distance = ground_distance(ray.origin, ray.direction);
-    if (hit.distance < kInfinity) hit.kind = Hit::Kind::ground;
+    if (hit.distance < infinity) hit.kind = Hit::Kind::ground;
   }
   const Lights::Hit light = lights_.intersect(ray.origin, ray.direction, hit.distance);
-  if (light.light >= 0) hit = {Hit::Kind::light, light.distance, uint32_t(light.light), 0, 0, 0};
+  if (light.light >= 0)
+    hit = {.kind = Hit::Kind::light, .distance = light.distance, .index = uint32_t(light.light)};
   if (objects_.empty()) return hit;
   const BoxTest box(ray.origin, ray.direction);
   for (size_t k = 0; k < objects_.size(); ++k) {
@@ -306,10 +308,10 @@ namespace {
 
 /// Where a ray met a sphere, on it to rounding.
 void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surface& s) {
-  Imath::V4f sphere = object.sphere[hit.triangle], way(0);
+  Imath::V4f sphere = object.sphere[hit.triangle], displacement(0);
   if (object.moves()) {
-    way = object.sphere_close[hit.triangle] - sphere;
-    sphere += way * ray.time;
+    displacement = object.sphere_close[hit.triangle] - sphere;
+    sphere += displacement * ray.time;
   }
   const V3f center(sphere.x, sphere.y, sphere.z);
   s.geometric_normal = s.shading_normal =
@@ -317,8 +319,9 @@ void meet_sphere(const SceneObject& object, const Ray& ray, const Hit& hit, Surf
   s.position = center + s.geometric_normal * sphere.w;
   s.uv = V2f(0);
   s.small = true;
-  const V3f size = absolute(center) + absolute(V3f(way.x, way.y, way.z)) + V3f(sphere.w);
-  const V3f error = size * kRelativeError + V3f(largest(size) * kSharedError);
+  const V3f size = absolute(center) +
+                   absolute(V3f(displacement.x, displacement.y, displacement.z)) + V3f(sphere.w);
+  const V3f error = size * relative_position_error + V3f(largest(size) * shared_position_error);
   s.reach = dot(absolute(s.geometric_normal), error);
 }
 
@@ -363,7 +366,7 @@ std::pair<Packed, Packed> SceneObject::moved_vertex(uint32_t vertex, float time)
           between(key[first].normal, key[first + 1].normal, at)};
 }
 
-V3f SceneObject::way(const Hit& hit, float time) const {
+V3f SceneObject::displacement(const Hit& hit, float time) const {
   const size_t first = key.empty() ? 0 : segment(time);
   const auto& open = key.empty() ? position : key[first].position;
   const auto& close = key.empty() ? position_close : key[first + 1].position;
@@ -395,10 +398,11 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   const float w = 1 - hit.u - hit.v;
   const Packed position = a * w + b * hit.u + c * hit.v;
   Packed size = absolute(a) * w + absolute(b) * hit.u + absolute(c) * hit.v;
-  if (object.moves()) size = size + Packed(object.way(hit, ray.time));
-  const Packed error = size * kRelativeError + Packed(_mm_set1_ps(largest(size) * kSharedError));
+  if (object.moves()) size = size + Packed(object.displacement(hit, ray.time));
+  const Packed error =
+      size * relative_position_error + Packed(_mm_set1_ps(largest(size) * shared_position_error));
   position.store(s.position);
-  if (s.body && std::min({w, hit.u, hit.v}) < kNearEdge) keep_off_edges(corner, hit, error, s);
+  if (s.body && std::min({w, hit.u, hit.v}) < near_edge) keep_off_edges(corner, hit, error, s);
   const Packed flat = normalized(corner.across());
   s.reach = dot(absolute(flat), error);
   const Packed smooth =
@@ -414,8 +418,8 @@ Surface Scene::surface(const Ray& ray, const Hit& hit) const {
   s.triangle = hit.triangle;
   if (s.material->normal_map && !object.uv.empty()) {
     const V2f p = object.uv[t.y] - object.uv[t.x], q = object.uv[t.z] - object.uv[t.x];
-    const float turn = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
-    const V3f e = (b - a).unpacked() * turn, f = (c - a).unpacked() * turn;
+    const float side = p.x * q.y - p.y * q.x > 0 ? 1.f : -1.f;
+    const V3f e = (b - a).unpacked() * side, f = (c - a).unpacked() * side;
     map_normal(s, e * q.y - f * p.y, f * p.x - e * q.x);
   }
   s.contact = !object.contact.empty() && object.contact[hit.triangle];
@@ -442,8 +446,8 @@ Bodies Scene::bodies_at(const V3f& point, float time) const {
 bool Scene::is_inside(uint32_t object, const V3f& point, float time) const {
   const Ray up{point, V3f(0, 1, 0), time};
   // The mesh is closed and outward: a point is inside if the first side met is an inner one.
-  const Hit hit = meet(object, up, kInfinity);
+  const Hit hit = meet(object, up, infinity);
   return hit.kind != Hit::Kind::nothing && surface(up, hit).geometric_normal.y > 0;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -11,24 +11,25 @@
 #include "pipeline/contract/hash.h"
 #include "render/bsdf/bsdf.h"
 #include "render/bsdf/material.h"
+#include "render/frame_geometry.h"
 #include "render/light/lights.h"
 #include "render/options.h"
 #include "render/packed.h"
 #include "render/scene/camera.h"
 #include "render/scene/embree.h"
 
-namespace drench {
+namespace drench::render {
 
-/// The dielectric bodies that a point is in, one bit each; of several the highest fills the place.
+/// The dielectric bodies that a point is in, one bit each; of several the highest is the medium.
 using Bodies = uint32_t;
 
-/// What fills a place.
+/// What fills a point of space.
 struct Medium {
   V3f absorption{0, 0, 0};  // 1/m
   float ior = 1;
 };
 
-class Turn;
+class RotationalMotion;
 
 /// What a ray met first.
 struct Hit {
@@ -89,9 +90,9 @@ struct SceneObject {
     return {{Packed::load(p[t.x]), Packed::load(p[t.y]), Packed::load(p[t.z])},
             {Packed::load(n[t.x]), Packed::load(n[t.y]), Packed::load(n[t.z])}};
   }
-  /// How far a point of a triangle comes on the straight way that it is on, along each axis, m. By
-  /// so much its ends, of which a place between is made, may be larger than that place.
-  V3f way(const Hit& hit, float time) const;
+  /// How far a point of a triangle moves on its straight segment, along each axis, m. By so much
+  /// the ends, between which a position is interpolated, may be larger than that position.
+  V3f displacement(const Hit& hit, float time) const;
 
  private:
   Corners moved(uint32_t of, float time) const;
@@ -176,9 +177,9 @@ class Scene {
   /// Whether anything lies on the ray before (1 - 1e-4) of the distance of what it is aimed at.
   bool occluded(const Ray& ray, const Target& target, World world = World::whole,
                 Gaps gaps = Gaps::closed) const;
-  /// The share of light that comes along the ray: 0, 1, or what gaps of cloth let through.
+  /// The fraction of light that comes along the ray: 0, 1, or what gaps of cloth let through.
   float transmitted(const Ray& ray, const Target& target, World world = World::whole) const;
-  /// Whether the fluid fills a place in these bodies.
+  /// Whether the fluid is the medium in these bodies.
   bool in_fluid(Bodies in) const { return &medium(in) != &medium(in & ~fluid_); }
   /// Whether the fluid is where a ray starts that came through a gap of cloth.
   bool fluid_beyond(const Ray& ray) const;
@@ -200,7 +201,7 @@ class Scene {
   Surface surface(const Ray& ray, const Hit& hit) const;
   /// Of cloth: where u and v grow, the directions of warp and weft; 0 where there are no uv.
   std::pair<V3f, V3f> yarns_along(const Hit& hit, float time) const;
-  /// Of cloth: the share that is wet, 0 to 1.
+  /// Of cloth: the fraction that is wet, 0 to 1.
   float wetness(const Hit& hit) const;
   /// The bodies that a point lies in.
   Bodies bodies_at(const V3f& point, float time) const;
@@ -236,21 +237,22 @@ class Scene {
   unsigned features() const { return features_; }
 
  private:
-  static constexpr float kVisibleMotion = 0.1f;  // pixels over the shutter
+  static constexpr float visible_motion = 0.1f;  // pixels over the shutter
 
   void add_obstacle(const Shot& shot, int frame, const ObstacleFrame& obstacle);
   void add_foam(const FoamFrame& foam);
   void add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                  uint32_t material, Matte matte, const Turn* turn = nullptr);
+                  uint32_t material, Matte matte, const RotationalMotion* motion = nullptr);
   /// Straight segments that its course over the shutter takes; 0: its velocity says enough.
-  int segments_of(const TriangleMesh& mesh, const Turn& turn) const;
-  void turn_object(SceneObject& object, const TriangleMesh& mesh, const Turn& turn,
-                   int segments) const;
+  int segments_of(const TriangleMesh& mesh, const RotationalMotion& motion) const;
+  void add_motion_keys(SceneObject& object, const TriangleMesh& mesh,
+                       const RotationalMotion& motion, int segments) const;
   void check_yarns(const SceneObject& object, const std::string& what) const;
   void find_fabrics();
   void add_wetness(SceneObject& object, const TriangleMesh& mesh, const std::string& what);
   uint32_t add_material(const Shot& shot, const std::string& name);
-  void find_bodies(bool has_fluid);
+  enum class FirstObject { fluid, other };
+  void find_bodies(FirstObject first);
   void find_mesh_lights();
   void find_lights_in(uint32_t body);
   /// Whether anything in a box may lie within a body, or on its surface, while the shutter is open.
@@ -280,7 +282,7 @@ class Scene {
   double fps_ = 24;
   bool keeps_velocities_ = false;
   ShutterCamera camera_;
-  std::shared_ptr<KeptParts> parts_;
+  std::shared_ptr<SceneCache> cache_;
   Lights lights_;
   std::vector<ShadingMaterial> materials_;
   std::vector<std::string> material_names_;
@@ -298,4 +300,4 @@ class Scene {
   unsigned features_ = 0;
 };
 
-}  // namespace drench
+}  // namespace drench::render

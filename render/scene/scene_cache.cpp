@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -16,25 +16,25 @@ EmbreeDevice make_device() {
 
 }  // namespace
 
-KeptParts::KeptParts(PictureMemory picture_memory)
+SceneCache::SceneCache(PictureMemory picture_memory)
     : device_(make_device()), picture_memory_(picture_memory) {}
 
-ShadingMaterial KeptParts::material(const Shot& shot, const std::string& name) {
+ShadingMaterial SceneCache::material(const Shot& shot, const std::string& name) {
   const std::lock_guard lock(mutex_);
   const auto known = materials_.find(name);
   if (known != materials_.end()) return known->second;
   return materials_.emplace(name, find_material(shot, name, picture_memory_)).first->second;
 }
 
-std::shared_ptr<const Environment> KeptParts::environment(const Light& light,
-                                                          Environment::Sampling sampling) {
+std::shared_ptr<const Environment> SceneCache::environment(const Light& light,
+                                                           Environment::Sampling sampling) {
   const std::lock_guard lock(mutex_);
   std::shared_ptr<const Environment>& known = environments_[{sampling, light.name}];
   if (!known) known = std::make_shared<const Environment>(light, sampling, picture_memory_);
   return known;
 }
 
-std::shared_ptr<const AlbedoTable> KeptParts::albedo(float alpha, float eta) {
+std::shared_ptr<const AlbedoTable> SceneCache::albedo(float alpha, float eta) {
   const std::lock_guard lock(mutex_);
   std::shared_ptr<const AlbedoTable>& known = albedos_[{alpha, eta}];
   if (!known)
@@ -43,7 +43,7 @@ std::shared_ptr<const AlbedoTable> KeptParts::albedo(float alpha, float eta) {
   return known;
 }
 
-std::optional<SceneObject> KeptParts::take(const Digest& contents) {
+std::optional<SceneObject> SceneCache::take(const Digest& contents) {
   const std::lock_guard lock(mutex_);
   const auto found = std::find_if(objects_.begin(), objects_.end(),
                                   [&](const SceneObject& o) { return o.contents == contents; });
@@ -53,12 +53,12 @@ std::optional<SceneObject> KeptParts::take(const Digest& contents) {
   return object;
 }
 
-void KeptParts::give_back(SceneObject object) {
+void SceneCache::give_back(SceneObject object) {
   const std::lock_guard lock(mutex_);
   const auto same_name = [&](const SceneObject& o) { return o.name == object.name; };
-  if (size_t(std::count_if(objects_.begin(), objects_.end(), same_name)) == kOfOneName)
+  if (size_t(std::count_if(objects_.begin(), objects_.end(), same_name)) == max_objects_per_name)
     objects_.erase(std::find_if(objects_.begin(), objects_.end(), same_name));
   objects_.push_back(std::move(object));
 }
 
-}  // namespace drench
+}  // namespace drench::render

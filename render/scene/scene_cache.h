@@ -1,6 +1,6 @@
 #pragma once
 // What the frames of a shot share: pictures, tables and Embree scenes of objects that stand. Safe
-// from several frames at once; a frame has the same bits with parts kept and without.
+// from several frames at once; a frame has the same bits with a cache and without.
 
 #include <map>
 #include <memory>
@@ -13,18 +13,19 @@
 #include "pipeline/contract/hash.h"
 #include "render/scene/scene.h"
 
-namespace drench {
+namespace drench::render {
 
-class KeptParts {
+class SceneCache final : public EnvironmentSource {
  public:
   /// @param picture_memory  what all pictures may take together
-  explicit KeptParts(PictureMemory picture_memory = {});
+  explicit SceneCache(PictureMemory picture_memory = {});
 
   const EmbreeDevice& device() const { return device_; }
   /// find_material of the shot, read once.
   ShadingMaterial material(const Shot& shot, const std::string& name);
   /// The shot's one environment, read once.
-  std::shared_ptr<const Environment> environment(const Light& light, Environment::Sampling);
+  std::shared_ptr<const Environment> environment(const Light& light,
+                                                 Environment::Sampling sampling) override;
   /// Of facets that divide indices of ratio `eta`; 0: of mirrors.
   std::shared_ptr<const AlbedoTable> albedo(float alpha, float eta);
 
@@ -35,7 +36,7 @@ class KeptParts {
  private:
   /// Of objects of one name: one for every frame that may be at work. More would only pile up
   /// where a sheet creeps too slowly to be blurred.
-  static constexpr size_t kOfOneName = 4;
+  static constexpr size_t max_objects_per_name = 4;
 
   EmbreeDevice device_;
   std::mutex mutex_;
@@ -47,4 +48,4 @@ class KeptParts {
   std::vector<SceneObject> objects_;  // oldest first
 };
 
-}  // namespace drench
+}  // namespace drench::render

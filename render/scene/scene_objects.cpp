@@ -10,13 +10,13 @@
 #include "render/scene/scene.h"
 #include "render/scene/scene_cache.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float infinity = std::numeric_limits<float>::infinity();
 /// Of foam: froth scatters light many times and absorbs next to none.
-constexpr float kFoamReflectance = 0.9f;
+constexpr float foam_reflectance = 0.9f;
 
 void check_embree(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
@@ -58,7 +58,7 @@ void check_foam(const FoamFrame& foam) {
                             foam.velocity.size(), foam.radius.size()));
   for (size_t k = 0; k < n; ++k)
     if (!finite(foam.position[k]) || !finite(foam.velocity[k]) || !(foam.radius[k] > 0) ||
-        !(foam.radius[k] < kInfinity))
+        !(foam.radius[k] < infinity))
       throw Error(
           fmt::format("foam: particle {} is not finite or has no radius; make the foam anew", k));
 }
@@ -95,7 +95,7 @@ Imath::Box3f bounds_of(const SceneObject& object) {
 bool Scene::moves_visibly(const TriangleMesh& mesh) const {
   if (mesh.velocity.empty() || close_ == open_) return false;
   const float shutter = float((close_ - open_) / fps_);  // s
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  const float limit = visible_motion / (shutter * camera_.pixels_per_radian());
   for (const auto& t : mesh.triangle) {
     const V3f &a = mesh.position[t.x], &b = mesh.position[t.y], &c = mesh.position[t.z];
     const V3f middle = (a + b + c) / 3;
@@ -125,12 +125,12 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
 }
 
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
-                       uint32_t material, Matte matte, const Turn* turn) {
+                       uint32_t material, Matte matte, const RotationalMotion* motion) {
   check_mesh(mesh, what);
-  const int segments = turn ? segments_of(mesh, *turn) : 0;
+  const int segments = motion ? segments_of(mesh, *motion) : 0;
   const bool moves = segments > 0 || moves_visibly(mesh);
   const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);
-  if (std::optional<SceneObject> kept = moves ? std::nullopt : parts_->take(contents)) {
+  if (std::optional<SceneObject> kept = moves ? std::nullopt : cache_->take(contents)) {
     kept->material = material;
     kept->light = -1;
     kept->matte = matte;
@@ -158,7 +158,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
     return moved;
   };
   if (segments > 0) {
-    turn_object(object, mesh, *turn, segments);
+    add_motion_keys(object, mesh, *motion, segments);
   } else if (moves) {
     object.position = at(open_);
     object.position_close = at(close_);
@@ -171,7 +171,7 @@ void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const 
 bool Scene::moves_visibly(const FoamFrame& foam) const {
   const float shutter = float((close_ - open_) / fps_);  // s
   if (shutter == 0) return false;
-  const float limit = kVisibleMotion / (shutter * camera_.pixels_per_radian());
+  const float limit = visible_motion / (shutter * camera_.pixels_per_radian());
   for (size_t k = 0; k < foam.position.size(); ++k) {
     const float distance = (foam.position[k] - camera_.open().position).length();
     if (foam.velocity[k].length() > limit * std::max(0.f, distance - foam.radius[k])) return true;
@@ -182,7 +182,7 @@ bool Scene::moves_visibly(const FoamFrame& foam) const {
 void Scene::add_foam(const FoamFrame& foam) {
   check_foam(foam);
   ShadingMaterial white;
-  white.reflectance = V3f(kFoamReflectance);
+  white.reflectance = V3f(foam_reflectance);
   white.transmittance = white.absorption = V3f(0);
   materials_.push_back(white);
   material_names_.push_back("foam");
@@ -209,7 +209,7 @@ void Scene::add_foam(const FoamFrame& foam) {
 }
 
 EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  EmbreeGeometry geometry(rtcNewGeometry(cache_->device().get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   const size_t vertices = object.position.size() - 1;
   const std::vector<const V3f*> keys = object.keys();
   rtcSetGeometryTimeStepCount(geometry.get(), unsigned(keys.size()));
@@ -223,7 +223,7 @@ EmbreeGeometry Scene::triangles_of(const SceneObject& object) const {
 }
 
 EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
-  EmbreeGeometry geometry(rtcNewGeometry(parts_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
+  EmbreeGeometry geometry(rtcNewGeometry(cache_->device().get(), RTC_GEOMETRY_TYPE_SPHERE_POINT));
   rtcSetGeometryTimeStepCount(geometry.get(), object.moves() ? 2 : 1);
   unsigned step = 0;
   for (const std::vector<Imath::V4f>* spheres : {&object.sphere, &object.sphere_close})
@@ -234,19 +234,19 @@ EmbreeGeometry Scene::spheres_of(const SceneObject& object) const {
 }
 
 void Scene::build(SceneObject& object) {
-  if (object.scene) return;  // it was kept
+  if (object.scene) return;  // from the cache
   object.bounds = bounds_of(object);
   const EmbreeGeometry geometry = object.sphere.empty() ? triangles_of(object) : spheres_of(object);
   rtcSetGeometryMask(geometry.get(), 0xffffffffu);
   rtcCommitGeometry(geometry.get());
-  object.scene.reset(rtcNewScene(parts_->device().get()));
+  object.scene.reset(rtcNewScene(cache_->device().get()));
   if (materials_[object.material].type == MaterialType::dielectric)
     rtcSetSceneFlags(object.scene.get(), RTC_SCENE_FLAG_ROBUST);
   // High quality would split triangles differently for different thread counts.
   rtcSetSceneBuildQuality(object.scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   rtcAttachGeometry(object.scene.get(), geometry.get());
   rtcJoinCommitScene(object.scene.get());
-  check_embree(parts_->device().get());
+  check_embree(cache_->device().get());
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -6,7 +6,7 @@
 
 #include "render/color/color.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -29,10 +29,10 @@ bool has_text(Bytes bytes, size_t at, std::string_view text) {
 
 /// The data of a tag; empty if there is none.
 Bytes tag(Bytes profile, std::string_view name) {
-  constexpr size_t kTable = 128, kEntry = 12, kMostTags = 1000;
-  const size_t count = std::min<size_t>(number(profile, kTable, 4), kMostTags);
+  constexpr size_t table_offset = 128, entry_size = 12, max_tags = 1000;
+  const size_t count = std::min<size_t>(number(profile, table_offset, 4), max_tags);
   for (size_t k = 0; k < count; ++k) {
-    const size_t entry = kTable + 4 + k * kEntry;
+    const size_t entry = table_offset + 4 + k * entry_size;
     if (!has_text(profile, entry, name)) continue;
     const size_t at = number(profile, entry + 4, 4), size = number(profile, entry + 8, 4);
     if (at > profile.size() || size > profile.size() - at) return {};
@@ -67,9 +67,9 @@ ColourCode::Curve sampled_curve(Bytes data) {
   std::vector<float> value(count);
   for (size_t k = 0; k < count; ++k) value[k] = float(number(data, 12 + 2 * k, 2)) / 65535;
   return [value](float x) {
-    const float place = x * float(value.size() - 1);
-    const size_t k = std::min(size_t(place), value.size() - 2);
-    const float t = place - float(k);
+    const float position = x * float(value.size() - 1);
+    const size_t k = std::min(size_t(position), value.size() - 2);
+    const float t = position - float(k);
     return value[k] * (1 - t) + value[k + 1] * t;
   };
 }
@@ -77,10 +77,10 @@ ColourCode::Curve sampled_curve(Bytes data) {
 /// Y = (aX + b)^g + c or e from X = d on, cX + f below; Table 68 of ICC.1:2022.
 ColourCode::Curve parametric_curve(Bytes data) {
   const size_t kind = number(data, 8, 2);
-  constexpr size_t kCount[] = {1, 3, 4, 5, 7};
-  if (kind > 4 || data.size() < 12 + 4 * kCount[kind]) return {};
+  constexpr size_t parameter_count[] = {1, 3, 4, 5, 7};
+  if (kind > 4 || data.size() < 12 + 4 * parameter_count[kind]) return {};
   double p[7] = {};
-  for (size_t k = 0; k < kCount[kind]; ++k) p[k] = fixed(data, 12 + 4 * k);
+  for (size_t k = 0; k < parameter_count[kind]; ++k) p[k] = fixed(data, 12 + 4 * k);
   double g = p[0], a = 1, b = 0, d = 0, slope = 0, above = 0, below = 0;
   if (kind >= 1) a = p[1], b = p[2];
   if (kind == 1 || kind == 2) d = a != 0 ? -b / a : 0;
@@ -126,17 +126,19 @@ Imath::V2f chromaticity(const Colorant& c) {
 
 /// Within what profiles of sRGB by different makers differ.
 bool is_srgb(const std::array<Colorant, 3>& rgb, const std::array<ColourCode::Curve, 3>& curves) {
-  constexpr Colorant kSrgb[3] = {// IEC 61966-2-1 adapted to D50 by Bradford
-                                 {0.4360, 0.2225, 0.0139},
-                                 {0.3851, 0.7169, 0.0971},
-                                 {0.1431, 0.0606, 0.7141}};
-  constexpr double kNear = 0.002;
+  constexpr Colorant srgb_colorant[3] = {// IEC 61966-2-1 adapted to D50 by Bradford
+                                         {0.4360, 0.2225, 0.0139},
+                                         {0.3851, 0.7169, 0.0971},
+                                         {0.1431, 0.0606, 0.7141}};
+  constexpr double tolerance = 0.002;
   for (size_t c = 0; c < 3; ++c) {
-    if (std::abs(rgb[c].x - kSrgb[c].x) > kNear || std::abs(rgb[c].y - kSrgb[c].y) > kNear ||
-        std::abs(rgb[c].z - kSrgb[c].z) > kNear)
+    if (std::abs(rgb[c].x - srgb_colorant[c].x) > tolerance ||
+        std::abs(rgb[c].y - srgb_colorant[c].y) > tolerance ||
+        std::abs(rgb[c].z - srgb_colorant[c].z) > tolerance)
       return false;
     for (int k = 0; k <= 255; ++k)
-      if (std::abs(curves[c](float(k) / 255) - srgb_decode(float(k) / 255)) > kNear) return false;
+      if (std::abs(curves[c](float(k) / 255) - srgb_decode(float(k) / 255)) > tolerance)
+        return false;
   }
   return true;
 }
@@ -186,4 +188,4 @@ IccProfile::IccProfile(Bytes bytes) : code_(code_of(bytes, why_not_)) {
   if (const std::string text = description(bytes); !text.empty()) name_ = text;
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -8,7 +8,7 @@
 
 #include "render/texture/picture.h"
 
-namespace drench {
+namespace drench::render {
 
 /// Method: ICC.1:2022 (profile version 4.4), clauses 7 (header, tags), 8.3.3 (three-component
 /// matrix-based profiles), 10.6 (curveType) and 10.18 (parametricCurveType); annex F.
@@ -28,4 +28,4 @@ class IccProfile {
   std::optional<ColourCode> code_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

@@ -16,17 +16,17 @@
 #include "render/texture/icc_profile.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kLargestFile = uint64_t(1) << 32;
-constexpr uint64_t kLargestPixels = uint64_t(1) << 28;  // 16384 x 16384
+constexpr uint64_t max_file_size = uint64_t(1) << 32;
+constexpr uint64_t max_pixels = uint64_t(1) << 28;  // 16384 x 16384
 /// Beyond this a conversion of primaries may leave float's range.
-constexpr float kLargestSample = 1e37f;
-constexpr double kGib = double(1 << 30);
+constexpr float max_sample = 1e37f;
+constexpr double bytes_per_gib = double(1 << 30);
 
 using Reader = Raster (*)(const PictureFile&);
 struct Format {
@@ -36,7 +36,7 @@ struct Format {
 };
 
 using namespace std::string_view_literals;
-constexpr Format kFormats[] = {
+constexpr Format known_formats[] = {
     {"PNG", "\x89PNG"sv, read_png},
     {"JPEG", "\xff\xd8\xff"sv, read_jpeg},
     {"EXR", "\x76\x2f\x31\x01"sv, read_exr_picture},
@@ -47,12 +47,12 @@ constexpr Format kFormats[] = {
     {"TIFF", "MM\0+"sv, read_tiff},
 };
 
-/// What a file is by bytes that stand at a place in it.
+/// What a file is by bytes that stand at an offset in it.
 struct Signature {
   size_t at;
   std::string_view bytes, name;
 };
-constexpr Signature kUnread[] = {
+constexpr Signature unread_formats[] = {
     {0, "GIF8"sv, "a GIF"},
     {8, "WEBP"sv, "a WebP"},
     {0, "BM"sv, "a BMP"},
@@ -91,7 +91,7 @@ bool holds(const std::vector<std::byte>& file, size_t at, std::string_view bytes
 /// "it is a WebP", or its first bytes.
 std::string looks_like(const std::vector<std::byte>& file) {
   if (file.empty()) return "it is empty";
-  for (const Signature& known : kUnread)
+  for (const Signature& known : unread_formats)
     if (holds(file, known.at, known.bytes)) return fmt::format("it is {}", known.name);
   std::string codes;
   for (size_t k = 0; k < std::min<size_t>(file.size(), 8); ++k)
@@ -116,7 +116,7 @@ void check_finite(const PictureFile& file, const Raster& picture, const Finite& 
         file.fail(fmt::format("pixel {}, {} is {} ({}); repair it", p % size_t(picture.width),
                               p / size_t(picture.width),
                               std::isfinite(float(value))
-                                  ? fmt::format("above {} in size", kLargestSample)
+                                  ? fmt::format("above {} in size", max_sample)
                                   : "not finite",
                               float(value)));
     }
@@ -126,7 +126,7 @@ void check_finite(const PictureFile& file, const Raster& picture) {
   if (picture.sample == Raster::Sample::f16)
     check_finite<Imath::half>(file, picture, [](Imath::half h) { return h.isFinite(); });
   if (picture.sample == Raster::Sample::f32)
-    check_finite<float>(file, picture, [](float f) { return std::abs(f) <= kLargestSample; });
+    check_finite<float>(file, picture, [](float f) { return std::abs(f) <= max_sample; });
 }
 
 bool is_real(Raster::Sample sample) {
@@ -153,7 +153,8 @@ void PictureMemory::take(const fs::path& path, const std::string& what, uint64_t
     throw Error(fmt::format(
         "{}: {} take {:.3g} GiB, and --memory {:.3g} leaves {:.3g} GiB for it; give a smaller "
         "picture or a larger --memory",
-        path.string(), what, double(bytes) / kGib, double(most_) / kGib, double(left) / kGib));
+        path.string(), what, double(bytes) / bytes_per_gib, double(most_) / bytes_per_gib,
+        double(left) / bytes_per_gib));
   taken_ += bytes;
 }
 
@@ -194,10 +195,9 @@ void PictureFile::warn_of_alpha(uint64_t transparent) const {
 
 void PictureFile::make_room(Raster& picture, uint64_t width, uint64_t height,
                             uint64_t beside) const {
-  if (width == 0 || height == 0 || width > kLargestPixels || height > kLargestPixels ||
-      width * height > kLargestPixels)
-    fail(
-        fmt::format("it has {} x {} pixels; there must be 1 to {}", width, height, kLargestPixels));
+  if (width == 0 || height == 0 || width > max_pixels || height > max_pixels ||
+      width * height > max_pixels)
+    fail(fmt::format("it has {} x {} pixels; there must be 1 to {}", width, height, max_pixels));
   const uint64_t own = width * height * uint64_t(picture.stride) * bytes_of(picture.sample);
   memory_.take(path_, described(picture, width, height), own + beside);
   memory_.give_back(beside);
@@ -247,9 +247,9 @@ std::optional<Imf::Chromaticities> PictureFile::other_primaries(const Imf::Chrom
 Raster read_picture(const fs::path& path, PictureUse use, PictureMemory& memory) {
   std::error_code none;
   const uint64_t size = fs::file_size(path, none);
-  if (!none) memory.take(path, "the bytes of the file", std::min(size, kLargestFile));
-  std::vector<std::byte> bytes = read_file(path, kLargestFile);
-  for (const Format& format : kFormats) {
+  if (!none) memory.take(path, "the bytes of the file", std::min(size, max_file_size));
+  std::vector<std::byte> bytes = read_file(path, max_file_size);
+  for (const Format& format : known_formats) {
     if (!holds(bytes, 0, format.magic)) continue;
     const PictureFile file(path, std::move(bytes), use, memory, format.name);
     try {
@@ -264,4 +264,4 @@ Raster read_picture(const fs::path& path, PictureUse use, PictureMemory& memory)
   fail_unread(path, bytes);
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace drench {
+namespace drench::render {
 
 /// Colours and skies are light. Data (normals) are numbers: what a file says of colours is not for
 /// them.
@@ -72,4 +72,4 @@ size_t bytes_of(Raster::Sample sample);
 ///         read, is damaged or cut off, has a pixel that is not finite, or is too large.
 Raster read_picture(const std::filesystem::path& path, PictureUse use, PictureMemory& memory);
 
-}  // namespace drench
+}  // namespace drench::render

@@ -23,15 +23,15 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// No codec of OpenEXR packs much tighter than deflate's 1032 to 1, so a header that promises far
 /// more pixels than the file could hold is refused before memory is taken for them.
-constexpr uint64_t kLargestPacking = 4096;
-constexpr int kMostRows = 256;             // read at once,
-constexpr uint64_t kMostAtOnce = 1 << 24;  // in so many bytes
+constexpr uint64_t max_compression_ratio = 4096;
+constexpr int max_rows_at_once = 256;            // read at once,
+constexpr uint64_t max_bytes_at_once = 1 << 24;  // in so many bytes
 
 /// Which channels of a file are its colours.
 struct Choice {
@@ -67,7 +67,7 @@ Choice choice_in(const Imf::Header& header, int part, const std::string& layer) 
        {std::array{"R", "G", "B"}, std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}})
     if (all({names[0], names[1], names[2]}))
       return {Kind::rgb, part, layer, {layer + names[0], layer + names[1], layer + names[2]}};
-  if (all({"X", "Y"})) return {};  // a place or direction
+  if (all({"X", "Y"})) return {};  // a position or direction
   if (all({"Y", "RY", "BY"}))
     return {Kind::luminance_chroma, part, layer, {layer + "Y", layer + "RY", layer + "BY"}};
   if (all({"Y"})) return {Kind::grey, part, layer, {layer + "Y"}};
@@ -76,18 +76,18 @@ Choice choice_in(const Imf::Header& header, int part, const std::string& layer) 
 
 /// "part 1 'depth' of 2: Z; part ...".
 std::string contents_of(const Imf::MultiPartInputFile& exr) {
-  constexpr size_t kMostNames = 12;
-  constexpr int kMostParts = 8;
+  constexpr size_t max_names = 12;
+  constexpr int max_parts = 8;
   std::vector<std::string> parts;
-  for (int p = 0; p < std::min(exr.parts(), kMostParts); ++p) {
+  for (int p = 0; p < std::min(exr.parts(), max_parts); ++p) {
     const Imf::Header& header = exr.header(p);
     std::vector<std::string> names;
     for (auto at = header.channels().begin(); at != header.channels().end(); ++at)
       names.push_back(std::string(at.name()).substr(0, 64));
     const size_t count = names.size();
-    names.resize(std::min(count, kMostNames));
+    names.resize(std::min(count, max_names));
     const std::string more =
-        count > kMostNames ? fmt::format(" and {} more", count - kMostNames) : "";
+        count > max_names ? fmt::format(" and {} more", count - max_names) : "";
     parts.push_back(exr.parts() == 1
                         ? fmt::format("{}{}", fmt::join(names, ", "), more)
                         : fmt::format("part {}{}: {}{}", p + 1,
@@ -95,7 +95,7 @@ std::string contents_of(const Imf::MultiPartInputFile& exr) {
                                       fmt::join(names, ", "), more));
   }
   const std::string more =
-      exr.parts() > kMostParts ? fmt::format("; and {} parts more", exr.parts() - kMostParts) : "";
+      exr.parts() > max_parts ? fmt::format("; and {} parts more", exr.parts() - max_parts) : "";
   return fmt::format("{}{}", fmt::join(parts, "; "), more);
 }
 
@@ -113,7 +113,7 @@ class ByteStream : public Imf::IStream {
     return at_ < bytes_.size();
   }
   uint64_t tellg() override { return at_; }
-  void seekg(uint64_t place) override { at_ = place; }
+  void seekg(uint64_t offset) override { at_ = offset; }
 
  private:
   const std::vector<std::byte>& bytes_;
@@ -216,7 +216,7 @@ class ExrReader {
                              text(data_), text(display_)));
     const uint64_t size = file_.bytes().size();
     const uint64_t width = width_of(data_), height = height_of(data_);
-    if (width > 1 << 20 || height > 1 << 20 || width * height / kLargestPacking > size)
+    if (width > 1 << 20 || height > 1 << 20 || width * height / max_compression_ratio > size)
       file_.fail(
           fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
                       "forged. Write it again or give another",
@@ -253,7 +253,7 @@ class ExrReader {
     }
   }
 
-  /// Copies what is seen of a row of the data window into its place.
+  /// Copies what is seen of a row of the data window to where it belongs.
   void place_row(Raster& picture, int y, const std::byte* row) const {
     const size_t pixel = size_t(picture.colours) * bytes_of(picture.sample);
     const size_t to =
@@ -271,9 +271,9 @@ class ExrReader {
 
   /// What the library keeps of all channels: a row of tiles, or the lines of its largest chunks.
   uint64_t taken_by_library(const Imf::Header& header) const {
-    constexpr uint64_t kLines = 256;
+    constexpr uint64_t chunk_lines = 256;
     const uint64_t lines =
-        header.hasTileDescription() ? uint64_t(header.tileDescription().ySize) : kLines;
+        header.hasTileDescription() ? uint64_t(header.tileDescription().ySize) : chunk_lines;
     uint64_t pixel = 0;
     for (auto at = header.channels().begin(); at != header.channels().end(); ++at)
       pixel += at.channel().type == Imf::HALF ? 2 : 4;
@@ -289,7 +289,7 @@ class ExrReader {
     const Imf::PixelType type = half ? Imf::HALF : Imf::FLOAT;
     const size_t sample = bytes_of(picture.sample), pixel = sample * choice_.channels.size();
     const size_t width = width_of(data_), row = width * pixel;
-    const int at_once = std::clamp(int(kMostAtOnce / row), 1, kMostRows);
+    const int at_once = std::clamp(int(max_bytes_at_once / row), 1, max_rows_at_once);
     const uint64_t buffer = uint64_t(at_once) * (row + width * sizeof(float));
     file_.make_room(picture, width_of(display_), height_of(display_),
                     buffer + taken_by_library(header));
@@ -371,4 +371,4 @@ Raster read_exr_picture(const PictureFile& file) {
   }
 }
 
-}  // namespace drench
+}  // namespace drench::render

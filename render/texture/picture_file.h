@@ -8,7 +8,7 @@
 
 #include "render/texture/picture.h"
 
-namespace drench {
+namespace drench::render {
 
 class PictureFile {
  public:
@@ -80,4 +80,4 @@ class Orientation {
   int code_, columns_, rows_;
 };
 
-}  // namespace drench
+}  // namespace drench::render

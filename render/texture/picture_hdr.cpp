@@ -13,7 +13,7 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -27,19 +27,19 @@ class HdrReader {
 
   Raster read() {
     read_header();
-    const Orientation place = read_resolution();
+    const Orientation orientation = read_resolution();
     Raster picture;
     picture.sample = Raster::Sample::f32;
     picture.code = ColourCode::linear(primaries_);
     // Runs hold 255 pixels or, of the old kind, any number; what is cut off is seen as it is read.
-    file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()));
+    file_.make_room(picture, uint64_t(orientation.width()), uint64_t(orientation.height()));
     std::vector<Rgbe> line(static_cast<size_t>(columns_));
     auto* texel = reinterpret_cast<float*>(picture.bytes.data());
     for (int row = 0; row < rows_; ++row) {
       read_line(line, row);
       for (int column = 0; column < columns_; ++column) {
         const V3f rgb = radiance_of(line[size_t(column)]);
-        std::memcpy(texel + 3 * place.pixel(column, row), &rgb, sizeof rgb);
+        std::memcpy(texel + 3 * orientation.pixel(column, row), &rgb, sizeof rgb);
       }
     }
     if (at_ < file_.bytes().size())
@@ -52,8 +52,8 @@ class HdrReader {
   /// Up to the end of the line, which must be there.
   std::string text_line() {
     std::string out;
-    constexpr size_t kLongest = 1 << 16;
-    while (at_ < file_.bytes().size() && out.size() < kLongest) {
+    constexpr size_t max_length = 1 << 16;
+    while (at_ < file_.bytes().size() && out.size() < max_length) {
       const char c = char(file_.bytes()[at_++]);
       if (c == '\n') {
         if (!out.empty() && out.back() == '\r') out.pop_back();
@@ -64,17 +64,18 @@ class HdrReader {
     file_.fail(
         fmt::format("its header has no end or a line of more than {} bytes; write it again or "
                     "give another",
-                    kLongest));
+                    max_length));
   }
 
+  enum class Sign { any, positive };
   /// Numbers after the '='. Fewer than `count`, or such that are not finite, or not above 0 where
   /// they must be: none.
-  std::vector<float> numbers(const std::string& line, size_t count, bool positive = false) {
+  std::vector<float> numbers(const std::string& line, size_t count, Sign sign = Sign::any) {
     std::vector<float> out;
     const char* from = line.c_str() + line.find('=') + 1;
     for (char* to = nullptr; out.size() < count; from = to) {
       const float value = std::strtof(from, &to);
-      if (to == from || !std::isfinite(value) || (positive && value <= 0)) break;
+      if (to == from || !std::isfinite(value) || (sign == Sign::positive && value <= 0)) break;
       out.push_back(value);
     }
     if (out.size() == count) return out;
@@ -92,10 +93,10 @@ class HdrReader {
         if (!xyz_ && line.find("rgbe") == std::string::npos)
           file_.fail(fmt::format("its {} is not known; give 32-bit_rle_rgbe", line.substr(0, 60)));
       } else if (begins("EXPOSURE=")) {  // each multiplied the pixels by so much
-        const auto found = numbers(line, 1, true);
+        const auto found = numbers(line, 1, Sign::positive);
         if (!found.empty()) scale_ *= 1 / found[0];
       } else if (begins("COLORCORR=")) {
-        const auto found = numbers(line, 3, true);
+        const auto found = numbers(line, 3, Sign::positive);
         if (!found.empty()) scale_ *= V3f(1 / found[0], 1 / found[1], 1 / found[2]);
       } else if (begins("PRIMARIES=")) {
         read_primaries(line);
@@ -157,9 +158,9 @@ class HdrReader {
   }
 
   void read_line(std::vector<Rgbe>& line, int row) {
-    constexpr size_t kShortest = 8, kLongest = 0x7fff;  // that the new kind of runs is for
+    constexpr size_t min_length = 8, max_length = 0x7fff;  // that the new kind of runs is for
     Rgbe first = pixel(row);
-    if (line.size() >= kShortest && line.size() <= kLongest && first.r == 2 && first.g == 2 &&
+    if (line.size() >= min_length && line.size() <= max_length && first.r == 2 && first.g == 2 &&
         first.b < 128) {
       if (size_t(first.b) << 8 != (line.size() & ~size_t(255)) || first.e != (line.size() & 255))
         damaged(row);
@@ -222,4 +223,4 @@ class HdrReader {
 
 Raster read_hdr(const PictureFile& file) { return HdrReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

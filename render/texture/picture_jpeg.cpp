@@ -16,12 +16,12 @@
 
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// A file of more scans only takes time: a picture that is refined bit by bit has a dozen or two.
-constexpr int kMostScans = 200;
+constexpr int max_scans = 200;
 
 /// What libjpeg is given and says. It reports errors by a jump, so nothing with a destructor may
 /// live here.
@@ -72,9 +72,9 @@ void on_message(j_common_ptr info, int level) {
 }
 
 void on_progress(j_common_ptr info) {
-  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= kMostScans) return;
+  if (reinterpret_cast<j_decompress_ptr>(info)->input_scan_number <= max_scans) return;
   Jpeg& state = state_of(info);
-  std::snprintf(state.error, sizeof state.error, "it has more than %d scans", kMostScans);
+  std::snprintf(state.error, sizeof state.error, "it has more than %d scans", max_scans);
   std::longjmp(state.jump, 1);
 }
 
@@ -96,13 +96,15 @@ bool read_header(Jpeg& state, const std::byte* data, size_t size) {
   return true;
 }
 
-/// 4 inks to R, G and B without their press: each takes its share of the light that the other
+enum class Inks { plain, inverted };
+
+/// 4 inks to R, G and B without their press: each takes its part of the light that the other
 /// inks and black leave. With Adobe's marker the samples are 255 where there is no ink.
-void from_inks(const uint8_t* inks, uint8_t* rgb, size_t pixels, bool inverted) {
+void from_inks(const uint8_t* inks, uint8_t* rgb, size_t pixels, Inks stored) {
   for (size_t p = 0; p < pixels; ++p)
     for (size_t c = 0; c < 3; ++c) {
       const int ink = inks[4 * p + c], black = inks[4 * p + 3];
-      const int product = inverted ? ink * black : (255 - ink) * (255 - black);
+      const int product = stored == Inks::inverted ? ink * black : (255 - ink) * (255 - black);
       rgb[3 * p + c] = uint8_t((product + 127) / 255);
     }
 }
@@ -117,7 +119,8 @@ bool read_rows(Jpeg& state, uint8_t* to, uint8_t* inks) {
     uint8_t* row = to + stride * j.output_width * j.output_scanline;
     uint8_t* into = inks ? inks : row;
     jpeg_read_scanlines(&j, &into, 1);
-    if (inks) from_inks(inks, row, j.output_width, j.saw_Adobe_marker);
+    if (inks)
+      from_inks(inks, row, j.output_width, j.saw_Adobe_marker ? Inks::inverted : Inks::plain);
   }
   jpeg_finish_decompress(&j);
   return true;
@@ -238,12 +241,12 @@ class JpegReader {
 
   void warn_of_orientation() const {
     for (const jpeg_marker_struct* m = state_.library.marker_list; m; m = m->next) {
-      const int turned = exif_orientation(m->data, m->data_length);
-      if (m->marker != JPEG_APP0 + 1 || turned == 1) continue;
+      const int orientation = exif_orientation(m->data, m->data_length);
+      if (m->marker != JPEG_APP0 + 1 || orientation == 1) continue;
       file_.warn(
           fmt::format("its EXIF orientation {} is not applied: texture coordinates count "
                       "on the pixels as they are stored. Turn the pixels if that is meant",
-                      turned));
+                      orientation));
       return;
     }
   }
@@ -257,4 +260,4 @@ class JpegReader {
 
 Raster read_jpeg(const PictureFile& file) { return JpegReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

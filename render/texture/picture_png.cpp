@@ -12,14 +12,14 @@
 
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
-/// File gammas nearer to sRGB's 1/2.2 than this share are taken as sRGB, as libpng does.
-constexpr double kSameGamma = 0.05;
+/// File gammas nearer to sRGB's 1/2.2 than this fraction are taken as sRGB, as libpng does.
+constexpr double same_gamma = 0.05;
 /// No deflate stream unpacks to more bytes than this for one of its own.
-constexpr uint64_t kLargestPacking = 1032;
+constexpr uint64_t max_compression_ratio = 1032;
 
 /// What libpng is given and says; it must not hold what a jump would leave undestroyed.
 struct Png {
@@ -130,14 +130,13 @@ class PngReader {
     const uint64_t width = png_get_image_width(state_.png, state_.info);
     const uint64_t height = png_get_image_height(state_.png, state_.info);
     const uint64_t bits = width * depth_ * uint64_t(picture.stride);  // of a row
-    if ((bits + 7) / 8 * height / kLargestPacking > state_.size)
+    if ((bits + 7) / 8 * height / max_compression_ratio > state_.size)
       file_.fail(
           fmt::format("its {} x {} pixels cannot come from {} bytes; it is cut off or "
                       "forged. Write it again or give another",
                       width, height, state_.size));
-    constexpr uint64_t kRowsOfLibrary = 4;
-    file_.make_room(picture, width, height,
-                    height * sizeof(png_bytep) + kRowsOfLibrary * 8 * width);
+    constexpr uint64_t library_rows = 4;
+    file_.make_room(picture, width, height, height * sizeof(png_bytep) + library_rows * 8 * width);
     if (!start_rows(state_)) fail();
     const size_t row = picture.bytes.size() / height;
     if (png_get_rowbytes(state_.png, state_.info) != row)
@@ -214,7 +213,7 @@ class PngReader {
     ColourCode out = ColourCode::srgb();
     double gamma = 0;
     if (png_get_gAMA(state_.png, state_.info, &gamma) && gamma > 0 &&
-        std::abs(gamma * 2.2 - 1) > kSameGamma) {
+        std::abs(gamma * 2.2 - 1) > same_gamma) {
       const auto power = float(1 / gamma);
       for (auto& curve : out.to_linear)
         curve = [power](float code) { return std::pow(code, power); };
@@ -237,15 +236,15 @@ class PngReader {
   std::span<const unsigned char> cicp() const {
     const auto* file = reinterpret_cast<const unsigned char*>(state_.data);
     const auto number = [&](size_t from) { return size_t(png_get_uint_32(file + from)); };
-    constexpr size_t kAround = 12;  // length and type before the data, check sum after
-    for (size_t at = 8; at + kAround <= state_.size;) {
+    constexpr size_t chunk_overhead = 12;  // length and type before the data, check sum after
+    for (size_t at = 8; at + chunk_overhead <= state_.size;) {
       const size_t size = number(at);
       const unsigned char* type = file + at + 4;
-      if (size > state_.size - at - kAround || std::memcmp(type, "IDAT", 4) == 0) break;
+      if (size > state_.size - at - chunk_overhead || std::memcmp(type, "IDAT", 4) == 0) break;
       if (std::memcmp(type, "cICP", 4) == 0 &&
           crc32(0, type, uInt(4 + size)) == number(at + 8 + size))
         return {type + 4, size};
-      at += kAround + size;
+      at += chunk_overhead + size;
     }
     return {};
   }
@@ -284,4 +283,4 @@ class PngReader {
 
 Raster read_png(const PictureFile& file) { return PngReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -14,12 +14,12 @@
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
 /// Of one strip or tile, and of what libtiff takes for itself at once.
-constexpr uint64_t kLargestBlock = uint64_t(1) << 30;
+constexpr uint64_t max_block_size = uint64_t(1) << 30;
 /// The most bytes that one of a codec's stands for; none where only decoding tells.
 std::optional<double> largest_packing(int compression, uint32_t width) {
   switch (compression) {
@@ -95,7 +95,7 @@ struct Close {
 
 std::unique_ptr<TIFF, Close> open(Source& source) {
   TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
-  TIFFOpenOptionsSetMaxSingleMemAlloc(options, tmsize_t(kLargestBlock));
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options, tmsize_t(max_block_size));
   TIFFOpenOptionsSetErrorHandlerExtR(options, on_error, &source);
   TIFFOpenOptionsSetWarningHandlerExtR(options, on_warning, &source);
   std::unique_ptr<TIFF, Close> tiff(TIFFClientOpenExt(
@@ -118,16 +118,17 @@ class TiffReader {
   Raster read() {
     read_tags();
     Raster picture = kind();
-    const Orientation place(orientation_, int(width_), int(height_));
+    const Orientation orientation(orientation_, int(width_), int(height_));
     const uint64_t block = tiled_ ? uint64_t(TIFFTileSize64(tiff())) : strip_size();
-    if (block == 0 || block > kLargestBlock)
+    if (block == 0 || block > max_block_size)
       file_.fail(
           fmt::format("its strips or tiles have {} bytes each; write it again with smaller "
                       "ones",
                       block));
-    check_size(place, block);
-    file_.make_room(picture, uint64_t(place.width()), uint64_t(place.height()), 2 * block);
-    read_blocks(picture, place, block);
+    check_size(orientation, block);
+    file_.make_room(picture, uint64_t(orientation.width()), uint64_t(orientation.height()),
+                    2 * block);
+    read_blocks(picture, orientation, block);
     if (inks_) to_rgb(picture);
     if (photometric_ == PHOTOMETRIC_PALETTE) picture.palette = palette();
     picture.code = code(picture.sample);
@@ -174,12 +175,12 @@ class TiffReader {
   }
 
   /// Before room is made: whether the file can hold what its header says.
-  void check_size(const Orientation& place, uint64_t block) {
+  void check_size(const Orientation& orientation, uint64_t block) {
     const auto packing = largest_packing(tag(TIFFTAG_COMPRESSION), width_);
     if (!packing) {
       file_.check_room("a strip or tile of it", 2 * block);
       Raster none;
-      return read_blocks(none, place, block);
+      return read_blocks(none, orientation, block);
     }
     const uint64_t size = file_.bytes().size();
     if (double(width_) * height_ * samples_ * bits_ / 8 > *packing * double(size))
@@ -191,6 +192,7 @@ class TiffReader {
 
   std::string described() const {
     const char* names[] = {"grey, white at 0", "grey", "RGB", "palette", "mask", "CMYK", "YCbCr"};
+    static_assert(PHOTOMETRIC_MINISWHITE == 0 && PHOTOMETRIC_YCBCR + 1 == std::size(names));
     const bool other_inks = photometric_ == PHOTOMETRIC_SEPARATED && !is_cmyk();
     const std::string colours = other_inks                                ? "inks other than CMYK"
                                 : size_t(photometric_) < std::size(names) ? names[photometric_]
@@ -240,7 +242,7 @@ class TiffReader {
   }
 
   /// Reads each strip or tile and puts its samples where they belong, if `picture` has room.
-  void read_blocks(Raster& picture, const Orientation& place, uint64_t size) {
+  void read_blocks(Raster& picture, const Orientation& orientation, uint64_t size) {
     uint32_t wide = width_, high = height_;
     if (tiled_) {
       TIFFGetField(tiff(), TIFFTAG_TILEWIDTH, &wide);
@@ -263,8 +265,8 @@ class TiffReader {
           read_block(block, uint32_t(x), uint32_t(y), uint16_t(plane), rows * row_bytes);
           for (uint64_t r = 0; r < rows && !picture.bytes.empty(); ++r)
             for (uint64_t c = 0; c < columns; ++c)
-              put(picture, place.pixel(int(x + c), int(y + r)), plane, block.data() + r * row_bytes,
-                  c);
+              put(picture, orientation.pixel(int(x + c), int(y + r)), plane,
+                  block.data() + r * row_bytes, c);
         }
   }
 
@@ -297,7 +299,7 @@ class TiffReader {
   }
   bool is_integer() const { return format_ != SAMPLEFORMAT_IEEEFP; }
 
-  /// Inks, 0 where there is none, to R, G and B: each takes its share of the light that black
+  /// Inks, 0 where there is none, to R, G and B: each takes its part of the light that black
   /// leaves.
   static void to_rgb(Raster& picture) {
     const bool wide = picture.sample == Raster::Sample::u16;
@@ -420,4 +422,4 @@ class TiffReader {
 
 Raster read_tiff(const PictureFile& file) { return TiffReader(file).read(); }
 
-}  // namespace drench
+}  // namespace drench::render

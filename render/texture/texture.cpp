@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/log.h"
 
-namespace drench {
+namespace drench::render {
 
 namespace {
 
@@ -143,4 +143,4 @@ Texture read_sky(const std::filesystem::path& path, PictureMemory& memory) {
   return {std::move(picture), Texture::Values::colour};
 }
 
-}  // namespace drench
+}  // namespace drench::render

@@ -8,7 +8,7 @@
 #include "render/texture/picture.h"
 #include "render/vector.h"
 
-namespace drench {
+namespace drench::render {
 
 class Texture {
  public:
@@ -54,4 +54,4 @@ Texture read_normal_map(const std::filesystem::path& path,
 Texture read_sky(const std::filesystem::path& path,
                  PictureMemory& memory = PictureMemory::without_limit());
 
-}  // namespace drench
+}  // namespace drench::render

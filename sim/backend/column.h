@@ -115,14 +115,14 @@ std::vector<T> to_host(const Column<T>& column, size_t size) {
 }
 /// One value, read back.
 template <class T>
-T value_at(const Column<T>& column, size_t place) {
+T value_at(const Column<T>& column, size_t index) {
 #if defined(__CUDACC__)
   T value;
-  check_cuda(cudaMemcpy(&value, column.data() + place, sizeof(T), cudaMemcpyDeviceToHost),
+  check_cuda(cudaMemcpy(&value, column.data() + index, sizeof(T), cudaMemcpyDeviceToHost),
              "reading back");
   return value;
 #else
-  return column.data()[place];
+  return column.data()[index];
 #endif
 }
 template <class T>

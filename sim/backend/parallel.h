@@ -1,6 +1,6 @@
 #pragma once
 // Launches: the same text for both backends, named so that a profile reads like the algorithm.
-// Results never depend on the number of threads: every index writes its own place, and the only
+// Results never depend on the number of threads: every index writes its own element, and the only
 // reductions are maxima and minima (order-free) or sums over fixed chunks.
 
 #include "sim/backend/column.h"
@@ -25,6 +25,7 @@ __global__ void launch_for(int n, F f) {
   if (i < n) f(i);
 }
 
+/// f(0..n-1), each index by a thread of its own. @param name  of the launch, in errors and profiles
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   if (n <= 0) return;
@@ -93,6 +94,7 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 #else
 
+/// f(0..n-1) on all cores.
 template <class F>
 void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
   constexpr int grain = 256;
@@ -157,19 +159,26 @@ bool any_lane(const char* name, int n, const F& f) {
 #endif
 }
 
-struct AddDoubles {
-  DRENCH_HD double operator()(double a, double b) const { return a + b; }
+/// Combines sums.
+struct Plus {
+  template <class T>
+  DRENCH_HD T operator()(const T& a, const T& b) const {
+    return a + b;
+  }
 };
 
-/// Two sums at once, of floats or packs.
+struct Larger {
+  template <class T>
+  DRENCH_HD T operator()(T a, T b) const {
+    return a > b ? a : b;
+  }
+};
+
+/// Two sums at once, of floats, doubles or packs.
 template <class T>
 struct Two {
   T a, b;
-};
-struct AddPairs {
-  DRENCH_HD Two<double> operator()(const Two<double>& x, const Two<double>& y) const {
-    return {x.a + y.a, x.b + y.b};
-  }
+  DRENCH_HD Two operator+(const Two& other) const { return {a + other.a, b + other.b}; }
 };
 
 #if defined(__CUDACC__)
@@ -183,7 +192,7 @@ void sum_lanes_then(const char* name, int n, const F& f, const Then& then) {
         const Two<float> one = f(i);
         return Two<double>{one.a, one.b};
       },
-      AddPairs{}, [=] __device__(const Two<double>& sum) { then(sum.a, sum.b); });
+      Plus{}, [=] __device__(const Two<double>& sum) { then(sum.a, sum.b); });
 }
 
 #else
@@ -199,12 +208,12 @@ void sum_lanes_then(const char*, int n, const F& f, const Then& then) {
     Two<Pack> sum{Pack(0.f), Pack(0.f)};
     for (int k = c * chunk; k < std::min(packs, (c + 1) * chunk); ++k) {
       const Two<Pack> one = f(Lanes{8 * k});
-      sum.a = sum.a + one.a, sum.b = sum.b + one.b;
+      sum = sum + one;
     }
     partial[c] = {sum_of_lanes(sum.a), sum_of_lanes(sum.b)};
   });
   Two<double> total{0., 0.};
-  for (const Two<double>& part : partial) total = AddPairs{}(total, part);
+  for (const Two<double>& part : partial) total = total + part;
   then(total.a, total.b);
 }
 

@@ -42,9 +42,9 @@ struct Quad {
 DRENCH_HD Quad multiply_add(Quad a, Quad b, Quad c) {
   return {fmaf(a.x, b.x, c.x), fmaf(a.y, b.y, c.y), fmaf(a.z, b.z, c.z), fmaf(a.w, b.w, c.w)};
 }
-/// The fourth component in all four places.
+/// w, w, w, w.
 DRENCH_HD Quad splat_w(Quad a) { return {a.w, a.w, a.w, a.w}; }
-/// The sum of all four components in all four places.
+/// The sum of all four, four times.
 DRENCH_HD Quad splat_sum(Quad a) {
   const float sum = (a.x + a.y) + (a.z + a.w);
   return {sum, sum, sum, sum};
@@ -87,7 +87,7 @@ DRENCH_HD Quad nearest_integer(Quad a) {
   return Quad(Quad::Native(_mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC)));
 }
 
-/// Lanes 2 k and 2 k + 1 of eight, each in all places of one half.
+/// Lanes 2 k and 2 k + 1 of eight, each in all four components of one half.
 DRENCH_HD Quad spread_two(Pack a, int k) {
   const __m256i lane =
       _mm256_add_epi32(_mm256_set1_epi32(2 * k), _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1));

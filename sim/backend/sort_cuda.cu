@@ -28,7 +28,7 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
       cub::DeviceRadixSort::SortPairs(scratch.bytes.data(), bytes, keys.data(),
                                       scratch.key_out.data(), iota, order.data(), n, 0, bits),
       "sorting");
-  // Where key k begins is the first sorted place whose key is not below k.
+  // Where key k begins is the first sorted index whose key is not below k.
   const int* sorted = scratch.key_out.data();
   int* first = start.data();
   parallel_for("sort: key starts", key_count + 1, [=] __device__(int k) {

@@ -59,12 +59,12 @@ inline GridShape make_grid_shape(Vec3<float> low, Vec3<float> high, float edge,
     const GridAxis x = axis(low.x, high.x, period.x), y = axis(low.y, high.y, period.y),
                    z = axis(low.z, high.z, period.z);
     if (x.count * y.count * z.count > double(1 << 25)) continue;
-    return {{x.origin, y.origin, z.origin},
-            {x.inverse_edge, y.inverse_edge, z.inverse_edge},
-            int(x.count),
-            int(y.count),
-            int(z.count),
-            period};
+    return {.origin = {x.origin, y.origin, z.origin},
+            .inverse_edge = {x.inverse_edge, y.inverse_edge, z.inverse_edge},
+            .nx = int(x.count),
+            .ny = int(y.count),
+            .nz = int(z.count),
+            .period = period};
   }
 }
 

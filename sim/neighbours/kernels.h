@@ -1,8 +1,8 @@
 #pragma once
 // SPH kernels of support radius h as Mueller, Charypar, Gross 2003 define them: poly6, spiky, and
 // the viscosity kernel's Laplacian; and their integrals over a flat layer and over the half-space
-// beyond it, the wall functions of the seed's eqs (8) and (9). q = distance / h throughout. Closed
-// forms and their derivation: tests/validation/README.md, section 4.
+// beyond it, the wall functions of eqs (8) and (9) of Harada et al. 2007. q = distance / h
+// throughout. Closed forms and their derivation: tests/validation/README.md, section 4.
 
 #include "sim/backend/pack.h"
 
@@ -130,9 +130,8 @@ struct WendlandC2 {
 
 /// Weight of a pair in the viscous rows (passes/viscosity/viscosity_rows.h): w = (1 - q)^3, in
 /// place of the Wendland kernel's (1 - q)^3 / q^2, because few neighbours weigh more evenly by it:
-/// shear along the axes and along the diagonals of a cubic lattice at h = 2.15 a meet 1.03 and 1.13
-/// times the viscosity (0.94 and 1.01 in a face-centred packing), with the other 0.73 and 1.42
-/// times. Layers of a lattice that slide over each other meet 1.00.
+/// shear along the axes and the diagonals of a cubic lattice differs by a tenth, by the other by a
+/// factor of two (docs/decisions/0028-weight-of-viscous-pairs.md).
 struct ViscousWeight {
   template <class T>
   static DRENCH_HD T value(T u) {

@@ -13,7 +13,7 @@
 //           template <class Q> struct Particle;  `columns` members of type Q
 //           template <class Q> struct Sum;       members of type Q, zero to start with
 //           template <class T> T weight(T u) const;    of float or Pack
-//           template <class Q> void pair(i, j, Q weight, sum) const;   weight in all four places
+//           template <class Q> void pair(i, j, Q weight, sum) const;   weight in all components
 //           void finish(int i, const Sum<Float4>&) const;
 //           bool idle() const;                   true: nothing is to be done
 // clang-format on
@@ -73,7 +73,7 @@ struct NeighbourView {
   const unsigned* begin;
   const int* blocks;
 
-  /// Places of the neighbours of particle i are first(i) .. end(i) - 1, filled or not.
+  /// Slots of the neighbours of particle i are first(i) .. end(i) - 1, filled or not.
   DRENCH_HD size_t first(int i) const { return size_t(begin[i]) * NeighbourBlock::size; }
   DRENCH_HD size_t end(int i) const {
     return (size_t(begin[i]) + size_t(blocks[i])) * NeighbourBlock::size;

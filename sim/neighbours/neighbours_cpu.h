@@ -17,7 +17,7 @@ struct LaneOrders {
 };
 inline constexpr LaneOrders lane_orders{};
 
-/// Room for lists, handed out to threads piece by piece. Where a list stands depends on the
+/// Room for lists, given to threads piece by piece. Where a list stands depends on the
 /// threads, what stands in it does not.
 class ListStore {
  public:
@@ -68,14 +68,14 @@ class Found {
   template <class Filter>
   void search(const Tile& tile, int i, float h, const Filter& filter) {
     const float *x = tile.column(0), *y = tile.column(1), *z = tile.column(2);
-    const int place = tile.place_of(i);
-    const Vec3<Pack> p{Pack(x[place]), Pack(y[place]), Pack(z[place])};
+    const int own = tile.index_of(i);
+    const Vec3<Pack> p{Pack(x[own]), Pack(y[own]), Pack(z[own])};
     const Pack h2(h * h);
     [[maybe_unused]] const float* columns[7];
     [[maybe_unused]] auto hidden_from = [&] {
       if constexpr (Filter::columns > 0) {
         for (int c = 0; c < 7; ++c) columns[c] = tile.column(3 + c);
-        return filter.template self<3>(columns, place);
+        return filter.template self<3>(columns, own);
       } else {
         return 0;
       }
@@ -104,7 +104,7 @@ class Found {
     for (int k = found; k < found + Pack::size; ++k) to_index[k] = i, to_distance2[k] = h * h;
     count = found;
   }
-  /// Closeness in the place of distances, and the sum of Kernel::value over it.
+  /// Closeness in place of distances, and the sum of Kernel::value over it.
   template <class Kernel>
   float close(float h) {
     Pack sum(0.f);
@@ -146,12 +146,12 @@ class Found {
   }
 
  private:
-  std::vector<int> particle_;  // of each place in the tile
+  std::vector<int> particle_;  // at each index of the tile
 };
 
 /// Particles in strips a few rows wide, plane after plane: the planes before and behind are still
-/// in the cache when their neighbours come. Without strips an iteration of 4M particles took 94 ns
-/// a particle in place of 79 (docs/benchmarks.md, fluid_scaling).
+/// in the cache when their neighbours come. Without strips an iteration takes a fifth longer
+/// (docs/benchmarks.md, fluid_scaling).
 inline void order_visits(const GridView& grid, std::vector<NeighbourLists::Range>& visits) {
   constexpr int strip_cells = 320, least_rows = 4, most_particles = 512;
   const GridShape& g = grid.shape;
@@ -184,17 +184,17 @@ void build_neighbour_lists(const GridView& grid, int n, const ConstVecView& posi
         const int cell = row * g.nx + cx, begin = grid.cell_start[cell],
                   end = grid.cell_start[cell + 1];
         if (begin == end) continue;
-        const Inputs<3> places{{position.x, position.y, position.z}};
+        const Inputs<3> positions{{position.x, position.y, position.z}};
         bool filtered = false;
         if constexpr (Filter::columns > 0) {
           for (int i = begin; i < end; ++i) filtered |= filter.tests(i);
           if (filtered) {
             tile.fill(grid, cx, row % g.ny, row / g.ny,
-                      join(places, filter.inputs_with_position().column), 10);
+                      join(positions, filter.inputs_with_position().column), 10);
             tile.carry_planes(3);
           }
         }
-        if (!filtered) tile.fill(grid, cx, row % g.ny, row / g.ny, places, 3);
+        if (!filtered) tile.fill(grid, cx, row % g.ny, row / g.ny, positions, 3);
         found.set_tile(tile);
         for (int i = begin; i < end; ++i) {
           if (filtered)

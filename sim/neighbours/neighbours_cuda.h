@@ -1,5 +1,5 @@
 #pragma once
-// Neighbour lists on the GPU: see neighbours.h. Counted, scanned and filled; a thread walks the
+// Neighbour lists on the GPU: see neighbours.h. Counted, scanned and filled; a thread traverses the
 // list of its particle.
 
 namespace drench::sim::cuda {

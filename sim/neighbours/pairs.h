@@ -2,7 +2,7 @@
 // for_each_pair: one physics functor over all neighbours of every particle. The functor names
 // columns and says what one pair does; the traversal owns cells, layout and hardware. On a CPU core
 // the neighbours of a cell are copied side by side once and read eight at a time; on the GPU every
-// thread walks the 27 cells of its particle. A particle is its own neighbour too (distance 0).
+// thread traverses the 27 cells of its particle. A particle is its own neighbour too (distance 0).
 //
 // clang-format off
 // Physics:  static constexpr int columns;        number of float columns read
@@ -139,9 +139,9 @@ class Tile {
   }
   int size() const { return size_; }
   /// What a sheet filter reads of the particles from beyond a seam, seen from this side of it:
-  /// three columns of places and, after three of normals, the planes.
-  void carry_planes(int place) {
-    float* to = data_.data() + size_t(place) * stride_;
+  /// three columns of positions and, after three of normals, the planes.
+  void carry_planes(int first_column) {
+    float* to = data_.data() + size_t(first_column) * stride_;
     const auto column = [&](int c) { return to + size_t(c) * stride_; };
     for (int r = 0; r < rows_; to += count_[r++]) {
       const float* s = shift_[r];
@@ -154,14 +154,14 @@ class Tile {
       }
     }
   }
-  /// The particle that stands in each place, and anything in the padding.
+  /// The particle at each index of the tile, and anything in the padding.
   void particles(std::vector<int>& particle) const {
     if (particle.size() < size_t(stride_)) particle.resize(stride_);
     int* to = particle.data();
     for (int r = 0; r < rows_; to += count_[r++]) std::iota(to, to + count_[r], begin_[r]);
   }
   /// Up to eight particles that follow each other.
-  struct Places {
+  struct Run {
     int particle, count;
   };
   /// Looks for those of the tile for which any has less than the limit in a column of particles.
@@ -169,24 +169,24 @@ class Tile {
     packs_.clear();
     for (int r = 0; r < rows_; ++r) {
       for (int k = 0; k < count_[r]; k += Pack::size) {
-        const Places places{begin_[r] + k, std::min(count_[r] - k, Pack::size)};
-        const Mask below = Pack::load(column + places.particle) < Pack(limit);
-        if ((below & first_lanes(places.count)).bits()) packs_.push_back(places);
+        const Run run{begin_[r] + k, std::min(count_[r] - k, Pack::size)};
+        const Mask below = Pack::load(column + run.particle) < Pack(limit);
+        if ((below & first_lanes(run.count)).bits()) packs_.push_back(run);
       }
     }
   }
-  const std::vector<Places>& packs() const { return packs_; }
+  const std::vector<Run>& packs() const { return packs_; }
   /// Is any of it seen across the seam of a periodic axis?
   bool seam() const {
     const auto across = [](const float* s) { return s[0] != 0.f || s[1] != 0.f || s[2] != 0.f; };
     return std::any_of(shift_, shift_ + rows_, across);
   }
-  int place_of(int particle) const { return particle + centre_; }  // of the centre row's particles
+  int index_of(int particle) const { return particle + centre_; }  // of the centre row's particles
   const float* column(int c) const { return data_.data() + size_t(c) * stride_; }
 
  private:
   std::vector<float> data_;
-  std::vector<Places> packs_;
+  std::vector<Run> packs_;
   static constexpr int most_rows = 18;       // nine, and each in two at the seam of a periodic x
   int begin_[most_rows], count_[most_rows];  // the runs of particles that a tile is made of
   float shift_[most_rows][3];                // m, from beyond the seam of a periodic axis
@@ -231,19 +231,19 @@ bool any_hidden(Tile& tile, int begin, int end, const Filter& filter) {
 template <class Physics, class Filter>
 DRENCH_HD auto sum_over_tile(const Tile& tile, int particle, const Physics& physics,
                              const Filter& filter) {
-  const int place = tile.place_of(particle);
+  const int own = tile.index_of(particle);
   constexpr int N = Physics::columns;
   using P = typename Physics::template Particle<Pack>;
   typename Physics::template Sum<Pack> sum{};
   Members<P, Pack, N> self;
   const float* column[N + Filter::columns];
   for (int c = 0; c < N + Filter::columns; ++c) column[c] = tile.column(c);
-  for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][place]);
+  for (int c = 0; c < N; ++c) self.value[c] = Pack(column[c][own]);
   const P i = self.as();
   [[maybe_unused]] const Pack reach2(physics.support_radius * physics.support_radius);
   auto hidden_from = [&] {
     if constexpr (Filter::columns > 0)
-      return filter.template self<N>(column, place);
+      return filter.template self<N>(column, own);
     else
       return 0;
   }();

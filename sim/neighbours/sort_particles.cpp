@@ -1,29 +1,30 @@
 #include "sim/neighbours/sort_particles.h"
 
+#include "sim/columns.h"
+#include "sim/passes/motion/domain_walls.h"
 #include "sim/passes/obstacle/drain.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-void permute(Column<float>& column, Column<float>& spare, const int* order, int n) {
-  const float* from = column.data();
-  float* to = spare.data();
+template <class T>
+void permute(Column<T>& column, Column<T>& spare, const int* order, int n) {
+  const T* from = column.data();
+  T* to = spare.data();
   parallel_for(
       "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
-
-void permute(Column<int>& column, Column<int>& spare, const int* order, int n) {
-  const int* from = column.data();
-  int* to = spare.data();
-  parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
-  column.swap(spare);
+void permute(Column<float>& column, State& state, const int* order, int n) {
+  permute(column, state.swap_float, order, n);
 }
-
-void permute(VecColumn& column, Column<float>& spare, const int* order, int n) {
-  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, spare, order, n);
+/// The cells of particles are of no use any more.
+void permute(Column<int>& column, State& state, const int* order, int n) {
+  permute(column, state.fluid.cell, order, n);
+}
+void permute(VecColumn& column, State& state, const int* order, int n) {
+  for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, state, order, n);
 }
 
 }  // namespace
@@ -35,21 +36,21 @@ void sort_by_cell(State& state) {
   const ConstVecView x = f.position.view();
   // Past an open side of the domain by more than a support a particle is lost: it sorts behind all,
   // and the grid ends there, however far it flies.
-  float low[3], high[3];
-  for (int k = 0; k < 3; ++k)
-    low[k] = p.low[k] - p.support_radius, high[k] = p.high[k] + p.support_radius;
-  const Vec3<float> lower{low[0], low[1], low[2]}, upper{high[0], high[1], high[2]};
+  const DomainWalls domain = domain_walls(p);
+  const Vec3<float> support{p.support_radius, p.support_radius, p.support_radius},
+      lower = Vec3<float>{domain.low[0], domain.low[1], domain.low[2]} - support,
+      upper = Vec3<float>{domain.high[0], domain.high[1], domain.high[2]} + support;
   Bounds box = bounds_of_points("fluid bounds", x, n);
   const auto clamped = [&](Vec3<float> q) {
-    return Vec3<float>{minimum(maximum(q.x, low[0]), high[0]),
-                       minimum(maximum(q.y, low[1]), high[1]),
-                       minimum(maximum(q.z, low[2]), high[2])};
+    return Vec3<float>{minimum(maximum(q.x, lower.x), upper.x),
+                       minimum(maximum(q.y, lower.y), upper.y),
+                       minimum(maximum(q.z, lower.z), upper.z)};
   };
   box = {clamped(box.low), clamped(box.high)};
   const Vec3<float> period = periods_of(p);
-  if (period.x > 0.f) box.low.x = p.low[0];
-  if (period.y > 0.f) box.low.y = p.low[1];
-  if (period.z > 0.f) box.low.z = p.low[2];
+  if (period.x > 0.f) box.low.x = domain.low[0];
+  if (period.y > 0.f) box.low.y = domain.low[1];
+  if (period.z > 0.f) box.low.z = domain.low[2];
   f.grid = make_grid_shape(box.low, box.high, p.support_radius, period);
   const GridShape grid = f.grid;
   const int lost = grid.cells(), sinks = state.sinks.count;
@@ -71,18 +72,10 @@ void sort_particles(State& state) {
   const int n = f.count;
   sort_by_cell(state);
   const int* order = f.order.data();
-  // Their cells are of no use any more: the columns of integers are permuted into that.
-  permute(f.position, state.swap_float, order, n);
-  permute(f.velocity, state.swap_float, order, n);
-  permute(f.id, f.cell, order, n);
-  if (p.incompressible) permute(f.pressure_term, state.swap_float, order, n);
-  if (f.memory_triangle.size()) {
-    if (p.incompressible) permute(f.start, state.swap_float, order, n);
-    permute(f.memory_triangle, f.cell, order, n);
-    permute(f.memory_side, f.cell, order, n);
-    permute(f.owed, state.swap_float, order, n);
-    permute(f.far_by, state.swap_float, order, n);
-  }
+  for_each_fluid_column(state, [&](const ColumnInfo& info, auto& column, auto) {
+    const bool lasts = info.extent == Extent::particles && info.use != Use::rebuilt;
+    if (lasts && size_of(column) > 0) permute(column, state, order, n);
+  });
   bool open = false;
   for (int k = 0; k < 3; ++k) open |= !p.wall[k] && !p.periodic[k];
   if (open || state.sinks.count > 0) drop_removed(state);

@@ -133,7 +133,7 @@ void say_what_was_mended(const TriangleMesh& mesh, const Welded& welded, const S
 
 void build_from_file(const Cloth& cloth, Sheet& sheet) {
   const TriangleMesh mesh = read_mesh(cloth.mesh_file, CornerData::uv);
-  const Welded welded = weld(mesh, cloth.weld < 0 ? weld_share * diagonal_of(mesh) : cloth.weld);
+  const Welded welded = weld(mesh, cloth.weld < 0 ? weld_fraction * diagonal_of(mesh) : cloth.weld);
   keep_used(mesh, welded.first, sheet);
   say_what_was_mended(mesh, welded, sheet);
 }

@@ -73,7 +73,8 @@ ObstacleSet::ObstacleSet(Solids role, const Shot& shot, const std::vector<Obstac
       snap_(frame.spacing / (1 << 20)),
       make_level_set_(std::move(make_level_set)) {
   for (const Obstacle& obstacle : solids) {
-    Entry entry{obstacle, false, V3d(0), V3d(0), {}, {}, {}, {}, {}};
+    Entry entry;
+    entry.obstacle = obstacle;
     entry.high = obstacle.type == ObstacleType::box ? obstacle.size * 0.5 : V3d(obstacle.radius);
     if (obstacle.type == ObstacleType::plane) {  // what of it the domain may hold
       entry.high = V3d((shot.domain.max - shot.domain.min).length());

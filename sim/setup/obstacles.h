@@ -74,7 +74,7 @@ class ObstacleSet {
   struct Entry {
     Obstacle obstacle;
     bool deforms = false;
-    V3d low, high;               // own coordinates; of a sequence as of the bracket
+    V3d low{0}, high{0};         // own coordinates; of a sequence as of the bracket
     TriangleMesh before, after;  // of a sequence: frame mesh_frame and the next
     std::optional<int> mesh_frame;
     std::optional<Bracket> bracket;

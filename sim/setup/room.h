@@ -27,8 +27,8 @@ NearInlet near_inlet(const Shot& shot, const Scene& scene, const FluidEmitter& e
 
 /// The pressure over rest density that fluid has where it has nowhere to go, m^2/s^2: twenty times
 /// the square of the speed that all of the scene's fall or this inlet brings about. The peak in a
-/// vessel was nine times that square with room left, with one layer too many 48 times it a step
-/// later and 4600 times it ten steps later (tests/sim/overfill_test.cpp).
+/// vessel is nine times that square with room left, and with one layer too many 48 times it a step
+/// later (tests/sim/overfill_test.cpp).
 double pressure_without_room(const Scene& scene, const FluidEmitter& emitter);
 
 }  // namespace drench::sim

@@ -193,8 +193,8 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.periodic[k] = shot.domain.axis[k] == Axis::periodic;
   }
   p.full = p.incompressible && fills_domain(shot, fluid);
-  // In a full box gravity is the gradient of a pressure that no velocity feels. Left to the solve,
-  // whose rows differ from packing to packing, it stirred a sealed tank of water to 1 m/s.
+  // In a closed domain gravity is the gradient of a pressure that no velocity feels. Left to the
+  // solve, whose rows differ from packing to packing, it stirs a sealed tank of water to 1 m/s.
   const V3d g = motion.moves() ? motion.gravity(-shot.preroll) : shot.gravity.keys.front().second;
   set_gravity(p, {float(g.x), float(g.y), float(g.z)});
   p.turns = motion.turns();

@@ -37,12 +37,12 @@ Wind::Wind(const Shot& shot, const LocalFrame& frame)
     V3d across(0);
     while (across.length() < 0.1) across = direction(random).cross(along);
     mode.wave = along * (turn / (shot.wind.gust_size * part));
-    mode.push = across.normalized() * std::cbrt(part);
+    mode.amplitude = across.normalized() * std::cbrt(part);
     mode.phase = turn * double(random()) / 4294967296.0;
-    energy += 0.5 * mode.push.length2();
+    energy += 0.5 * mode.amplitude.length2();
     mode_.push_back(mode);
   }
-  for (Mode& mode : mode_) mode.push *= shot.wind.gust / std::sqrt(energy);
+  for (Mode& mode : mode_) mode.amplitude *= shot.wind.gust / std::sqrt(energy);
 }
 
 /// How far the mean wind has carried the gusts since the first frame, m.
@@ -64,11 +64,11 @@ WindNow Wind::at(double time) const {
   const V3d shift = origin_ - carried(time);
   for (const Mode& mode : mode_) {
     const int k = now.modes++;
-    const double rate = mode.wave.length() * mode.push.length();  // rad/s
+    const double rate = mode.wave.length() * mode.amplitude.length();  // rad/s
     const double phase = mode.phase + mode.wave.dot(shift) + rate * time;
     now.phase[k] = float(phase - turn * std::floor(phase / turn));
     for (int c = 0; c < 3; ++c)
-      now.wave[k][c] = float(mode.wave[c]), now.push[k][c] = float(mode.push[c]);
+      now.wave[k][c] = float(mode.wave[c]), now.amplitude[k][c] = float(mode.amplitude[c]);
   }
   return now;
 }

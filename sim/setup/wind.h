@@ -20,8 +20,8 @@ class Wind {
 
  private:
   struct Mode {
-    V3d wave, push;    // rad/m, m/s
-    double phase = 0;  // rad, at the world's origin and time 0
+    V3d wave, amplitude;  // rad/m, m/s
+    double phase = 0;     // rad, at the world's origin and time 0
   };
   V3d carried(double time) const;
 

@@ -29,14 +29,14 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int kSamples = 64, kReferenceSamples = 100 * kSamples;
-constexpr int kFew = 16, kMany = 256;  // between them a sample's cost is measured
-constexpr uint32_t kSeeds = 3;
+constexpr int picture_samples = 64, reference_samples = 100 * picture_samples;
+constexpr int few_samples = 16, many_samples = 256;  // between them a sample's cost is measured
+constexpr uint32_t seeds = 3;
 
 struct Picture {
   std::string name;
   Shot shot;
-  FrameGeometry geometry;
+  render::FrameGeometry geometry;
   double bar;
 };
 
@@ -66,7 +66,7 @@ TriangleMesh flat(const TriangleMesh& mesh) {
   return out;
 }
 
-Picture grey(std::string name, Shot shot, FrameGeometry geometry, double bar) {
+Picture grey(std::string name, Shot shot, render::FrameGeometry geometry, double bar) {
   shot.material = grey_materials();
   shot.fluid.material = "water";
   geometry.fluid = flat(geometry.fluid);
@@ -104,7 +104,7 @@ TriangleMesh blurred_splash() {
 
 std::vector<Picture> pictures() {
   const std::vector<ClothFrame> cloth{{"cloth", pleated_sheet()}};
-  const FrameGeometry pool{wavy_pool(), cloth, {{"glass", ball()}}};
+  const render::FrameGeometry pool{wavy_pool(), cloth, {{"glass", ball()}}};
   Shot sky_only = pool_shot();
   std::erase_if(sky_only.light, [](const Light& l) { return l.type != LightType::environment; });
   Shot splash = cloth_shot();
@@ -152,8 +152,8 @@ json description_of(const Picture& picture, const fs::path& folder) {
                        {"v", vector_of(light.v)},
                        {"radiance", light.radiance.x}});
   }
-  return {{"width", kSmallWidth},
-          {"height", kSmallHeight},
+  return {{"width", small_width},
+          {"height", small_height},
           {"fps", shot.timeline.fps},
           {"shutter", shot.camera.shutter_close - shot.camera.shutter_open},
           {"threads", hardware_threads()},
@@ -168,7 +168,7 @@ json description_of(const Picture& picture, const fs::path& folder) {
 }
 
 struct Rendered {
-  Film film;
+  render::Film film;
   double cpu_s = 0;
 };
 
@@ -194,7 +194,7 @@ Rendered cycles(const fs::path& folder, int samples, uint32_t seed) {
   if (pclose(pipe) != 0 || !result.contains("cpu_s"))
     throw std::runtime_error("render_vs_cycles: Blender failed (./test --blender installs it): " +
                              said);
-  return {read_exr(out), result["cpu_s"]};
+  return {render::read_exr(out), result["cpu_s"]};
 }
 
 Rendered ours(const Picture& picture, int samples, uint32_t seed) {
@@ -202,50 +202,50 @@ Rendered ours(const Picture& picture, int samples, uint32_t seed) {
   return {out.film, out.cost.cpu_s};
 }
 
-double mean_of(const Film& film) {
+double mean_of(const render::Film& film) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); k += 4) sum += film.rgba[k];
   return 4 * sum / double(film.rgba.size());
 }
 
-Film mean_of(const std::vector<Film>& films) {
-  Film mean = films[0];
+render::Film mean_of(const std::vector<render::Film>& films) {
+  render::Film mean = films[0];
   for (size_t k = 0; k < mean.rgba.size(); ++k) {
     double sum = 0;
-    for (const Film& film : films) sum += film.rgba[k];
+    for (const render::Film& film : films) sum += film.rgba[k];
     mean.rgba[k] = float(sum / double(films.size()));
   }
   return mean;
 }
 
 /// Variance of the picture's mean of `films`' mean, from how pixels differ between them.
-double variance_of_mean(const std::vector<Film>& films) {
-  const Film mean = mean_of(films);
+double variance_of_mean(const std::vector<render::Film>& films) {
+  const render::Film mean = mean_of(films);
   const double n = double(films.size()), pixels = double(mean.rgba.size()) / 4;
   double sum = 0;
-  for (const Film& film : films)
+  for (const render::Film& film : films)
     for (size_t k = 0; k < film.rgba.size(); k += 4)
       sum += std::pow(film.rgba[k] - mean.rgba[k], 2) / (n - 1);
   return sum / n / (pixels * pixels);
 }
 
 struct Reference {
-  Film film;
+  render::Film film;
   double rel_mse = 0;   // its own
   double variance = 0;  // of the picture's mean
 };
 
 Reference reference_of(Picture picture) {
   picture.shot.render.photons = 0;
-  const std::vector<Film> halves{ours(picture, kReferenceSamples, 1001).film,
-                                 ours(picture, kReferenceSamples, 1002).film};
+  const std::vector<render::Film> halves{ours(picture, reference_samples, 1001).film,
+                                         ours(picture, reference_samples, 1002).film};
   Reference reference{mean_of(halves), 0, variance_of_mean(halves)};
   reference.rel_mse = relative_mse(halves[0], reference.film);  // half of their mean is each
   return reference;
 }
 
 struct Contender {
-  double rel_mse = 0, cpu_s = 0, whole_cpu_s = 0;  // at kSamples; without and with set-up
+  double rel_mse = 0, cpu_s = 0, whole_cpu_s = 0;  // at picture_samples; without and with set-up
   double mean = 0, variance = 0;                   // of the picture; of this mean
   double off = 0, sigmas = 0;                      // from the reference's
 };
@@ -253,16 +253,17 @@ struct Contender {
 template <class F>
 Contender contend(const Reference& reference, F rendered) {
   Contender out;
-  std::vector<Film> many;
+  std::vector<render::Film> many;
   double few_s = 1e30, many_s = 1e30, usual_s = 1e30;
-  for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
-    const Rendered usual = rendered(kSamples, seed), lots = rendered(kMany, 100 + seed);
-    out.rel_mse += (relative_mse(usual.film, reference.film) - reference.rel_mse) / kSeeds;
+  for (uint32_t seed = 1; seed <= seeds; ++seed) {
+    const Rendered usual = rendered(picture_samples, seed),
+                   lots = rendered(many_samples, 100 + seed);
+    out.rel_mse += (relative_mse(usual.film, reference.film) - reference.rel_mse) / seeds;
     usual_s = std::min(usual_s, usual.cpu_s), many_s = std::min(many_s, lots.cpu_s);
-    few_s = std::min(few_s, rendered(kFew, 200 + seed).cpu_s);
+    few_s = std::min(few_s, rendered(few_samples, 200 + seed).cpu_s);
     many.push_back(lots.film);
   }
-  out.cpu_s = (many_s - few_s) * kSamples / (kMany - kFew);
+  out.cpu_s = (many_s - few_s) * picture_samples / (many_samples - few_samples);
   out.whole_cpu_s = usual_s;
   const double right = mean_of(reference.film);
   out.mean = mean_of(mean_of(many)), out.variance = variance_of_mean(many);
@@ -273,7 +274,8 @@ Contender contend(const Reference& reference, F rendered) {
 
 Line line_of(const Contender& contender) {
   Line line;
-  line.resolution = fmt::format("{} x {} pixels, {} samples", kSmallWidth, kSmallHeight, kSamples);
+  line.resolution =
+      fmt::format("{} x {} pixels, {} samples", small_width, small_height, picture_samples);
   line.threads = hardware_threads();
   line.more["rel_mse"] = contender.rel_mse;
   line.more["cpu_s_of_samples"] = contender.cpu_s;

@@ -16,16 +16,16 @@ namespace drench::bench {
 
 namespace {
 
-constexpr int kReference = 800;              // samples
-constexpr int kFirst = 1001, kMeasured = 3;  // frames that are compared
-constexpr int kRadius = 2;                   // frames beside them
-constexpr float kFps = 24;
+constexpr int reference = 800;             // samples
+constexpr int first = 1001, measured = 3;  // frames that are compared
+constexpr int frame_radius = 2;            // frames beside them
+constexpr float fps = 24;
 
 /// Pleats that wander by their length in a second.
-FrameGeometry cloth_at(int frame) {
+render::FrameGeometry cloth_at(int frame) {
   TriangleMesh mesh = pleated_sheet();
   const float rate = 2 * float(std::numbers::pi);  // 1/s
-  const float phase = rate * float(frame - kFirst) / kFps;
+  const float phase = rate * float(frame - first) / fps;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     V3f& p = mesh.position[v];
     const float angle = 30 * p.x + 3 * p.y - phase, deep = 0.05f * (1.2f - p.y);
@@ -36,10 +36,10 @@ FrameGeometry cloth_at(int frame) {
 }
 
 /// Waves of 0.9 m that wander at about the speed of deep water, 1.2 m/s.
-FrameGeometry pool_at(int frame) {
+render::FrameGeometry pool_at(int frame) {
   TriangleMesh mesh = wavy_pool();
   const float rate = 8;  // 1/s
-  const float phase = rate * float(frame - kFirst) / kFps;
+  const float phase = rate * float(frame - first) / fps;
   for (size_t v = 0; v < mesh.position.size(); ++v) {
     V3f& p = mesh.position[v];
     if (p.y < 0.2f) continue;
@@ -61,40 +61,41 @@ Shot moving(Shot shot) {
   shot.material.back().checker = true;
   shot.material.back().checker_size = 0.5;
   const V3d from = shot.camera.position.keys.front().second, by(0.03, 0, 0);
-  shot.camera.position.keys = {{kFirst - kRadius, from - by * kRadius},
-                               {kFirst + kMeasured + kRadius, from + by * (kMeasured + kRadius)}};
+  shot.camera.position.keys = {
+      {first - frame_radius, from - by * frame_radius},
+      {first + measured + frame_radius, from + by * (measured + frame_radius)}};
   return shot;
 }
 
 struct Sequence {
   std::string name;
   Shot shot;
-  FrameGeometry (*geometry)(int frame);
+  render::FrameGeometry (*geometry)(int frame);
 };
 
 /// A frame as it is rendered, with what denoising takes.
-Film noisy_frame(const Sequence& sequence, int frame, int samples) {
+render::Film noisy_frame(const Sequence& sequence, int frame, int samples) {
   Shot shot = sequence.shot;
   shot.render.samples = samples;
-  RenderOptions options;
-  options.denoised = Denoised::later;
-  return render_frame(shot, frame, sequence.geometry(frame), options);
+  render::RenderOptions options;
+  options.denoised = render::Denoised::later;
+  return render::render_frame(shot, frame, sequence.geometry(frame), options);
 }
 
-std::vector<Film> references(const Sequence& sequence) {
+std::vector<render::Film> references(const Sequence& sequence) {
   Shot shot = sequence.shot;
   shot.render.denoise = false;
-  shot.render.samples = kReference;
+  shot.render.samples = reference;
   shot.render.seed = 1000;
-  std::vector<Film> out;
-  for (int frame = kFirst; frame < kFirst + kMeasured; ++frame)
-    out.push_back(render_frame(shot, frame, sequence.geometry(frame)));
+  std::vector<render::Film> out;
+  for (int frame = first; frame < first + measured; ++frame)
+    out.push_back(render::render_frame(shot, frame, sequence.geometry(frame)));
   return out;
 }
 
 /// Mean over pixels, colours and pairs of frames of the squared change of the error from one frame
 /// to the next, over (colour^2 + 0.01).
-double flicker(const std::vector<Film>& films, const std::vector<Film>& truth) {
+double flicker(const std::vector<render::Film>& films, const std::vector<render::Film>& truth) {
   double sum = 0, count = 0;
   for (size_t f = 1; f < films.size(); ++f)
     for (size_t k = 0; k < films[f].rgba.size(); ++k) {
@@ -111,39 +112,40 @@ struct Quality {
   double error = 0, flicker = 0;
 };
 
-Quality quality_of(const std::vector<Film>& films, const std::vector<Film>& truth) {
+Quality quality_of(const std::vector<render::Film>& films, const std::vector<render::Film>& truth) {
   Quality out{0, flicker(films, truth)};
   for (size_t f = 0; f < films.size(); ++f)
     out.error += relative_mse(films[f], truth[f]) / double(films.size());
   return out;
 }
 
-/// Frames denoised by `radius` neighbours on either side; noisy[kRadius] is the first of them.
-std::vector<Film> denoised(const std::vector<Film>& noisy, int radius) {
-  std::vector<Film> out;
-  for (int f = kRadius; f < kRadius + kMeasured; ++f) {
-    Neighbours neighbours;
+/// Frames denoised by `radius` neighbours on either side; noisy[frame_radius] is the first of them.
+std::vector<render::Film> denoised(const std::vector<render::Film>& noisy, int radius) {
+  std::vector<render::Film> out;
+  for (int f = frame_radius; f < frame_radius + measured; ++f) {
+    render::Neighbours neighbours;
     for (int k = 1; k <= radius; ++k) {
-      neighbours.before.push_back(picture_of(noisy[size_t(f - k)]));
-      neighbours.after.push_back(picture_of(noisy[size_t(f + k)]));
+      neighbours.before.push_back(render::picture_of(noisy[size_t(f - k)]));
+      neighbours.after.push_back(render::picture_of(noisy[size_t(f + k)]));
     }
-    Film film = noisy[size_t(f)];
-    put_clean(film, denoise(picture_of(film), std::move(neighbours)));
+    render::Film film = noisy[size_t(f)];
+    put_clean(film, denoise(render::picture_of(film), std::move(neighbours)));
     out.push_back(std::move(film));
   }
   return out;
 }
 
 void emit_sequence(const Emit& emit, const Sequence& sequence) {
-  const std::vector<Film> truth = references(sequence);
+  const std::vector<render::Film> truth = references(sequence);
   for (const int samples : {16, 64}) {
-    std::vector<Film> noisy;
-    for (int f = -kRadius; f < kMeasured + kRadius; ++f)
-      noisy.push_back(noisy_frame(sequence, kFirst + f, samples));
-    const std::vector<Film> bare(noisy.begin() + kRadius, noisy.begin() + kRadius + kMeasured);
+    std::vector<render::Film> noisy;
+    for (int f = -frame_radius; f < measured + frame_radius; ++f)
+      noisy.push_back(noisy_frame(sequence, first + f, samples));
+    const std::vector<render::Film> bare(noisy.begin() + frame_radius,
+                                         noisy.begin() + frame_radius + measured);
     Quality alone;
-    for (int radius = 0; radius <= kRadius; ++radius) {
-      std::vector<Film> films;
+    for (int radius = 0; radius <= frame_radius; ++radius) {
+      std::vector<render::Film> films;
       Line line;
       line.cost = measure([&] { films = denoised(noisy, radius); });
       const Quality quality = quality_of(films, truth);
@@ -158,7 +160,7 @@ void emit_sequence(const Emit& emit, const Sequence& sequence) {
       line.more["rel_mse"] = quality.error;
       line.more["flicker"] = quality.flicker;
       line.more["noisy_rel_mse"] = quality_of(bare, truth).error;
-      line.more["cpu_s_a_frame"] = line.cost->cpu_s / kMeasured;
+      line.more["cpu_s_a_frame"] = line.cost->cpu_s / measured;
       emit(line);
     }
   }

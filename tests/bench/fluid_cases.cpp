@@ -16,6 +16,7 @@
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
 #include "tests/bench/bench.h"
+#include "tests/sim/support.h"
 #include "tests/validation/fluid.h"
 #include "tests/validation/lobovsky.h"
 
@@ -73,43 +74,38 @@ Energies energies(const sim::HostState& s) {
 }
 
 void run_dam(const Dam& dam, const Quality& quality, const Emit& emit) {
-  const sim::Scene scene = sim::build_scene(dam_shot(dam, quality.tolerance));
-  const auto solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
-  solver->load(scene.start);
-  sim::Limits limits = solver->measure();
-  const double start = energies(scene.start).potential;
+  sim_tests::Stepper run(dam_shot(dam, quality.tolerance));
+  const double start = energies(run.scene.start).potential;
   Measured total;
   Errors errors;
-  double time = 0, kick = 0, half = 0, iterations = 0;
-  int steps = 0;
-  while (time < dam.end - 1e-9) {
-    const double dt =
-        std::min({sim::stable_step(scene.parameters, limits).dt, dam.cap, dam.end - time});
-    const Measured cost = measure([&] { limits = solver->step(dt, 1); });
+  double kick = 0, half = 0, iterations = 0;
+  while (run.time < dam.end - 1e-9) {
+    const double dt = std::min({run.stable_dt(), dam.cap, dam.end - run.time});
+    const Measured cost = measure([&] { run.step(dt); });
     total.wall_s += cost.wall_s, total.cpu_s += cost.cpu_s;
     total.peak_mib = std::max(total.peak_mib, cost.peak_mib);
-    time += dt, ++steps, iterations += limits.iterations;
-    if (time <= 0.005) kick = energies(solver->save()).kinetic / start;
-    if (time <= 0.005) continue;
-    solver->refresh();
-    errors.add(solver->density(), scene.parameters.rest_density);
-    if (half == 0 && time >= 0.5) {
-      const Energies e = energies(solver->save());
+    iterations += run.limits.iterations;
+    if (run.time <= 0.005) kick = energies(run.solver->save()).kinetic / start;
+    if (run.time <= 0.005) continue;
+    run.solver->refresh();
+    errors.add(run.solver->density(), run.scene.parameters.rest_density);
+    if (half == 0 && run.time >= 0.5) {
+      const Energies e = energies(run.solver->save());
       half = (e.kinetic + e.potential) / start;
     }
   }
-  const Energies e = energies(solver->save());
+  const Energies e = energies(run.solver->save());
   Line line;
   line.method = "incompressible, tolerance " + std::to_string(100 * quality.tolerance) + " %";
-  line.resolution = std::to_string(scene.start.id.size()) + " particles";
-  line.time_step = dam.end / steps;
+  line.resolution = std::to_string(run.scene.start.id.size()) + " particles";
+  line.time_step = dam.end / double(run.steps);
   line.threads = hardware_threads();
   line.cost = total;
   line.error = errors.mean / errors.steps;
   line.error_of = "mean of max(rho / rho_0 - 1, 0)";
   line.gate = quality.gate;
-  line.more["steps"] = steps;
-  line.more["iterations_a_step"] = iterations / steps;
+  line.more["steps"] = run.steps;
+  line.more["iterations_a_step"] = iterations / double(run.steps);
   line.more["percentile_99_9"] = errors.percentile / errors.steps;
   line.more["worst"] = errors.worst;
   line.more["kick"] = kick;

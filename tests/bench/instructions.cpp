@@ -11,7 +11,7 @@
 namespace drench::bench {
 
 namespace {
-constexpr const char* kVariable = "DRENCH_BENCH_COUNT";
+constexpr const char* variable = "DRENCH_BENCH_COUNT";
 }
 
 /// callgrind counts from where this is entered to where it is left.
@@ -20,7 +20,7 @@ extern "C" __attribute__((noinline)) void drench_bench_counted(const std::functi
   asm volatile("");  // or the call above would be a jump, and this never be left
 }
 
-const char* variant_to_count() { return std::getenv(kVariable); }
+const char* variant_to_count() { return std::getenv(variable); }
 
 void count_instructions(const std::function<void()>& work) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
@@ -32,7 +32,7 @@ double instructions(const std::string& case_name, const std::string& variant) {
   const std::string command = fmt::format(
       "{}='{}' valgrind --tool=callgrind --callgrind-out-file=/dev/null "
       "--toggle-collect=drench_bench_counted '{}' {} 2>&1",
-      kVariable, variant, self, case_name);
+      variable, variant, self, case_name);
   FILE* pipe = popen(command.c_str(), "r");
   if (!pipe) throw std::runtime_error(case_name + ": valgrind cannot be started");
   std::string said;

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "pipeline/contract/files/mesh_file.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene.h"
 #include "tests/bench/render_scenes.h"
@@ -29,16 +29,16 @@ namespace {
 struct Query {
   RTCRayHit ray;
   bool occlusion;
-  Coherence coherence;
+  render::Coherence coherence;
 };
 
 struct Recording {
   std::vector<Query> queries;
-  const Scene* scene = nullptr;
+  const render::Scene* scene = nullptr;
 };
 Recording* recording = nullptr;
 
-RTCRayHit embree_query(const Ray& ray, float reach) {
+RTCRayHit embree_query(const render::Ray& ray, float reach) {
   const V3f &o = ray.origin, &d = ray.direction;
   return {{o.x, o.y, o.z, 0, d.x, d.y, d.z, ray.time, reach, 0xffffffffu, 0, 0}, {}};
 }
@@ -46,16 +46,20 @@ RTCRayHit embree_query(const Ray& ray, float reach) {
 }  // namespace
 
 // Scene::intersect and Scene::occluded as the linker calls them, `this` first.
-#define DRENCH_INTERSECT "_ZNK6drench5Scene9intersectERKNS_3RayENS_9CoherenceENS_5WorldE"
-#define DRENCH_OCCLUDED "_ZNK6drench5Scene8occludedERKNS_3RayERKNS0_6TargetENS_5WorldENS0_4GapsE"
-Hit real_intersect(const Scene*, const Ray&, Coherence, World) asm("__real_" DRENCH_INTERSECT);
-bool real_occluded(const Scene*, const Ray&, const Scene::Target&, World,
-                   Scene::Gaps) asm("__real_" DRENCH_OCCLUDED);
-Hit wrapped_intersect(const Scene*, const Ray&, Coherence, World) asm("__wrap_" DRENCH_INTERSECT);
-bool wrapped_occluded(const Scene*, const Ray&, const Scene::Target&, World,
-                      Scene::Gaps) asm("__wrap_" DRENCH_OCCLUDED);
+#define DRENCH_INTERSECT "_ZNK6drench6render5Scene9intersectERKNS0_3RayENS0_9CoherenceENS0_5WorldE"
+#define DRENCH_OCCLUDED \
+  "_ZNK6drench6render5Scene8occludedERKNS0_3RayERKNS1_6TargetENS0_5WorldENS1_4GapsE"
+render::Hit real_intersect(const render::Scene*, const render::Ray&, render::Coherence,
+                           render::World) asm("__real_" DRENCH_INTERSECT);
+bool real_occluded(const render::Scene*, const render::Ray&, const render::Scene::Target&,
+                   render::World, render::Scene::Gaps) asm("__real_" DRENCH_OCCLUDED);
+render::Hit wrapped_intersect(const render::Scene*, const render::Ray&, render::Coherence,
+                              render::World) asm("__wrap_" DRENCH_INTERSECT);
+bool wrapped_occluded(const render::Scene*, const render::Ray&, const render::Scene::Target&,
+                      render::World, render::Scene::Gaps) asm("__wrap_" DRENCH_OCCLUDED);
 
-Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence, World world) {
+render::Hit wrapped_intersect(const render::Scene* scene, const render::Ray& ray,
+                              render::Coherence coherence, render::World world) {
   if (recording) {
     recording->scene = scene;
     recording->queries.push_back(
@@ -64,8 +68,9 @@ Hit wrapped_intersect(const Scene* scene, const Ray& ray, Coherence coherence, W
   return real_intersect(scene, ray, coherence, world);
 }
 
-bool wrapped_occluded(const Scene* scene, const Ray& ray, const Scene::Target& target, World world,
-                      Scene::Gaps gaps) {
+bool wrapped_occluded(const render::Scene* scene, const render::Ray& ray,
+                      const render::Scene::Target& target, render::World world,
+                      render::Scene::Gaps gaps) {
   if (recording)
     recording->queries.push_back({embree_query(ray, target.distance * (1 - 1e-4f)), true, {}});
   return real_occluded(scene, ray, target, world, gaps);
@@ -82,17 +87,17 @@ double thread_cpu_s() {
 /// All that a frame's rays can meet as one Embree scene, the ground and rectangular lamps too.
 class BareScene {
  public:
-  BareScene(const Scene& scene, const Shot& shot)
+  BareScene(const render::Scene& scene, const Shot& shot)
       : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_.get())) {
     bool robust = false;
     for (uint32_t k = 0; k < scene.object_count(); ++k) {
-      const SceneObject& object = scene.object(k);
+      const render::SceneObject& object = scene.object(k);
       add(object.position, object.position_close, object.triangle);
       robust |= object.body != 0;
     }
     const float half = float(shot.ground.half_size), y = float(shot.ground.height);
     quad({-half, y, -half}, {2 * half, 0, 0}, {0, 0, 2 * half});
-    for (const ShapeLight& lamp : scene.lights().shapes())
+    for (const render::ShapeLight& lamp : scene.lights().shapes())
       quad(lamp.center - lamp.u - lamp.v, lamp.u * 2.f, lamp.v * 2.f);
     if (robust) rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
     rtcCommitScene(scene_.get());
@@ -106,7 +111,8 @@ class BareScene {
   /// The last position is padding.
   void add(const std::vector<V3f>& open, const std::vector<V3f>& close,
            const std::vector<Imath::Vec3<uint32_t>>& triangle) {
-    const EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    const render::EmbreeGeometry geometry(
+        rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     rtcSetGeometryTimeStepCount(geometry.get(), close.empty() ? 1 : 2);
     unsigned step = 0;
     for (const std::vector<V3f>* position : {&open, &close}) {
@@ -122,20 +128,20 @@ class BareScene {
     rtcAttachGeometry(scene_.get(), geometry.get());
   }
 
-  EmbreeDevice device_;
-  EmbreeScene scene_;
+  render::EmbreeDevice device_;
+  render::EmbreeScene scene_;
 };
 
 /// CPU seconds of the queries, asked in their order.
 double replay(std::vector<Query>& queries, const BareScene& scene) {
-  const FlushDenormals flush;
+  const render::FlushDenormals flush;
   const double start = thread_cpu_s();
   for (Query& query : queries) {
     query.ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     if (query.occlusion)
-      embree_occluded(scene.get(), query.ray.ray);
+      render::embree_occluded(scene.get(), query.ray.ray);
     else
-      embree_intersect(scene.get(), query.ray, query.coherence);
+      render::embree_intersect(scene.get(), query.ray, query.coherence);
   }
   return thread_cpu_s() - start;
 }
@@ -147,7 +153,7 @@ struct TileTime {
   size_t queries = 0;
 };
 
-TileTime measure_tiles(const Shot& shot, const FrameGeometry& geometry) {
+TileTime measure_tiles(const Shot& shot, const render::FrameGeometry& geometry) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   TileTime out;
   double start = 0;
@@ -155,7 +161,7 @@ TileTime measure_tiles(const Shot& shot, const FrameGeometry& geometry) {
     if (start == 0) start = thread_cpu_s();
     if (share == 1) out.traced = thread_cpu_s() - start;
   };
-  render_frame(shot, shot.timeline.first, geometry, nullptr, time);
+  render::render_frame(shot, shot.timeline.first, geometry, nullptr, time);
   Recording record;
   bool first = true;
   const auto end = [&](double share) {
@@ -167,22 +173,22 @@ TileTime measure_tiles(const Shot& shot, const FrameGeometry& geometry) {
     out.bare = replay(record.queries, BareScene(*record.scene, shot));
   };
   recording = &record;
-  render_frame(shot, shot.timeline.first, geometry, nullptr, end);
+  render::render_frame(shot, shot.timeline.first, geometry, nullptr, end);
   return out;
 }
 
-void emit_share(const Emit& emit, const std::string& name, Shot shot, const FrameGeometry& geometry,
-                double needed) {
-  constexpr int kRuns = 11;
+void emit_share(const Emit& emit, const std::string& name, Shot shot,
+                const render::FrameGeometry& geometry, double needed) {
+  constexpr int run_count = 11;
   shot.render.width = 192;
   shot.render.height = 108;
   shot.render.samples = 16;
   std::vector<TileTime> runs;
-  for (int run = 0; run < kRuns; ++run) runs.push_back(measure_tiles(shot, geometry));
+  for (int run = 0; run < run_count; ++run) runs.push_back(measure_tiles(shot, geometry));
   const auto share = [](const TileTime& t) { return t.bare / t.traced; };
-  std::nth_element(runs.begin(), runs.begin() + kRuns / 2, runs.end(),
+  std::nth_element(runs.begin(), runs.begin() + run_count / 2, runs.end(),
                    [&](const TileTime& a, const TileTime& b) { return share(a) < share(b); });
-  const TileTime& median = runs[kRuns / 2];
+  const TileTime& median = runs[run_count / 2];
   Line line;
   line.method = name;
   line.resolution = "192 x 108 pixels, 16 samples";
@@ -210,7 +216,7 @@ const Registration render_rays_case{
 
 /// From the file of a mesh of a million triangles to the picture of one pixel.
 void render_load(const Emit& emit) {
-  constexpr int kRuns = 3;
+  constexpr int run_count = 3;
   const std::filesystem::path file = std::filesystem::temp_directory_path() /
                                      ("drench_render_load." + std::to_string(getpid()) + ".ply");
   for (const bool moving : {false, true}) {
@@ -223,21 +229,21 @@ void render_load(const Emit& emit) {
     shot.render.width = shot.render.height = shot.render.samples = 1;
     shot.render.photons = 0;
     std::vector<double> read, whole;
-    for (int run = 0; run < kRuns; ++run) {
-      FrameGeometry geometry;
+    for (int run = 0; run < run_count; ++run) {
+      render::FrameGeometry geometry;
       read.push_back(measure([&] { geometry.fluid = read_mesh(file); }).cpu_s);
       whole.push_back(read.back() + render(shot, geometry, 1, 1).cost.cpu_s);
     }
-    std::nth_element(read.begin(), read.begin() + kRuns / 2, read.end());
-    std::nth_element(whole.begin(), whole.begin() + kRuns / 2, whole.end());
+    std::nth_element(read.begin(), read.begin() + run_count / 2, read.end());
+    std::nth_element(whole.begin(), whole.begin() + run_count / 2, whole.end());
     Line line;
     line.method = moving ? "mesh that moves" : "mesh that stands";
     line.resolution = std::to_string(pool.triangle.size()) + " triangles";
     line.threads = hardware_threads();
-    line.error = whole[kRuns / 2] / (1e-6 * double(pool.triangle.size()));
+    line.error = whole[run_count / 2] / (1e-6 * double(pool.triangle.size()));
     line.error_of = "CPU s per million triangles, from the file to the first ray";
     line.gate = 1.2;
-    line.more["read_cpu_s"] = read[kRuns / 2];
+    line.more["read_cpu_s"] = read[run_count / 2];
     emit(line);
   }
   std::filesystem::remove(file);
@@ -247,23 +253,23 @@ const Registration render_load_case{
     "render_load", "a frame of a million triangles, from the file to the first ray", render_load};
 
 void render_leaks(const Emit& emit) {
-  constexpr uint32_t kChains = 1u << 20;
-  constexpr int kLength = 100;
+  constexpr uint32_t chains = 1u << 20;
+  constexpr int length = 100;
   for (const bool waves : {false, true}) {
     Shot shot = pool_shot();
     shot.ground.present = false;
     TriangleMesh body = wavy_pool(waves ? 128 : 1);
-    const Scene scene(shot, shot.timeline.first, {body, {}}, {});
+    const render::Scene scene(shot, shot.timeline.first, {body, {}}, {});
     std::atomic<uint64_t> lost{0};
     Line line;
     line.cost = measure([&] {
-      tbb::parallel_for(0u, kChains, [&](uint32_t chain) {
-        const float x = unit_float(hash_bits(chain)) - 0.5f;
-        lost += test::loses_ray(scene, {3.9f * x, 0.1f, 0.3f}, chain, kLength);
+      tbb::parallel_for(0u, chains, [&](uint32_t chain) {
+        const float x = render::unit_float(render::hash_bits(chain)) - 0.5f;
+        lost += render::test::loses_ray(scene, {3.9f * x, 0.1f, 0.3f}, chain, length);
       });
     });
     line.method = waves ? "slab with waves" : "box";
-    line.resolution = std::to_string(uint64_t(kChains) * kLength) + " rays, " +
+    line.resolution = std::to_string(uint64_t(chains) * length) + " rays, " +
                       std::to_string(body.triangle.size()) + " triangles";
     line.threads = hardware_threads();
     line.error = double(lost);

@@ -18,10 +18,10 @@ namespace drench::bench {
 
 namespace {
 
-constexpr int kWidth = kSmallWidth, kHeight = kSmallHeight;
+constexpr int picture_width = small_width, picture_height = small_height;
 /// A hundred times the most samples measured: 1 % of that error is the reference's own.
-constexpr int kReferenceSamples = 25600;
-constexpr double kMostCost = 1 / 0.3;  // CPU s per million camera samples
+constexpr int reference_samples = 25600;
+constexpr double most_cost = 1 / 0.3;  // CPU s per million camera samples
 
 /// Slope of the straight line through the points of log y over log x.
 double log_slope(const std::vector<double>& x, const std::vector<double>& y) {
@@ -38,7 +38,7 @@ double log_slope(const std::vector<double>& x, const std::vector<double>& y) {
 }
 
 /// Sum of the colours over the film.
-double light_of(const Film& film) {
+double light_of(const render::Film& film) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); ++k)
     if (k % 4 != 3) sum += film.rgba[k];
@@ -52,30 +52,31 @@ struct Sampled {
   double light = 0;  // over that of the reference
 };
 
-Sampled sample(const Shot& shot, const FrameGeometry& geometry, int samples, const Film& reference,
-               const RenderOptions& options = {}) {
-  constexpr int kSeeds = 5;
+Sampled sample(const Shot& shot, const render::FrameGeometry& geometry, int samples,
+               const render::Film& reference, const render::RenderOptions& options = {}) {
+  constexpr int seeds = 5;
   Sampled out;
   std::vector<Render> renders;
-  for (int seed = 1; seed <= kSeeds; ++seed) {
+  for (int seed = 1; seed <= seeds; ++seed) {
     renders.push_back(render(shot, geometry, samples, uint32_t(seed), options));
-    out.error += relative_mse(renders.back().film, reference) / kSeeds;
-    out.light += light_of(renders.back().film) / light_of(reference) / kSeeds;
+    out.error += relative_mse(renders.back().film, reference) / seeds;
+    out.light += light_of(renders.back().film) / light_of(reference) / seeds;
   }
-  std::nth_element(renders.begin(), renders.begin() + kSeeds / 2, renders.end(),
+  std::nth_element(renders.begin(), renders.begin() + seeds / 2, renders.end(),
                    [](const Render& a, const Render& b) { return a.cost.cpu_s < b.cost.cpu_s; });
-  out.median = renders[kSeeds / 2];
+  out.median = renders[seeds / 2];
   return out;
 }
 
 Line line_of(const Sampled& sampled) {
   Line line;
   line.method = "path tracing, depth 8";
-  line.resolution = std::to_string(kWidth) + " x " + std::to_string(kHeight) + " pixels";
+  line.resolution =
+      std::to_string(picture_width) + " x " + std::to_string(picture_height) + " pixels";
   line.threads = hardware_threads();
   line.cost = sampled.median.cost;
   const double count = double(sampled.median.stats.camera_samples);
-  line.more["samples"] = sampled.median.stats.camera_samples / (kWidth * kHeight);
+  line.more["samples"] = sampled.median.stats.camera_samples / (picture_width * picture_height);
   line.more["samples_per_cpu_s"] = count / sampled.median.cost.cpu_s;
   line.more["rays_per_cpu_s"] = double(sampled.median.stats.rays) / sampled.median.cost.cpu_s;
   return line;
@@ -96,7 +97,7 @@ std::optional<double> time_to(double error, const std::vector<Sampled>& curve) {
 }
 
 void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
-                const FrameGeometry& geometry, const Film& reference) {
+                const render::FrameGeometry& geometry, const render::Film& reference) {
   std::vector<double> counts, errors;
   std::vector<Sampled> curve;
   for (const int samples : {1, 4, 16, 64, 256}) {
@@ -106,7 +107,7 @@ void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
     Line line = line_of(curve.back());
     line.method = name;
     line.error = errors.back();
-    line.error_of = "relMSE against " + std::to_string(kReferenceSamples) + " samples";
+    line.error_of = "relMSE against " + std::to_string(reference_samples) + " samples";
     if (counts.size() > 1) line.more["slope"] = log_slope(counts, errors);
     emit(line);
   }
@@ -122,13 +123,13 @@ void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
 }
 
 void render_convergence(const Emit& emit) {
-  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
+  const render::FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
   emit_curve(emit, "cloth", cloth_shot(), cloth,
-             render(cloth_shot(), cloth, kReferenceSamples, 1000).film);
+             render(cloth_shot(), cloth, reference_samples, 1000).film);
   Shot paths = pool_shot();
   paths.render.photons = 0;
   emit_curve(emit, "pool, small lamp", pool_shot(), pool,
-             render(paths, pool, kReferenceSamples, 1000).film);
+             render(paths, pool, reference_samples, 1000).film);
 }
 
 const Registration render_convergence_case{
@@ -136,13 +137,13 @@ const Registration render_convergence_case{
     render_convergence};
 
 void render_cloth(const Emit& emit) {
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   // So many samples that building the scene no longer counts.
   Line line = line_of({0, render(cloth_shot(), geometry, 256, 1)});
   line.method += ", rate";
   line.error = 1e6 / line.more["samples_per_cpu_s"].get<double>();
   line.error_of = "CPU s per million camera samples";
-  line.gate = kMostCost;
+  line.gate = most_cost;
   emit(line);
 }
 
@@ -154,15 +155,15 @@ const Registration render_cloth_case{
 void render_caustics(const Emit& emit) {
   Shot photons = pool_shot(), paths = photons;
   paths.render.photons = 0;
-  const FrameGeometry geometry{wavy_pool(), {}};
-  Film reference = render(paths, geometry, kReferenceSamples / 2, 1000).film;
-  const Film half = render(paths, geometry, kReferenceSamples / 2, 1001).film;
+  const render::FrameGeometry geometry{wavy_pool(), {}};
+  render::Film reference = render(paths, geometry, reference_samples / 2, 1000).film;
+  const render::Film half = render(paths, geometry, reference_samples / 2, 1001).film;
   const double own = relative_mse(reference, half) / 4;
   for (size_t k = 0; k < half.rgba.size(); ++k)
     reference.rgba[k] = 0.5f * (reference.rgba[k] + half.rgba[k]);
-  RenderOptions none;
-  none.walks = Walks::none;
-  const std::tuple<const char*, const Shot*, RenderOptions> ways[] = {
+  render::RenderOptions none;
+  none.walks = render::ManifoldWalks::none;
+  const std::tuple<const char*, const Shot*, render::RenderOptions> ways[] = {
       {"paths", &paths, {}}, {"photons", &photons, none}, {"photons and walks", &photons, {}}};
   for (const int samples : {4, 16, 64, 256}) {
     double efficiency = 0;
@@ -191,7 +192,7 @@ const Registration render_caustics_case{
     render_caustics};
 
 /// Relative MSE by two references of paths alone, so that their noise adds nothing.
-double error_beside(const Film& film, const Film& a, const Film& b) {
+double error_beside(const render::Film& film, const render::Film& a, const render::Film& b) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); ++k) {
     if (k % 4 == 3) continue;
@@ -204,31 +205,31 @@ double error_beside(const Film& film, const Film& a, const Film& b) {
 /// What waves of a height leave to photons, and whether the renderer's choice errs less in its
 /// time.
 void render_walks(const Emit& emit) {
-  constexpr int kReference = 6400, kSamples = 64, kSeeds = 4;
+  constexpr int reference_spp = 6400, spp = 64, seeds = 4;
   const Shot shot = pool_shot();
   Shot paths = shot;
   paths.render.photons = 0;
   for (const float waves : {0.f, 1.f, 2.f, 4.f}) {
-    const FrameGeometry geometry{wavy_pool(128, waves), {}};
-    const Film a = render(paths, geometry, kReference, 1000).film,
-               b = render(paths, geometry, kReference, 1001).film;
+    const render::FrameGeometry geometry{wavy_pool(128, waves), {}};
+    const render::Film a = render(paths, geometry, reference_spp, 1000).film,
+                       b = render(paths, geometry, reference_spp, 1001).film;
     double least = 1e30;  // relative MSE x CPU s
-    for (const auto& [name, walks] : {std::pair{"photons", Walks::none},
-                                      {"photons and walks", Walks::some},
-                                      {"what is chosen", Walks::if_calm}}) {
-      RenderOptions options;
+    for (const auto& [name, walks] : {std::pair{"photons", render::ManifoldWalks::none},
+                                      {"photons and walks", render::ManifoldWalks::some},
+                                      {"what is chosen", render::ManifoldWalks::if_calm}}) {
+      render::RenderOptions options;
       options.walks = walks;
       double error = 0, cpu_s = 0;
       Render last;
-      for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
-        last = render(shot, geometry, kSamples, seed, options);
-        error += error_beside(last.film, a, b) / kSeeds, cpu_s += last.cost.cpu_s / kSeeds;
+      for (uint32_t seed = 1; seed <= seeds; ++seed) {
+        last = render(shot, geometry, spp, seed, options);
+        error += error_beside(last.film, a, b) / seeds, cpu_s += last.cost.cpu_s / seeds;
       }
       Line line = line_of({error, last});
       line.method = fmt::format("pool, waves of {:.2f} m, {}", 0.03 * double(waves), name);
       line.more["rel_mse"] = error, line.more["cpu_s"] = cpu_s;
       line.more["walked"] = last.stats.walked;
-      if (walks == Walks::if_calm) {
+      if (walks == render::ManifoldWalks::if_calm) {
         line.error = error * cpu_s / least, line.gate = 1.15;
         line.error_of = "error x time over that of the better";
       }
@@ -272,19 +273,19 @@ Shot lamps_shot(int count, Lamps where) {
 
 /// Error and time by the number of lamps.
 void render_lamps(const Emit& emit) {
-  constexpr int kReference = 1600, kSamples = 64, kSeeds = 4;
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  constexpr int reference_spp = 1600, spp = 64, seeds = 4;
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   for (const Lamps where : {Lamps::above, Lamps::low}) {
     double of_one = 0;
     for (const int count : {1, 4, 16, 64, 256}) {
       const Shot shot = lamps_shot(count, where);
-      const Film a = render(shot, geometry, kReference, 1000).film,
-                 b = render(shot, geometry, kReference, 1001).film;
+      const render::Film a = render(shot, geometry, reference_spp, 1000).film,
+                         b = render(shot, geometry, reference_spp, 1001).film;
       double error = 0, cpu_s = 0;
       Render last;
-      for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
-        last = render(shot, geometry, kSamples, seed);
-        error += error_beside(last.film, a, b) / kSeeds, cpu_s += last.cost.cpu_s / kSeeds;
+      for (uint32_t seed = 1; seed <= seeds; ++seed) {
+        last = render(shot, geometry, spp, seed);
+        error += error_beside(last.film, a, b) / seeds, cpu_s += last.cost.cpu_s / seeds;
       }
       if (count == 1) of_one = cpu_s;
       Line line = line_of({error, last});
@@ -309,17 +310,17 @@ Shot larger(Shot shot) {
 
 /// Gain: of 1 / (error x CPU s) over the noisy picture of as many samples.
 void render_denoise(const Emit& emit) {
-  constexpr int kReference = 6400;
+  constexpr int reference_spp = 6400;
   Shot sky = larger(pool_shot());
   sky.light.erase(sky.light.begin());
-  const FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}},
+  const render::FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}},
       drops{spray(), {}};
-  const std::tuple<std::string, Shot, const FrameGeometry*> pictures[] = {
+  const std::tuple<std::string, Shot, const render::FrameGeometry*> pictures[] = {
       {"cloth", larger(cloth_shot()), &cloth},
       {"pool under the sky", sky, &pool},
       {"spray against the sun", larger(spray_shot()), &drops}};
   for (const auto& [name, shot, geometry] : pictures) {
-    const Film reference = render(shot, *geometry, kReference, 1000).film;
+    const render::Film reference = render(shot, *geometry, reference_spp, 1000).film;
     for (const int samples : {16, 64, 256}) {
       Shot clean = shot;
       clean.render.denoise = true;
@@ -329,7 +330,7 @@ void render_denoise(const Emit& emit) {
       line.method = name + ", denoised";
       line.resolution = "192 x 108 pixels";
       line.error = denoised.error;
-      line.error_of = "relMSE against " + std::to_string(kReference) + " samples";
+      line.error_of = "relMSE against " + std::to_string(reference_spp) + " samples";
       line.more["samples"] = samples;
       line.more["noisy_rel_mse"] = noisy.error;
       line.more["light"] = denoised.light;
@@ -348,11 +349,11 @@ const Registration render_denoise_case{
 
 /// The same error with samples spread evenly would take `even_samples` as their errors' line says.
 void render_adaptive(const Emit& emit) {
-  constexpr int kReference = 25600;
+  constexpr int reference_spp = 25600;
   Shot shot = pool_shot();
   shot.light.erase(shot.light.begin());
-  const FrameGeometry geometry{wavy_pool(), {}};
-  const Film reference = render(shot, geometry, kReference, 1000).film;
+  const render::FrameGeometry geometry{wavy_pool(), {}};
+  const render::Film reference = render(shot, geometry, reference_spp, 1000).film;
   std::vector<double> counts, errors;
   for (const int samples : {32, 64, 128, 256, 512}) {
     counts.push_back(std::log(double(samples)));
@@ -381,11 +382,11 @@ const Registration render_adaptive_case{
 
 /// Wall time by threads, the median of three pictures each.
 void render_scaling(const Emit& emit) {
-  constexpr int kSamples = 16, kGated = 16;
-  constexpr double kLeastEfficiency = 0.85;
+  constexpr int spp = 16, gated = 16;
+  constexpr double least_efficiency = 0.85;
   Shot shot = cloth_shot();
   shot.render.width = 640, shot.render.height = 360;  // 920 tiles
-  const FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
+  const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
   double alone_s = 0;
   std::vector<int> counts;
   for (int n = 1; n < hardware_threads(); n *= 2) counts.push_back(n);
@@ -394,7 +395,7 @@ void render_scaling(const Emit& emit) {
     const tbb::global_control some(tbb::global_control::max_allowed_parallelism, size_t(threads));
     std::vector<Measured> costs;
     for (uint32_t seed = 1; seed <= 3; ++seed)
-      costs.push_back(render(shot, geometry, kSamples, seed).cost);
+      costs.push_back(render(shot, geometry, spp, seed).cost);
     std::sort(costs.begin(), costs.end(),
               [](const Measured& a, const Measured& b) { return a.wall_s < b.wall_s; });
     if (threads == 1) alone_s = costs[1].wall_s;
@@ -405,7 +406,7 @@ void render_scaling(const Emit& emit) {
     line.cost = costs[1];
     line.error = costs[1].wall_s * threads / alone_s;
     line.error_of = "wall time times threads over that of one";
-    if (threads == kGated) line.gate = 1 / kLeastEfficiency;
+    if (threads == gated) line.gate = 1 / least_efficiency;
     line.more["efficiency"] = 1 / *line.error;
     emit(line);
   }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "tests/contract/sphere_mesh.h"
 
 namespace drench::bench {
@@ -28,8 +28,8 @@ TriangleMesh pleated_sheet(uint32_t cells) {
 
 Shot cloth_shot() {
   Shot shot;
-  shot.render.width = kSmallWidth;
-  shot.render.height = kSmallHeight;
+  shot.render.width = small_width;
+  shot.render.height = small_height;
   shot.render.depth = 8;
   shot.camera.position = V3d(0.7, 0.9, 2.2);
   shot.camera.target = V3d(0, 0.5, 0);
@@ -93,11 +93,11 @@ Shot pool_shot() {
 }
 
 TriangleMesh spray() {
-  constexpr uint32_t kDrops = 400, kRings = 12;
-  const TriangleMesh drop = test::unit_sphere(kRings, 2 * kRings);
-  const auto number = [](uint32_t k) { return unit_float(hash_bits(k)); };
+  constexpr uint32_t drops = 400, rings = 12;
+  const TriangleMesh drop = test::unit_sphere(rings, 2 * rings);
+  const auto number = [](uint32_t k) { return render::unit_float(render::hash_bits(k)); };
   TriangleMesh mesh;
-  for (uint32_t k = 0; k < kDrops; ++k) {
+  for (uint32_t k = 0; k < drops; ++k) {
     const V3f place(0.5f * (number(4 * k) - 0.5f), 0.05f + 0.3f * number(4 * k + 1),
                     0.3f * (number(4 * k + 2) - 0.5f));
     const float radius = 0.0015f + 0.0035f * number(4 * k + 3);
@@ -127,17 +127,18 @@ Shot spray_shot() {
   return shot;
 }
 
-Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed,
-              const RenderOptions& options) {
+Render render(Shot shot, const render::FrameGeometry& geometry, int samples, uint32_t seed,
+              const render::RenderOptions& options) {
   shot.render.samples = samples;
   shot.render.seed = seed;
   Render out;
-  out.cost = measure(
-      [&] { out.film = render_frame(shot, shot.timeline.first, geometry, options, &out.stats); });
+  out.cost = measure([&] {
+    out.film = render::render_frame(shot, shot.timeline.first, geometry, options, &out.stats);
+  });
   return out;
 }
 
-double relative_mse(const Film& film, const Film& reference) {
+double relative_mse(const render::Film& film, const render::Film& reference) {
   double sum = 0;
   for (size_t k = 0; k < film.rgba.size(); ++k) {
     if (k % 4 == 3) continue;

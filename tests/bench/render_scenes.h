@@ -2,11 +2,12 @@
 // Pictures that the renderer's cases are measured on.
 
 #include "render/options.h"
+#include "render/renderer.h"
 #include "tests/bench/bench.h"
 
 namespace drench::bench {
 
-inline constexpr int kSmallWidth = 96, kSmallHeight = 54;  // pixels
+inline constexpr int small_width = 96, small_height = 54;  // pixels
 
 /// A pleated sheet of 2 x cells x cells triangles.
 TriangleMesh pleated_sheet(uint32_t cells = 64);
@@ -25,14 +26,14 @@ TriangleMesh spray();
 Shot spray_shot();
 
 struct Render {
-  Film film;
-  RenderStats stats;
+  render::Film film;
+  render::RenderStats stats;
   Measured cost;
 };
-Render render(Shot shot, const FrameGeometry& geometry, int samples, uint32_t seed,
-              const RenderOptions& options = {});
+Render render(Shot shot, const render::FrameGeometry& geometry, int samples, uint32_t seed,
+              const render::RenderOptions& options = {});
 
 /// mean((x - r)^2 / (r^2 + 0.01)) over pixels and channels.
-double relative_mse(const Film& film, const Film& reference);
+double relative_mse(const render::Film& film, const render::Film& reference);
 
 }  // namespace drench::bench

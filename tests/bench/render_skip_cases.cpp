@@ -14,7 +14,7 @@ namespace {
 
 struct Frame {
   Shot shot;
-  FrameGeometry geometry;
+  render::FrameGeometry geometry;
 };
 
 struct Variant {
@@ -45,7 +45,7 @@ Frame pool_frame() {
 }
 
 /// The first is the frame as it is; each of the others has something to no effect.
-constexpr std::array kVariants{
+constexpr std::array variants{
     Variant{"as it is", [](Frame&) {}},
     Variant{"motion blur of what stands", [](Frame& f) { f.shot.render.motion_blur = true; }},
     Variant{"a lens of radius 0", [](Frame& f) { f.shot.camera.blades = 6; }},
@@ -68,7 +68,7 @@ constexpr std::array kVariants{
 };
 
 void render_variant(Frame frame, size_t number) {
-  kVariants[number].change(frame);
+  variants[number].change(frame);
   count_instructions([&] { render(frame.shot, frame.geometry, 4, 1); });
 }
 
@@ -77,10 +77,10 @@ void emit_picture(const Emit& emit, const std::string& key, const std::string& p
     return instructions("render_skips", key + std::to_string(number));
   };
   const double plain = count(0);
-  for (size_t k = 1; k < kVariants.size(); ++k) {
+  for (size_t k = 1; k < variants.size(); ++k) {
     Line line;
-    line.method = picture + ", " + kVariants[k].name;
-    line.resolution = fmt::format("{} x {} pixels, 4 samples", kSmallWidth, kSmallHeight);
+    line.method = picture + ", " + variants[k].name;
+    line.resolution = fmt::format("{} x {} pixels, 4 samples", small_width, small_height);
     line.threads = 1;
     line.error = count(k) / plain;
     line.error_of = "instructions over those of the picture without it";

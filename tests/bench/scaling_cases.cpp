@@ -159,13 +159,9 @@ void gpu_column(int side, const Emit& emit) {
 void weak_column(int side, Where where, const Emit& emit) {
   Shot shot = column_shot(side);
   shot.fluid.solver = FluidSolver::weakly_compressible;
-  const sim::Scene scene = sim::build_scene(shot);
-  const auto solver = make_solver(scene.parameters, scene.cloth, where);
-  solver->load(scene.start);
-  sim::Limits limits = solver->measure();
+  sim::Stepper run = make_stepper(sim::build_scene(shot), where);
   const auto steps = [&](int count) {
-    for (int k = 0; k < count; ++k)
-      limits = solver->step(sim::stable_step(scene.parameters, limits).dt, 1);
+    for (int k = 0; k < count; ++k) take_stable_step(run);
   };
   steps(5);
   std::vector<double> step;
@@ -175,9 +171,9 @@ void weak_column(int side, Where where, const Emit& emit) {
     const Measured now = measure([&] { steps(10); });
     step.push_back(seconds(now, where) / 10), add(*line.cost, now);
   }
-  const double n = double(scene.start.id.size());
+  const double n = double(run.scene.start.id.size());
   line.method = "weakly compressible";
-  line.resolution = std::to_string(scene.start.id.size()) + " particles";
+  line.resolution = std::to_string(run.scene.start.id.size()) + " particles";
   line.device = name_of(where), line.threads = hardware_threads();
   line.more["us_a_step"] = 1e6 * median(step);
   if (where == Where::cuda) add_rate(line, weak_steps, n / median(step), n);

@@ -5,14 +5,12 @@
 // the GPU.
 
 #include <algorithm>
-#include <cmath>
-#include <memory>
-#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "sim/setup/scene.h"
-#include "sim/solver.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/step_cost.h"
 
 namespace drench::bench {
 namespace {
@@ -80,49 +78,6 @@ Shot seed_shot(SeedScene scene, int particles, CouplingScheme scheme) {
   return shot;
 }
 
-struct BlowUp : std::runtime_error {
-  explicit BlowUp(double at)
-      : runtime_error("blew up at t = " + std::to_string(at) + " s"), time(at) {}
-  double time;  // s
-};
-
-/// A solver with what the next step needs.
-struct Run {
-  sim::Parameters parameters;
-  std::unique_ptr<sim::Solver> solver;
-  sim::Limits limits;
-  double time = 0;  // s
-
-  void load(const sim::HostState& state) {
-    solver->load(state);
-    limits = solver->measure();
-  }
-  void step(bool cloth) {
-    const double dt = sim::stable_step(parameters, limits).dt;
-    const int substeps =
-        cloth ? std::max(1, int(std::ceil(dt / parameters.cloth_dt_limit - 1e-6))) : 1;
-    limits = solver->step(dt, substeps);
-    if (limits.bad_particle >= 0 || limits.bad_vertex >= 0) {
-      throw BlowUp(time);
-    }
-    time += dt;
-  }
-};
-
-Run make_run(const sim::Scene& scene, const std::string& device) {
-#if defined(DRENCH_HAS_CUDA)
-  if (device == "cuda") {
-    return {scene.parameters, sim::cuda::make_solver(scene.parameters, scene.cloth), {}, 0};
-  }
-#endif
-  return {scene.parameters, sim::cpu::make_solver(scene.parameters, scene.cloth), {}, 0};
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
 /// Costs of rounds of one method.
 struct Rounds {
   std::vector<double> wall, cpu;  // s a step
@@ -135,10 +90,10 @@ struct Rounds {
   }
 };
 
-Line line_of(const Rounds& rounds, int particles, const std::string& device) {
+Line line_of(const Rounds& rounds, int particles, Where device) {
   Line line;
   line.resolution = std::to_string(particles) + " particles";
-  line.device = device;
+  line.device = name_of(device);
   line.threads = hardware_threads();
   line.cost = rounds.total;
   line.more["ms_a_step"] = 1e3 * median(rounds.wall);
@@ -152,41 +107,41 @@ Line line_of(const Rounds& rounds, int particles, const std::string& device) {
 /// The moment at which the fluid lies on the cloth, s: blocks at once, drops once most have landed.
 double warm_time(SeedScene scene) { return scene == SeedScene::drops ? 0.2 : 0.06; }
 
-void run_scene(SeedScene which, int particles, CouplingScheme scheme, const std::string& device,
+void run_scene(SeedScene which, int particles, CouplingScheme scheme, Where device,
                const Emit& emit) {
   Shot shot = seed_shot(which, particles, scheme);
   const sim::Scene scene = sim::build_scene(shot);
-  Run coupled = make_run(scene, device);
-  coupled.load(scene.start);
-  while (coupled.time < warm_time(which)) coupled.step(true);
+  sim::Stepper coupled = make_stepper(scene, device);
+  while (coupled.time < warm_time(which)) take_stable_step(coupled);
 
   sim::Scene without = scene;  // the same fluid and numbers, cloth removed
   without.cloth = {};
-  Run alone = make_run(without, device);
+  sim::Stepper alone = make_stepper(std::move(without), device);
   constexpr int rounds = 7, steps = 10;
   Rounds with_cloth, fluid_only;
   std::vector<double> ratio;
   for (int r = 0; r < rounds; ++r) {
-    alone.load(coupled.solver->save());
-    alone.step(false);
+    alone.load(coupled.solver->save(), {}, coupled.time);
+    alone.limits = alone.solver->measure();
+    take_stable_step(alone);
     fluid_only.add(measure([&] {
-                     for (int s = 0; s < steps; ++s) alone.step(false);
+                     for (int s = 0; s < steps; ++s) take_stable_step(alone);
                    }),
                    steps);
-    coupled.step(true);
+    take_stable_step(coupled);
     with_cloth.add(measure([&] {
-                     for (int s = 0; s < steps; ++s) coupled.step(true);
+                     for (int s = 0; s < steps; ++s) take_stable_step(coupled);
                    }),
                    steps);
-    ratio.push_back(device == "cpu" ? with_cloth.cpu.back() / fluid_only.cpu.back()
-                                    : with_cloth.wall.back() / fluid_only.wall.back());
+    ratio.push_back(device == Where::cpu ? with_cloth.cpu.back() / fluid_only.cpu.back()
+                                         : with_cloth.wall.back() / fluid_only.wall.back());
   }
   const auto near = coupled.solver->near_triangles();
   const auto touching = std::count_if(near.begin(), near.end(), [](int t) { return t >= 0; });
   const std::string coupling = scheme == CouplingScheme::exact ? "exact" : "paper";
   Line line = line_of(with_cloth, particles, device);
   line.method = std::string(name_of(which)) + ", " + coupling;
-  line.time_step = sim::stable_step(coupled.parameters, coupled.limits).dt;
+  line.time_step = coupled.stable_limit().dt;
   line.more["polygons"] = scene.cloth.triangles();
   line.more["cloth_kg_m2"] = shot.cloth[0].areal_density;
   line.more["near_percent"] = 100.0 * double(touching) / particles;
@@ -194,17 +149,17 @@ void run_scene(SeedScene which, int particles, CouplingScheme scheme, const std:
   emit(line);
   Line fluid = line_of(fluid_only, particles, device);
   fluid.method = std::string(name_of(which)) + ", fluid alone (of the " + coupling + " run)";
-  fluid.time_step = sim::stable_step(alone.parameters, alone.limits).dt;
+  fluid.time_step = alone.stable_limit().dt;
   emit(fluid);
 }
 
 void seed_table1(const Emit& emit) {
-  std::vector<std::string> devices{"cpu"};
+  std::vector<Where> devices{Where::cpu};
 #if defined(DRENCH_HAS_CUDA)
   std::string name_or_reason;
-  if (sim::cuda::device_available(name_or_reason)) devices.push_back("cuda");
+  if (sim::cuda::device_available(name_or_reason)) devices.push_back(Where::cuda);
 #endif
-  for (const std::string& device : devices)
+  for (const Where device : devices)
     for (const SeedScene scene : {SeedScene::one_sheet, SeedScene::two_sheets, SeedScene::drops})
       for (const int particles : {16384, 65536})
         for (const CouplingScheme scheme : {CouplingScheme::exact, CouplingScheme::paper}) try {
@@ -214,7 +169,7 @@ void seed_table1(const Emit& emit) {
             Line line;  // the published scheme is known to: a result, not a failure
             line.method = std::string(name_of(scene)) + ", paper";
             line.resolution = std::to_string(particles) + " particles";
-            line.device = device;
+            line.device = name_of(device);
             line.more["blew_up_at_s"] = error.time;
             emit(line);
           }

@@ -18,6 +18,18 @@ std::unique_ptr<sim::Solver> make_solver(const sim::Parameters& parameters,
   return sim::cpu::make_solver(parameters, cloth);
 }
 
+sim::Stepper make_stepper(sim::Scene scene, Where where) {
+  std::unique_ptr<sim::Solver> solver = make_solver(scene.parameters, scene.cloth, where);
+  return {std::move(scene), std::move(solver)};
+}
+
+double take_stable_step(sim::Stepper& run) {
+  const double dt = run.stable_limit().dt;
+  run.step(dt);
+  if (run.limits.bad_particle >= 0 || run.limits.bad_vertex >= 0) throw BlowUp(run.time);
+  return dt;
+}
+
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
   return values[values.size() / 2];
@@ -53,32 +65,9 @@ Shot pool_shot(const Pool& pool, Bottom bottom) {
   return shot;
 }
 
-namespace {
-
-struct Run {
-  sim::Scene scene;
-  std::unique_ptr<sim::Solver> solver;
-  sim::Limits limits;
-
-  Run(const Shot& shot, Where where)
-      : scene(sim::build_scene(shot)), solver(make_solver(scene.parameters, scene.cloth, where)) {
-    solver->load(scene.start);
-    limits = solver->measure();
-  }
-  /// @return its length, s.
-  double step() {
-    const double dt = sim::stable_step(scene.parameters, limits).dt;
-    limits = solver->step(dt, 1);
-    if (limits.bad_particle >= 0 || limits.bad_vertex >= 0)
-      throw std::runtime_error("a pool blew up");
-    return dt;
-  }
-};
-
-}  // namespace
-
 PoolCost cost_of(const Pool& pool, Where where, int warm, int steps) {
-  Run runs[2] = {{pool_shot(pool, Bottom::sheet), where}, {pool_shot(pool, Bottom::floor), where}};
+  sim::Stepper runs[2] = {make_stepper(sim::build_scene(pool_shot(pool, Bottom::sheet)), where),
+                          make_stepper(sim::build_scene(pool_shot(pool, Bottom::floor)), where)};
   PoolCost result;
   PoolCost::One* ones[2] = {&result.sheet, &result.floor};
   std::vector<double> took[2], ratio;
@@ -86,7 +75,7 @@ PoolCost cost_of(const Pool& pool, Where where, int warm, int steps) {
     double pair[2];
     for (const int k : {0, 1}) {
       double dt = 0;
-      const Measured cost = measure([&] { dt = runs[k].step(); });
+      const Measured cost = measure([&] { dt = take_stable_step(runs[k]); });
       if (s < warm) continue;
       took[k].push_back(pair[k] = seconds(cost, where));
       ones[k]->dt += dt / steps;

@@ -3,10 +3,13 @@
 // several cases share.
 
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
+#include "sim/stepper.h"
 #include "tests/bench/bench.h"
 
 namespace drench::bench {
@@ -15,6 +18,14 @@ enum class Where { cpu, cuda };
 const char* name_of(Where where);
 std::unique_ptr<sim::Solver> make_solver(const sim::Parameters& parameters,
                                          const sim::ClothTopology& cloth, Where where);
+sim::Stepper make_stepper(sim::Scene scene, Where where);
+struct BlowUp : std::runtime_error {
+  explicit BlowUp(double at)
+      : runtime_error("blew up at t = " + std::to_string(at) + " s"), time(at) {}
+  double time;  // s
+};
+/// One step as long as it may be. @return its length, s. @throws BlowUp.
+double take_stable_step(sim::Stepper& run);
 
 double median(std::vector<double> values);
 /// Of the device's clock, s: CPU seconds of all threads, or wall seconds beside a GPU.

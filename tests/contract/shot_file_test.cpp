@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/shot/colour.h"
 #include "pipeline/contract/shot/shot_table.h"
-#include "pipeline/contract/shot/shot_value.h"
+#include "pipeline/contract/shot/shot_text.h"
 #include "tests/contract/shot_samples.h"
 
 namespace drench {

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/driver/movie.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/driver/folder.h"
 
 namespace drench {
@@ -16,8 +16,8 @@ namespace {
 
 using test::TemporaryFolder;
 
-Film flat(int width, int height, float value) {
-  Film film{width, height, std::vector<float>(4 * size_t(width) * height, value)};
+render::Film flat(int width, int height, float value) {
+  render::Film film{width, height, std::vector<float>(4 * size_t(width) * height, value)};
   for (size_t k = 3; k < film.rgba.size(); k += 4) film.rgba[k] = 1;
   return film;
 }
@@ -27,7 +27,7 @@ std::vector<NumberedImage> frames_in(const std::filesystem::path& folder, int co
   std::vector<NumberedImage> images;
   for (int k = 0; k < count; ++k) {
     const std::filesystem::path file = folder / (std::to_string(k) + ".exr");
-    write_exr(file, flat(width, height, 0.02f * float(k + 1)), {});
+    render::write_exr(file, flat(width, height, 0.02f * float(k + 1)), {});
     images.push_back({1001 + k, file});
   }
   return images;
@@ -45,7 +45,7 @@ TEST(ContactSheet, ShowsEachFramesOwnColour) {
     seen.insert(sheet.rgb[k]);
   }
   for (int k = 0; k < 6; ++k) {
-    const uint8_t expected = ViewTransform()(flat(1, 1, 0.02f * float(k + 1)))[0];
+    const uint8_t expected = render::ViewTransform()(flat(1, 1, 0.02f * float(k + 1)))[0];
     bool found = false;  // half floats of the file: a level of 8-bit rounding
     for (int level = expected - 1; level <= expected + 1; ++level) found |= seen.contains(level);
     EXPECT_TRUE(found) << k;
@@ -122,7 +122,7 @@ TEST(Movie, RefusesFramesOfDifferentSizes) {
   if (!find_ffmpeg()) GTEST_SKIP() << "ffmpeg is not installed";
   const TemporaryFolder folder;
   auto images = frames_in(folder.path(), 2, 32, 18);
-  write_exr(images[1].file, flat(34, 18, 0.1f), {});
+  render::write_exr(images[1].file, flat(34, 18, 0.1f), {});
   EXPECT_THROW(write_movie(folder.path() / "a.mp4", images, 24, {}), Error);
 }
 

@@ -164,10 +164,10 @@ TEST(Mp4Check, FindsEveryCut) {
 TEST(Faults, ALimitWithinTheLastBytesOfAnExrIsReported) {
   const TemporaryFolder folder;
   constexpr int width = 300, height = 200;
-  Film film{width, height, std::vector<float>(4 * width * height)};
+  render::Film film{width, height, std::vector<float>(4 * width * height)};
   std::mt19937 random(5);  // noise, which no codec makes small
   for (float& value : film.rgba) value = float(random() % 1000) / 1000;
-  const uint64_t size = write_exr(folder / "whole.exr", film, {}).size;
+  const uint64_t size = render::write_exr(folder / "whole.exr", film, {}).size;
   for (const uint64_t missing : {1u, 100u, 1000u, 9000u}) {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -176,7 +176,7 @@ TEST(Faults, ALimitWithinTheLastBytesOfAnExrIsReported) {
       ::signal(SIGXFSZ, SIG_IGN);
       int code = 1;
       try {
-        write_exr(folder / "cut.exr", film, {});
+        render::write_exr(folder / "cut.exr", film, {});
       } catch (const Error&) {
         code = 0;
       }

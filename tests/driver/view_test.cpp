@@ -56,9 +56,9 @@ TEST_F(View, AChangedConfigMakesDailiesAgainAndRendersNothing) {
 
 TEST_F(View, IsThatOfTheContactSheet) {
   write_config(folder_.path() / "a.ocio", "0.5");
-  Film film{64, 36, std::vector<float>(4 * 64 * 36, 0.6f)};
-  write_exr(folder_.path() / "a.exr", film, {});
-  const ViewTransform view(shot("[view]\nocio_config = \"a.ocio\"\n").view);
+  render::Film film{64, 36, std::vector<float>(4 * 64 * 36, 0.6f)};
+  render::write_exr(folder_.path() / "a.exr", film, {});
+  const render::ViewTransform view(shot("[view]\nocio_config = \"a.ocio\"\n").view);
   const Picture sheet = contact_sheet({{1001, folder_.path() / "a.exr"}}, view);
   const size_t middle = size_t(sheet.height / 2) * size_t(sheet.width) + size_t(sheet.width / 2);
   EXPECT_NEAR(sheet.rgb[3 * middle], 0.3 * 255, 1);

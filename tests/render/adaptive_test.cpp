@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 /// Left a sky that has no noise; right a floor under a lamp that most paths miss.
@@ -106,16 +108,16 @@ TEST(ErrorTarget, GivesTheSameBitsForAnyThreads) {
 
 TEST(SamplePlan, GoesByTheScatterOfSamples) {
   // Columns 0 to 15 have none, 16 to 31 scatter by 1, 32 to 47 by 2, of a mean of 1.
-  constexpr int kWidth = 48, kHeight = 8;
-  std::vector<PixelSum> pixels(kWidth * kHeight);
-  SamplePlan plan(kWidth, kHeight, 1 << 20, 1e-4);
+  constexpr int film_width = 48, film_height = 8;
+  std::vector<PixelSum> pixels(film_width * film_height);
+  SamplePlan plan(film_width, film_height, 1 << 20, 1e-4);
   int passes = 0;
   for (uint32_t state = 1; plan.next(pixels); ++passes) {
     ASSERT_LT(passes, 64);
     for (size_t p = 0; p < pixels.size(); ++p)
       while (pixels[p].samples() < plan.wanted(p)) {
         state = hash_bits(state + 1);
-        const float scatter = float(p % kWidth / 16);
+        const float scatter = float(p % film_width / 16);
         pixels[p].add(V3f(1 + (state & 1 ? scatter : -scatter)), 1);
       }
   }
@@ -126,9 +128,9 @@ TEST(SamplePlan, GoesByTheScatterOfSamples) {
   // The least for the target: n = scatter x mean scatter / (1.01 target).
   for (const size_t scatter : {1, 2}) {
     double samples = 0;
-    for (size_t y = 0; y < kHeight; ++y)
+    for (size_t y = 0; y < film_height; ++y)
       for (size_t x = 20; x < 28; ++x)
-        samples += pixels[y * kWidth + x + 16 * (scatter - 1)].samples() / (8. * kHeight);
+        samples += pixels[y * film_width + x + 16 * (scatter - 1)].samples() / (8. * film_height);
     EXPECT_NEAR(samples, double(scatter) / 1.01e-4, 0.1 * double(scatter) / 1.01e-4);
   }
 }
@@ -168,4 +170,4 @@ TEST(Crop, BeyondTheFrameIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,11 +8,13 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/bsdf_fabric.h"
 #include "render/bsdf/material.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 V3f at_angle(double angle) {  // towards a surface with normal +y
@@ -21,9 +23,9 @@ V3f at_angle(double angle) {  // towards a surface with normal +y
 
 TEST(Interface, BendsBySnellsLaw) {
   for (double degrees = 1; degrees < 90; degrees += 4) {
-    const double sin_in = std::sin(degrees * kPi64 / 180);
+    const double sin_in = std::sin(degrees * pi64 / 180);
     const InterfaceSplit split =
-        split_at_interface(at_angle(degrees * kPi64 / 180), {0, 1, 0}, 1.333f);
+        split_at_interface(at_angle(degrees * pi64 / 180), {0, 1, 0}, 1.333f);
     EXPECT_NEAR(split.refracted.x, sin_in / 1.333, 1e-6);
     EXPECT_LT(split.refracted.y, 0);
     EXPECT_NEAR(split.reflected.x, sin_in, 1e-6);
@@ -40,7 +42,7 @@ TEST(Interface, ReflectsHalfOfOnePolarisationAtBrewstersAngle) {
 
 TEST(Interface, ReflectsTheSameShareFromBothSides) {
   for (double degrees = 1; degrees < 88; degrees += 3) {
-    const InterfaceSplit out = split_at_interface(at_angle(degrees * kPi64 / 180), {0, 1, 0}, 1.5f);
+    const InterfaceSplit out = split_at_interface(at_angle(degrees * pi64 / 180), {0, 1, 0}, 1.5f);
     const InterfaceSplit back = split_at_interface(-out.refracted, {0, -1, 0}, 1 / 1.5f);
     EXPECT_NEAR(out.reflectance, back.reflectance, 2e-5) << degrees;
   }
@@ -54,7 +56,7 @@ TEST(Interface, ReflectsTotallyBeyondTheCriticalAngle) {
 
 struct RandomCloth {
   std::mt19937 random{9};
-  float uniform() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
+  float uniform() { return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random); }
   V3f direction() { return Basis({0, 0, 1}).world(sample_cone({uniform(), uniform()}, 2)); }
   ClothBsdf bsdf(float bend) {
     const V3f geometric = direction();
@@ -86,23 +88,23 @@ TEST(Cloth, SamplesWithTheDensityAndValueItStates) {
 // would be a random part of the even set.)
 TEST(Cloth, SpreadsThePixelsSamplesEvenlyOnBothSides) {
   const ClothBsdf bsdf({0, 1, 0}, {0, 1, 0}, {0, 1, 0}, V3f(0.5f), V3f(0.2f));
-  constexpr int kPixels = 400, kSamples = 64;
+  constexpr int pixels = 400, samples = 64;
   for (const float side : {1.f, -1.f}) {
     const auto beyond = [&](const V2f& u) {
       const V3f d = bsdf.sample(u).direction;
       return d.y * side > 0 && d.x + 0.5f * d.z > 0.3f ? 1. : 0.;
     };
-    double share = 0, squares = 0;
+    double fraction = 0, squares = 0;
     for (int i = 0; i < 512; ++i)
       for (int j = 0; j < 512; ++j)
-        share += beyond({(float(i) + 0.5f) / 512, (float(j) + 0.5f) / 512}) / (512. * 512);
-    for (uint32_t pixel = 0; pixel < kPixels; ++pixel) {
+        fraction += beyond({(float(i) + 0.5f) / 512, (float(j) + 0.5f) / 512}) / (512. * 512);
+    for (uint32_t pixel = 0; pixel < pixels; ++pixel) {
       double mean = 0;
-      for (uint32_t s = 0; s < kSamples; ++s)
-        mean += beyond(Sampler(PixelOrder::separate, 1, pixel, 0, 6, s).two(11)) / kSamples;
-      squares += std::pow(mean - share, 2) / kPixels;
+      for (uint32_t s = 0; s < samples; ++s)
+        mean += beyond(Sampler(PixelOrder::separate, 1, pixel, 0, 6, s).two(11)) / samples;
+      squares += std::pow(mean - fraction, 2) / pixels;
     }
-    EXPECT_LT(std::sqrt(squares), 0.5 * std::sqrt(share * (1 - share) / kSamples)) << side;
+    EXPECT_LT(std::sqrt(squares), 0.5 * std::sqrt(fraction * (1 - fraction) / samples)) << side;
   }
 }
 
@@ -111,10 +113,10 @@ TEST(Cloth, ReturnsReflectanceAndTransmittanceWhenFlatAndNeverMore) {
   for (const float bend : {0.f, 0.4f}) {
     const ClothBsdf bsdf = cloth.bsdf(bend);
     V3d sum(0);
-    constexpr int kDraws = 1 << 18;
-    for (int k = 0; k < kDraws; ++k) {  // uniform over the sphere
+    constexpr int draws = 1 << 18;
+    for (int k = 0; k < draws; ++k) {  // uniform over the sphere
       float pdf = 0;
-      sum += V3d(bsdf.value(cloth.direction(), pdf)) * (4 * kPi64 / kDraws);
+      sum += V3d(bsdf.value(cloth.direction(), pdf)) * (4 * pi64 / draws);
     }
     for (int c = 0; c < 3; ++c) {
       const double albedo = bsdf.albedo()[c];
@@ -161,14 +163,14 @@ TEST(Cloth, ShowsNoTrianglesWhereLightGrazesIt) {
   shot.camera.up = V3d(0, 0, -1);
   shot.camera.fov_deg = 1.1;
   const Film film = render_frame(shot, 1001, {{}, {{"cloth", bowl}}});
-  const double half = std::tan(0.55 * kPi64 / 180) * 19.8;  // m
+  const double half = std::tan(0.55 * pi64 / 180) * 19.8;  // m
   double most = 0;
   for (int y = 0; y < film.height; ++y)
     for (int x = 0; x < film.width; ++x) {
       const double at = 0.75 + half * (2 * (x + 0.5) / film.width - 1);
       const double cos = (0.8 * at - 0.4) / std::sqrt((1 + 0.64 * at * at) * 1.16);
       const double shown = film.rgba[4 * (size_t(y) * film.width + x)];
-      most = std::max(most, std::abs(shown - 0.4 * 10 * cos / kPi64));
+      most = std::max(most, std::abs(shown - 0.4 * 10 * cos / pi64));
     }
   EXPECT_LT(most, 0.01);
 }
@@ -178,8 +180,8 @@ TEST(Cloth, ShowsNoTrianglesWhereLightGrazesIt) {
 /// @param value  V3f(outgoing, normal, incoming): what its material makes of light, x |cos|
 template <class Value>
 double off_a_smooth_ball(const Material& material, const Value& value) {
-  constexpr int kSize = 96;
-  Shot shot = plain_shot(64, kSize);
+  constexpr int picture_size = 96;
+  Shot shot = plain_shot(64, picture_size);
   shot.render.depth = 1;
   shot.material = {material};
   shot.fluid.material = material.name;
@@ -191,19 +193,20 @@ double off_a_smooth_ball(const Material& material, const Value& value) {
   const V3d eye(0, 0, 20);
   shot.camera.position = eye;
   shot.camera.target = V3d(0, 0, 0);
-  shot.camera.fov_deg = 2 * std::atan(1 / 20.) * 180 / kPi64;
+  shot.camera.fov_deg = 2 * std::atan(1 / 20.) * 180 / pi64;
   const Film film = render_frame(shot, 1001, {sphere_mesh(3), {}});
   double most = 0;
   int seen = 0;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const V3d d = V3d(2 * (x + 0.5) / kSize - 1, 1 - 2 * (y + 0.5) / kSize, -20).normalized();
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
+      const V3d d =
+          V3d(2 * (x + 0.5) / picture_size - 1, 1 - 2 * (y + 0.5) / picture_size, -20).normalized();
       const double nearest2 = 400 - std::pow(eye.dot(d), 2);
       if (nearest2 > 0.8) continue;  // near its rim triangles are seen from the side
       const V3d n = eye - d * (eye.dot(d) + std::sqrt(1 - nearest2));
       const V3f in(-sun.direction.normalized());
-      const double expected = value(V3f(-d), V3f(n), in).x * kPi64;
-      const double shown = film.rgba[4 * size_t(y * kSize + x)] * kPi64 / 10;
+      const double expected = value(V3f(-d), V3f(n), in).x * pi64;
+      const double shown = film.rgba[4 * size_t(y * picture_size + x)] * pi64 / 10;
       most = std::max(most, std::abs(shown - expected));
       ++seen;
     }
@@ -299,4 +302,4 @@ TEST(Checker, AlternatesInSquaresOfItsSize) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,7 +8,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/strip.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 TEST(Camera, SpansItsHorizontalFieldOfView) {
@@ -17,23 +17,23 @@ TEST(Camera, SpansItsHorizontalFieldOfView) {
   camera.target = V3d(0, 0, -1);
   camera.fov_deg = 60.0;
   const ShutterCamera shutter(camera, 1001, 1001, 200, 100);
-  const V3f left = shutter.ray<false, false>({0, 50}, {0, 0}, 0).direction;
-  const V3f top = shutter.ray<false, false>({100, 0}, {0, 0}, 0).direction;
-  EXPECT_NEAR(std::atan2(-left.x, -left.z) * 180 / kPi64, 30, 1e-4);
-  EXPECT_NEAR(top.y / -top.z, std::tan(kPi64 / 6) / 2, 1e-6);
+  const V3f left = shutter.ray<CameraMotion::still, Lens::pinhole>({0, 50}, {0, 0}, 0).direction;
+  const V3f top = shutter.ray<CameraMotion::still, Lens::pinhole>({100, 0}, {0, 0}, 0).direction;
+  EXPECT_NEAR(std::atan2(-left.x, -left.z) * 180 / pi64, 30, 1e-4);
+  EXPECT_NEAR(top.y / -top.z, std::tan(pi64 / 6) / 2, 1e-6);
 }
 
 TEST(MotionBlur, SpreadsAMovingStripIntoATrapezoid) {
-  constexpr double kWidth = 6, kTravel = 20;
-  const Strip strip(kWidth, kTravel);
+  constexpr double width = 6, travel_distance = 20;
+  const Strip strip(width, travel_distance);
   const std::vector<double> dark =
       darkness_of_columns(render_frame(strip.shot, 1001, strip.geometry));
   // Coverage at x over the shutter, then the pixel filter's quantiles.
   const PixelFilter filter;
   const auto coverage = [&](double x) {
-    const double from = std::max(x - kWidth / 2, -kTravel / 2),
-                 to = std::min(x + kWidth / 2, kTravel / 2);
-    return std::max(0., to - from) / kTravel;
+    const double from = std::max(x - width / 2, -travel_distance / 2),
+                 to = std::min(x + width / 2, travel_distance / 2);
+    return std::max(0., to - from) / travel_distance;
   };
   double sum = 0;
   for (int column = 0; column < 64; ++column) {
@@ -44,7 +44,7 @@ TEST(MotionBlur, SpreadsAMovingStripIntoATrapezoid) {
     EXPECT_NEAR(dark[column], expected, 0.01) << column;
     sum += dark[column];
   }
-  EXPECT_NEAR(sum, kWidth, 0.01 * kWidth);  // blur moves light, it makes none
+  EXPECT_NEAR(sum, width, 0.01 * width);  // blur moves light, it makes none
 }
 
 TEST(MotionBlur, IsCentredOnTheFrame) {
@@ -64,14 +64,14 @@ TEST(MotionBlur, IsLeftOutBelowATenthOfAPixel) {
     const Strip strip(4, travel);
     return Scene(strip.shot, 1001, strip.geometry, {}).features();
   };
-  EXPECT_EQ(features(0.05) & kMotionBlur, 0u);
-  EXPECT_NE(features(0.2) & kMotionBlur, 0u);
+  EXPECT_EQ(features(0.05) & Feature::motion_blur, 0u);
+  EXPECT_NE(features(0.2) & Feature::motion_blur, 0u);
 }
 
 TEST(MotionBlur, OfTheCameraEqualsThatOfTheScene) {
   // The camera moving left and the strip moving right give one picture (parallel to the film).
   Strip strip(6, 12), still(6, 0);
-  const double reach = 12 * Strip::kPixel / 2;
+  const double reach = 12 * Strip::pixel / 2;
   for (Animated<V3d>* key : {&still.shot.camera.position, &still.shot.camera.target}) {
     const V3d middle = key->keys.front().second;
     key->keys = {{1000.75, middle + V3d(reach, 0, 0)}, {1001.25, middle - V3d(reach, 0, 0)}};
@@ -90,7 +90,7 @@ TEST(ThinLens, SpreadsAPointOverItsCircleOfConfusion) {
   shot.camera.target = V3d(0, 0, -d);
   shot.camera.focus_distance = f;
   shot.camera.lens_radius = lens;
-  shot.camera.fov_deg = 2 * std::atan(0.05) * 180 / kPi64;
+  shot.camera.fov_deg = 2 * std::atan(0.05) * 180 / pi64;
   Light sphere;
   sphere.type = LightType::sphere;
   sphere.center = {0, 0, -d};
@@ -116,4 +116,4 @@ TEST(ThinLens, SpreadsAPointOverItsCircleOfConfusion) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -1,11 +1,11 @@
 #pragma once
 // Rays that must not leave a closed body.
 
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 /// Whether one of a chain of rays, each from where the last arrived back into the body, is lost: it
 /// meets nothing, or a face from without.
@@ -27,4 +27,4 @@ inline bool loses_ray(const Scene& scene, const V3f& start, uint32_t chain, int 
   return false;
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

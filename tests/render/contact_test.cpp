@@ -7,18 +7,18 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr double kIndex = 1.333;
+constexpr double water_index = 1.333;
 
 /// Reflectance of the surface from below, at an angle.
 double reflectance_from_water(double angle) {
-  const double sine = kIndex * std::sin(angle);
+  const double sine = water_index * std::sin(angle);
   if (sine >= 1) return 1;
   const double in = std::cos(angle), out = std::sqrt(1 - sine * sine);
-  const double s = (kIndex * in - out) / (kIndex * in + out),
-               p = (kIndex * out - in) / (kIndex * out + in);
+  const double s = (water_index * in - out) / (water_index * in + out),
+               p = (water_index * out - in) / (water_index * out + in);
   return 0.5 * (s * s + p * p);
 }
 
@@ -43,7 +43,7 @@ struct WetCloth {
     Material cloth = diffuse("cotton", reflectance);
     cloth.type = MaterialType::cloth;
     cloth.transmittance = V3f(transmittance);
-    shot.material = {dielectric("water", kIndex), cloth};
+    shot.material = {dielectric("water", water_index), cloth};
     shot.fluid.material = "water";
     shot.light = {sky(1)};
     shot.render.depth = 60;
@@ -94,4 +94,4 @@ TEST(WaterOnCloth, TurnedInsideOutHasNoDepth) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,16 +8,18 @@
 #include <random>
 
 #include "render/denoise/denoise.h"
+#include "render/denoise/motion_match.h"
 #include "render/denoise/noisy_frame.h"
-#include "render/scene/motion_match.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
-constexpr int kSize = 64;
-constexpr float kNoise = 0.2f;
+constexpr int picture_size = 64;
+constexpr float noise_level = 0.2f;
 
 /// What a pixel shows in a frame.
 struct Seen {
@@ -31,14 +33,15 @@ NoisyPicture frame_of(const Scene& scene, int frame, unsigned seed = 1) {
   std::mt19937 random(seed * 1000 + unsigned(frame));
   std::normal_distribution<float> scatter(0, 1);
   NoisyPicture picture;
-  picture.width = picture.height = kSize;
+  picture.width = picture.height = picture_size;
   picture.feature.resize(1);
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
       const Seen seen = scene(frame, x, y);
       for (int c = 0; c < 3; ++c) {
-        for (auto& half : picture.half) half[c].push_back(seen.colour + kNoise * scatter(random));
-        picture.variance[c].push_back(kNoise * kNoise);
+        for (auto& half : picture.half)
+          half[c].push_back(seen.colour + noise_level * scatter(random));
+        picture.variance[c].push_back(noise_level * noise_level);
       }
       picture.feature[0].push_back(seen.guide);
       for (int axis = 0; axis < 2; ++axis) {
@@ -46,7 +49,7 @@ NoisyPicture frame_of(const Scene& scene, int frame, unsigned seed = 1) {
         picture.motion[1][axis].push_back(seen.motion[axis]);
       }
     }
-  picture.feature_variance.assign(1, NoisyPicture::Plane(kSize * kSize, 0.f));
+  picture.feature_variance.assign(1, NoisyPicture::Plane(picture_size * picture_size, 0.f));
   return picture;
 }
 
@@ -70,24 +73,24 @@ struct Quality {
 };
 
 Quality quality(const Scene& scene, int radius) {
-  constexpr int kFrames = 5;
+  constexpr int frames = 5;
   std::vector<NoisyPicture::Plane> off;
-  for (int f = 0; f < kFrames; ++f) {
+  for (int f = 0; f < frames; ++f) {
     off.push_back(denoised(scene, f, radius));
-    for (int p = 0; p < kSize * kSize; ++p)
-      off.back()[size_t(p)] -= scene(f, p % kSize, p / kSize).colour;
+    for (int p = 0; p < picture_size * picture_size; ++p)
+      off.back()[size_t(p)] -= scene(f, p % picture_size, p / picture_size).colour;
   }
   Quality out;
   int pixels = 0, pairs = 0;
-  for (int f = 0; f < kFrames; ++f)
-    for (int y = 8; y < kSize - 8; ++y)
-      for (int x = 8; x < kSize - 8; ++x, ++pixels) {
-        const float here = off[size_t(f)][size_t(y * kSize + x)];
+  for (int f = 0; f < frames; ++f)
+    for (int y = 8; y < picture_size - 8; ++y)
+      for (int x = 8; x < picture_size - 8; ++x, ++pixels) {
+        const float here = off[size_t(f)][size_t(y * picture_size + x)];
         out.error += here * here;
-        if (f + 1 == kFrames) continue;
+        if (f + 1 == frames) continue;
         const V2f motion = scene(f, x, y).motion;
         const int u = x + int(std::lround(motion.x)), v = y + int(std::lround(motion.y));
-        const float change = off[size_t(f) + 1][size_t(v * kSize + u)] - here;
+        const float change = off[size_t(f) + 1][size_t(v * picture_size + u)] - here;
         out.flicker += change * change;
         ++pairs;
       }
@@ -124,34 +127,34 @@ TEST(DenoiseFrames, IsNotMisledByMotionThatIsNotTheSurfaces) {
 /// Samples of water either mirror or refract: what a pixel shows and its guide are off together.
 /// The guides' noise is not taken for detail, and an edge of theirs is not lost for it.
 TEST(DenoiseFrames, IsNotMisledByGuidesWhoseNoiseIsThatOfThePicture) {
-  const auto truth = [](int x) { return x < kSize / 2 ? 0.5f : 0.55f; };
+  const auto truth = [](int x) { return x < picture_size / 2 ? 0.5f : 0.55f; };
   const auto frame = [&](int number) {
     std::mt19937 random{unsigned(number)};
-    std::normal_distribution<float> scatter(0, kNoise);
+    std::normal_distribution<float> scatter(0, noise_level);
     NoisyPicture picture = frame_of([&](int, int x, int) { return Seen{truth(x), 0}; }, number);
-    for (size_t p = 0; p < kSize * kSize; ++p) {
-      const bool left = p % kSize < kSize / 2;
+    for (size_t p = 0; p < picture_size * picture_size; ++p) {
+      const bool left = p % picture_size < picture_size / 2;
       float mean = 0;
       for (auto& half : picture.half) {
         const float off = scatter(random);
-        for (auto& colour : half) colour[p] = truth(left ? 0 : kSize) + off;
+        for (auto& colour : half) colour[p] = truth(left ? 0 : picture_size) + off;
         mean += off / 2;
       }
       picture.feature[0][p] = (left ? 0.f : 1.f) + mean;
-      picture.feature_variance[0][p] = kNoise * kNoise / 2;
+      picture.feature_variance[0][p] = noise_level * noise_level / 2;
     }
     return picture;
   };
   const auto rms = [&](const NoisyPicture::Plane& out) {
     double sum = 0;
-    for (int p = 0; p < kSize * kSize; ++p)
-      sum += std::pow(out[size_t(p)] - truth(p % kSize), 2) / (kSize * kSize);
+    for (int p = 0; p < picture_size * picture_size; ++p)
+      sum += std::pow(out[size_t(p)] - truth(p % picture_size), 2) / (picture_size * picture_size);
     return std::sqrt(sum);
   };
   const double alone = rms(denoise(frame(1))[1]),
                with = rms(denoise(frame(1), {{frame(0)}, {frame(2)}})[1]);
-  EXPECT_LT(alone, 0.18 * kNoise);
-  EXPECT_LT(with, 0.15 * kNoise);
+  EXPECT_LT(alone, 0.18 * noise_level);
+  EXPECT_LT(with, 0.15 * noise_level);
   EXPECT_LT(with, 0.9 * alone);
 }
 
@@ -172,15 +175,16 @@ TEST(DenoiseFrames, LeavesNoGhostOfWhatMovesAway) {
     };
     // Means over the strips that the square leaves and enters, of many pictures.
     double behind = 0, ahead = 0;
-    constexpr int kPictures = 12;
-    for (unsigned seed = 1; seed <= kPictures; ++seed) {
+    constexpr int pictures = 12;
+    for (unsigned seed = 1; seed <= pictures; ++seed) {
       const NoisyPicture::Plane with = denoised(scene, 1, 1, seed),
                                 alone = denoised(scene, 1, 0, seed);
       for (int y = 26; y < 38; ++y)
         for (int k = 0; k < 5; ++k) {
-          const size_t left = size_t(y * kSize + 20 + k), right = size_t(y * kSize + 43 + k);
-          behind += (with[left] - alone[left]) / (60. * kPictures);
-          ahead += (with[right] - alone[right]) / (60. * kPictures);
+          const size_t left = size_t(y * picture_size + 20 + k),
+                       right = size_t(y * picture_size + 43 + k);
+          behind += (with[left] - alone[left]) / (60. * pictures);
+          ahead += (with[right] - alone[right]) / (60. * pictures);
         }
     }
     // A ghost of half its weight would be 0.1.
@@ -192,7 +196,7 @@ TEST(DenoiseFrames, LeavesNoGhostOfWhatMovesAway) {
 TEST(MotionMatch, FollowsMotionAndKnowsWhatIsCovered) {
   const PixelMatch match =
       match_pixels(frame_of(square_before_wall, 1), frame_of(square_before_wall, 0), Side::before);
-  const auto at = [](int x, int y) { return size_t(y * kSize + x); };
+  const auto at = [](int x, int y) { return size_t(y * picture_size + x); };
   EXPECT_EQ(match.pixel[at(30, 30)], int32_t(at(24, 30)));  // the square
   EXPECT_EQ(match.same[at(30, 30)], 1);
   EXPECT_EQ(match.pixel[at(10, 10)], int32_t(at(10, 10)));  // the wall
@@ -211,10 +215,10 @@ TEST(MotionMatch, OfFramesFartherAwayGoesByThoseBetween) {
   const auto picture = [](int frame) { return frame_of(moving_waves, frame); };
   const PixelMatch far = chained(match_pixels(picture(5), picture(4), Side::before),
                                  match_pixels(picture(4), picture(3), Side::before));
-  const size_t p = 30 * kSize + 30;
-  EXPECT_EQ(far.pixel[p], int32_t((30 + 2) * kSize + 30 - 6));
+  const size_t p = 30 * picture_size + 30;
+  EXPECT_EQ(far.pixel[p], int32_t((30 + 2) * picture_size + 30 - 6));
   EXPECT_EQ(far.same[p], 1);
-  EXPECT_EQ(far.same[30 * kSize + 4], 0);  // came in from the left in between
+  EXPECT_EQ(far.same[30 * picture_size + 4], 0);  // came in from the left in between
 }
 
 TEST(DenoiseFrames, GivesTheSameBitsForAnyThreads) {
@@ -313,7 +317,7 @@ TEST(NoisyFrame, TellsTheMotionOfThings) {
   ball.shot.camera.position = V3d(0, 0.4, 3);
   ball.shot.camera.target = V3d(0, 0.4, 0);
   const NoisyPicture now = picture_of(read_layers(ball.noisy(1003)));
-  const double pixels = 0.06 * 96 / (2 * std::tan(20 * kPi64 / 180) * (3 - 0.4));  // a frame
+  const double pixels = 0.06 * 96 / (2 * std::tan(20 * pi64 / 180) * (3 - 0.4));  // a frame
   const size_t middle = 48 * 96 + 48, floor = 90 * 96 + 5;
   EXPECT_NEAR(now.motion[0][0][middle], -pixels, 0.02);
   EXPECT_NEAR(now.motion[1][0][middle], pixels, 0.02);
@@ -350,4 +354,4 @@ TEST(NoisyFrame, WithNeighboursErrsLess) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -8,11 +8,11 @@
 #include "render/denoise/denoise.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr int kSize = 64;
-constexpr float kNoise = 0.2f;
+constexpr int picture_size = 64;
+constexpr float noise_level = 0.2f;
 
 /// A picture of truth(x, y) in grey with Gaussian noise of its halves, guided by feature(x, y).
 template <class Truth, class Feature>
@@ -20,17 +20,17 @@ NoisyPicture made(const Truth& truth, const Feature& feature, float noise, unsig
   std::mt19937 random(seed);
   std::normal_distribution<float> scatter(0, 1);
   NoisyPicture picture;
-  picture.width = picture.height = kSize;
+  picture.width = picture.height = picture_size;
   picture.feature.resize(1);
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
       for (int c = 0; c < 3; ++c) {
         for (auto& half : picture.half) half[c].push_back(truth(x, y) + noise * scatter(random));
         picture.variance[c].push_back(noise * noise);
       }
       picture.feature[0].push_back(feature(x, y));
     }
-  picture.feature_variance.assign(1, NoisyPicture::Plane(kSize * kSize, 0.f));
+  picture.feature_variance.assign(1, NoisyPicture::Plane(picture_size * picture_size, 0.f));
   return picture;
 }
 
@@ -38,12 +38,12 @@ NoisyPicture made(const Truth& truth, const Feature& feature, float noise, unsig
 template <class Truth>
 double rms(const std::vector<NoisyPicture::Plane>& out, const Truth& truth) {
   double sum = 0;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const double d = out[1][size_t(y * kSize + x)] - truth(x, y);
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
+      const double d = out[1][size_t(y * picture_size + x)] - truth(x, y);
       sum += d * d;
     }
-  return std::sqrt(sum / (kSize * kSize));
+  return std::sqrt(sum / (picture_size * picture_size));
 }
 
 const auto none = [](int, int) { return 0.f; };
@@ -57,10 +57,10 @@ TEST(Denoise, LeavesWhatHasNoNoise) {
 TEST(Denoise, SmoothsAFlatPictureWithoutBias) {
   const auto truth = [](int, int) { return 1.f; };
   double mean = 0;
-  const auto out = denoise(made(truth, none, kNoise, 2));
-  for (const float v : out[1]) mean += v / (kSize * kSize);
-  EXPECT_LT(rms(out, truth), 0.12 * kNoise);
-  EXPECT_NEAR(mean, 1, 4 * kNoise / std::sqrt(2.) / kSize);
+  const auto out = denoise(made(truth, none, noise_level, 2));
+  for (const float v : out[1]) mean += v / (picture_size * picture_size);
+  EXPECT_LT(rms(out, truth), 0.12 * noise_level);
+  EXPECT_NEAR(mean, 1, 4 * noise_level / std::sqrt(2.) / picture_size);
 }
 
 /// Neither is an edge that a feature shows lost, however little it stands out of the noise, nor a
@@ -70,9 +70,9 @@ TEST(Denoise, KeepsEdgesAndSlopes) {
   const auto feature = [](int x, int y) { return (x / 8 + y / 8) % 2 ? 0.2f : 0.9f; };
   const auto slope = [](int x, int y) { return 0.3f + 0.03f * float(x) + 0.01f * float(y); };
   const auto bold = [](int x, int y) { return (x / 16 + y / 16) % 2 ? 0.f : 4.f; };
-  EXPECT_LT(rms(denoise(made(faint, feature, kNoise, 3)), faint), 0.12 * kNoise);
-  EXPECT_LT(rms(denoise(made(slope, none, kNoise, 4)), slope), 0.2 * kNoise);
-  EXPECT_LT(rms(denoise(made(bold, none, kNoise, 5)), bold), 0.35 * kNoise);
+  EXPECT_LT(rms(denoise(made(faint, feature, noise_level, 3)), faint), 0.12 * noise_level);
+  EXPECT_LT(rms(denoise(made(slope, none, noise_level, 4)), slope), 0.2 * noise_level);
+  EXPECT_LT(rms(denoise(made(bold, none, noise_level, 5)), bold), 0.35 * noise_level);
 }
 
 /// One sample in a pixel found the sun: no white square is left, and nothing else is changed. A
@@ -85,19 +85,20 @@ TEST(Denoise, TakesAwayLoneOutliersOnly) {
       picture.variance[c][p] = lone * lone / 2;
     }
   };
-  NoisyPicture picture = made(truth, none, kNoise, 9);
-  for (const size_t p : {size_t(20 * kSize + 20), size_t(21 * kSize + 22), size_t(50 * kSize + 7)})
+  NoisyPicture picture = made(truth, none, noise_level, 9);
+  for (const size_t p : {size_t(20 * picture_size + 20), size_t(21 * picture_size + 22),
+                         size_t(50 * picture_size + 7)})
     add(picture, p, 4000);
-  EXPECT_LT(rms(denoise(picture), truth), 0.2 * kNoise);
+  EXPECT_LT(rms(denoise(picture), truth), 0.2 * noise_level);
 
   // One of many samples, on a small drop before a clear sky: the drop's guide is no reason for it.
   const auto drop = [](int x, int y) { return x == 20 && y == 20 ? 0.9f : 0.f; };
   NoisyPicture sky = made(truth, drop, 0, 9);
-  add(sky, 20 * kSize + 20, 14);
-  EXPECT_NEAR(denoise(sky)[1][20 * kSize + 20], 1, 0.1);
+  add(sky, 20 * picture_size + 20, 14);
+  EXPECT_NEAR(denoise(sky)[1][20 * picture_size + 20], 1, 0.1);
 
-  NoisyPicture sure = made(truth, none, kNoise, 10);
-  const size_t star = 30 * kSize + 30;
+  NoisyPicture sure = made(truth, none, noise_level, 10);
+  const size_t star = 30 * picture_size + 30;
   for (int c = 0; c < 3; ++c)
     for (auto& half : sure.half) half[c][star] = 100;
   EXPECT_NEAR(denoise(sure)[1][star], 100, 1);
@@ -106,17 +107,17 @@ TEST(Denoise, TakesAwayLoneOutliersOnly) {
 // A glint that few samples found in a part of the pixels around: no blot where their windows meet.
 TEST(Denoise, TakesAwayOutliersThatLieTogether) {
   const auto truth = [](int, int) { return 1.f; };
-  NoisyPicture picture = made(truth, none, kNoise, 11);
+  NoisyPicture picture = made(truth, none, noise_level, 11);
   std::mt19937 random(12);
   for (int y = 20; y < 40; ++y)
     for (int x = 20; x < 40; ++x) {
       if (random() % 10 != 0) continue;
       for (int c = 0; c < 3; ++c) {
-        picture.half[random() % 2][c][size_t(y * kSize + x)] += 400;
-        picture.variance[c][size_t(y * kSize + x)] = 1e5f;
+        picture.half[random() % 2][c][size_t(y * picture_size + x)] += 400;
+        picture.variance[c][size_t(y * picture_size + x)] = 1e5f;
       }
     }
-  EXPECT_LT(rms(denoise(picture), truth), 0.5 * kNoise);
+  EXPECT_LT(rms(denoise(picture), truth), 0.5 * noise_level);
 }
 
 /// A lamp that a drop shows in eight pixels, which each know it badly: it is no white square, and
@@ -125,46 +126,46 @@ TEST(Denoise, TakesAwayOutliersThatLieTogether) {
 TEST(Denoise, KeepsGlintsWhereTheyAre) {
   const auto truth = [](int, int) { return 1.f; };
   const auto brighten = [](NoisyPicture& picture, int x, int y) {
-    const size_t p = size_t(y * kSize + x);
+    const size_t p = size_t(y * picture_size + x);
     for (int c = 0; c < 3; ++c) {
       for (auto& half : picture.half) half[c][p] += 300;
       picture.variance[c][p] = 170 * 170;
     }
   };
-  NoisyPicture glint = made(truth, none, kNoise, 12);
+  NoisyPicture glint = made(truth, none, noise_level, 12);
   NoisyPicture luck = glint;
   for (int x = 30; x < 34; ++x)
     for (int y = 40; y < 42; ++y) brighten(glint, x, y);
   const auto lit = [](int x, int y) {
     return x >= 30 && x < 34 && y >= 40 && y < 42 ? 301.f : 1.f;
   };
-  EXPECT_LT(rms(denoise(glint), lit), 0.2 * kNoise);
+  EXPECT_LT(rms(denoise(glint), lit), 0.2 * noise_level);
   brighten(luck, 30, 40);
-  EXPECT_LT(rms(denoise(luck), truth), 0.2 * kNoise);
+  EXPECT_LT(rms(denoise(luck), truth), 0.2 * noise_level);
 }
 
 /// A moving drop's glint, of which single samples lie loosely together, has no dark rim and no
 /// square around it, and keeps some of its light.
 TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
-  NoisyPicture picture = made([](int, int) { return 1.f; }, none, kNoise, 14);
+  NoisyPicture picture = made([](int, int) { return 1.f; }, none, noise_level, 14);
   std::mt19937 random(15);
   const auto within = [](int x, int y, int reach) {
     return std::abs(x - 30) <= 5 + reach && std::abs(y - 40) <= 4 + reach;
   };
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
       if (!within(x, y, 0) || random() % 5 > 1) continue;
       const size_t half = random() % 2;
       for (size_t c = 0; c < 3; ++c) {
-        picture.half[half][c][size_t(y * kSize + x)] += 150;
-        picture.variance[c][size_t(y * kSize + x)] = 75 * 75;
+        picture.half[half][c][size_t(y * picture_size + x)] += 150;
+        picture.variance[c][size_t(y * picture_size + x)] = 75 * 75;
       }
     }
   const auto out = denoise(picture);
   double light = 0;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const float value = out[1][size_t(y * kSize + x)];
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
+      const float value = out[1][size_t(y * picture_size + x)];
       EXPECT_GT(value, 0.8f) << x << ' ' << y;
       EXPECT_TRUE(value < 1.2f || within(x, y, 1)) << x << ' ' << y;
       light += value - 1;
@@ -175,30 +176,30 @@ TEST(Denoise, KeepsLooseGlintsWhereTheyAre) {
 /// The sun in a moving drop is a line of pixels that have a sample of it each, or two. What single
 /// samples found beside it may stay; as bright ones elsewhere go.
 template <class Width>
-void expect_whole_streak(const Width& width, double share) {
-  NoisyPicture picture = made([](int, int) { return 1.f; }, none, kNoise, 16);
+void expect_whole_streak(const Width& width, double fraction) {
+  NoisyPicture picture = made([](int, int) { return 1.f; }, none, noise_level, 16);
   std::mt19937 random(17);
   const auto within = [&](int x, int y, int reach) {
     const int across = x - 20 - y / 6;
     return y >= 10 - reach && y < 50 + reach && across >= -reach && across < width(y) + reach;
   };
   double found = 0;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x) {
       if (random() % 100 >= (within(x, y, 0) ? 80 : 1)) continue;
       for (size_t c = 0; c < 3; ++c) {
-        picture.half[random() % 2][c][size_t(y * kSize + x)] += 150;
-        picture.variance[c][size_t(y * kSize + x)] = 75 * 75;
+        picture.half[random() % 2][c][size_t(y * picture_size + x)] += 150;
+        picture.variance[c][size_t(y * picture_size + x)] = 75 * 75;
       }
       found += within(x, y, 0) ? 75 : 0;
     }
   const auto out = denoise(picture);
   double streak = 0, elsewhere = 0;
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x)
+  for (int y = 0; y < picture_size; ++y)
+    for (int x = 0; x < picture_size; ++x)
       if (within(x, y, 1) || !within(x, y, 4))
-        (within(x, y, 1) ? streak : elsewhere) += out[1][size_t(y * kSize + x)] - 1;
-  EXPECT_GT(streak, share * found);
+        (within(x, y, 1) ? streak : elsewhere) += out[1][size_t(y * picture_size + x)] - 1;
+  EXPECT_GT(streak, fraction * found);
   EXPECT_LT(elsewhere, 0.05 * found);
 }
 
@@ -215,13 +216,13 @@ TEST(Denoise, KeepsThinEndsOfStreaks) {
 TEST(Denoise, FillsGlintsThatFewSamplesFound) {
   const auto within = [](int x, int y) { return x >= 20 && x < 28 && y >= 30 && y < 35; };
   for (const int samples : {64, 256}) {
-    NoisyPicture picture = made([](int, int) { return 1.f; }, none, kNoise, 18);
+    NoisyPicture picture = made([](int, int) { return 1.f; }, none, noise_level, 18);
     std::mt19937 random(19);
     double light = 0, rendered = 0, denoised = 0, kept = 0;
     const float lamp = 40 * 100;  // 100 in the mean
     for (int y = 30; y < 35; ++y)
       for (int x = 20; x < 28; ++x) {
-        const size_t p = size_t(y * kSize + x);
+        const size_t p = size_t(y * picture_size + x);
         double mean = 0;
         for (auto& half : picture.half) {
           const int found = std::binomial_distribution<int>(samples / 2, 1. / 40)(random);
@@ -234,9 +235,9 @@ TEST(Denoise, FillsGlintsThatFewSamplesFound) {
         rendered += (mean - 100) * (mean - 100);
       }
     const auto out = denoise(picture);
-    for (int y = 0; y < kSize; ++y)
-      for (int x = 0; x < kSize; ++x) {
-        const double found = double(out[1][size_t(y * kSize + x)]) - 1;
+    for (int y = 0; y < picture_size; ++y)
+      for (int x = 0; x < picture_size; ++x) {
+        const double found = double(out[1][size_t(y * picture_size + x)]) - 1;
         denoised += std::pow(found - (within(x, y) ? 100 : 0), 2);
         kept += found;
       }
@@ -264,16 +265,16 @@ TEST(Denoise, TrustsNoisyFeaturesLess) {
   std::mt19937 random(6);
   std::normal_distribution<float> scatter(0, 0.3f);
   NoisyPicture picture = made(
-      truth, [&](int, int) { return scatter(random); }, kNoise, 7);
+      truth, [&](int, int) { return scatter(random); }, noise_level, 7);
   const double trusting = rms(denoise(picture), truth);
-  picture.feature_variance[0].assign(kSize * kSize, 0.09f);
+  picture.feature_variance[0].assign(picture_size * picture_size, 0.09f);
   const double wary = rms(denoise(picture), truth);
   EXPECT_LT(wary, trusting);
-  EXPECT_LT(wary, 0.15 * kNoise);
+  EXPECT_LT(wary, 0.15 * noise_level);
 }
 
 TEST(Denoise, GivesTheSameBitsForAnyThreads) {
-  const NoisyPicture picture = made([](int x, int) { return float(x); }, none, kNoise, 8);
+  const NoisyPicture picture = made([](int x, int) { return float(x); }, none, noise_level, 8);
   std::vector<NoisyPicture::Plane> expected;
   for (const size_t threads : {1, 2, 16}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
@@ -325,4 +326,4 @@ TEST(DenoisedFrame, OfTooFewSamplesIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 struct Everything {
@@ -110,7 +112,7 @@ TEST(RenderedBits, OfEveryLightAndLensAreTheSameForAnyNumberOfThreads) {
 
 TEST(RenderedBits, DoNotChangeWhenUnusedFeaturesAreSwitchedOn) {
   RenderOptions forced;
-  forced.force_features = kFeatureCount - 1;
+  forced.force_features = Feature::combinations - 1;
   Everything scene;
   const Film with_water = render_frame(scene.shot, 1001, scene.geometry);
   EXPECT_EQ(render_frame(scene.shot, 1001, scene.geometry, forced).rgba, with_water.rgba);
@@ -129,7 +131,7 @@ TEST(RenderedBits, DoNotChangeWithAnIdleFeature) {
   scene.shot.camera.lens_radius = 0.0;
   scene.geometry.cloth.push_back({"empty", {}});
   EXPECT_EQ(Scene(scene.shot, 1001, scene.geometry, {}).features(),
-            unsigned(kDielectric | kSampledLights));
+            unsigned(Feature::dielectric | Feature::sampled_lights));
   EXPECT_EQ(render_frame(scene.shot, 1001, scene.geometry).rgba, plain.rgba);
 }
 
@@ -143,12 +145,12 @@ TEST(RenderedBits, ChangeWithTheSeedAndTheFrame) {
 
 TEST(Progress, RisesToOneAndMayStopTheRender) {
   const Everything scene;
-  std::vector<double> shares;
+  std::vector<double> fractions;
   render_frame(scene.shot, 1001, scene.geometry, nullptr,
-               [&](double share) { shares.push_back(share); });
-  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-  EXPECT_EQ(shares.back(), 1);
-  EXPECT_GT(shares.size(), 4u);
+               [&](double fraction) { fractions.push_back(fraction); });
+  EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+  EXPECT_EQ(fractions.back(), 1);
+  EXPECT_GT(fractions.size(), 4u);
   EXPECT_THROW(render_frame(scene.shot, 1001, scene.geometry, nullptr,
                             [](double) { throw Stopped("enough"); }),
                Stopped);
@@ -164,4 +166,4 @@ TEST(RenderStats, CountWhatWasTraced) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

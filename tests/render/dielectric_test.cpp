@@ -12,11 +12,11 @@
 #include "tests/render/closed_body.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr double kIndex = 1.333;
-const double kOneFace = std::pow((kIndex - 1) / (kIndex + 1), 2);  // 0.020371
+constexpr double water_index = 1.333;
+const double one_face = std::pow((water_index - 1) / (water_index + 1), 2);  // 0.020371
 
 /// A slab of 20 m x d x 20 m whose top lies at y = 0, seen straight from above; the camera hides
 /// nothing. One panel shines from above or from below.
@@ -34,19 +34,18 @@ struct Slab {
 
 // A million rays here, a hundred million in ./bench render_leaks.
 TEST(ClosedBody, LosesNoRay) {
-  constexpr uint32_t kChains = 4096;
+  constexpr uint32_t chains = 4096;
   for (const float far : {0.f, 300.f})
     for (const bool round : {false, true}) {
       Shot shot = plain_shot(1);
-      shot.material = {dielectric("water", kIndex)};
+      shot.material = {dielectric("water", water_index)};
       const V3f center(far, 0.5f * far, -far);
       FrameGeometry geometry;
       geometry.fluid = round ? sphere_mesh(4) : box_mesh({-1, -1, -1}, {1, 1, 1});
       translate(geometry.fluid, center);
       const Scene scene(shot, 1001, geometry, {});
       uint32_t lost = 0;
-      for (uint32_t chain = 0; chain < kChains; ++chain)
-        lost += loses_ray(scene, center, chain, 64);
+      for (uint32_t chain = 0; chain < chains; ++chain) lost += loses_ray(scene, center, chain, 64);
       EXPECT_EQ(lost, 0u) << "far " << far << ", round " << round;
     }
 }
@@ -54,32 +53,32 @@ TEST(ClosedBody, LosesNoRay) {
 TEST(FresnelSlab, ReflectsWhatBothFacesSumTo) {
   // R = R1 + (1 - R1)^2 R1 (1 + R1^2 + ...) = 2 R1 / (1 + R1) = 0.03993.
   for (const auto first : {FirstInterface::one, FirstInterface::both}) {
-    Slab slab(0.5, dielectric("water", kIndex), Facing::down);
+    Slab slab(0.5, dielectric("water", water_index), Facing::down);
     slab.shot.render.samples = 4096;
     RenderOptions options;
     options.first_interface = first;
     const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry, options), 0);
     EXPECT_LT(mean.error, 1e-4);  // 2 R1, without what goes to and fro, is 8e-4 more
-    EXPECT_NEAR(mean.value, 2 * kOneFace / (1 + kOneFace), bound(mean));
+    EXPECT_NEAR(mean.value, 2 * one_face / (1 + one_face), bound(mean));
   }
 }
 
 TEST(FresnelSlab, TransmitsTheRest) {
-  const Slab slab(0.5, dielectric("water", kIndex), Facing::up);
+  const Slab slab(0.5, dielectric("water", water_index), Facing::up);
   const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry), 0);
-  EXPECT_NEAR(mean.value, (1 - kOneFace) / (1 + kOneFace), bound(mean));
+  EXPECT_NEAR(mean.value, (1 - one_face) / (1 + one_face), bound(mean));
 }
 
 TEST(AbsorbingSlab, TransmitsBeerLambertBetweenItsReflections) {
   // T = (1 - R1)^2 e^-sd / (1 - R1^2 e^-2sd)
   const V3f absorption(0.5f, 1, 2);
   const double thickness = 0.7;
-  const Slab slab(thickness, dielectric("water", kIndex, absorption), Facing::up);
+  const Slab slab(thickness, dielectric("water", water_index, absorption), Facing::up);
   const Film film = render_frame(slab.shot, 1001, slab.geometry);
   for (int c = 0; c < 3; ++c) {
     const double once = std::exp(-absorption[c] * thickness);
     const Mean mean = channel_mean(film, c);
-    EXPECT_NEAR(mean.value, std::pow(1 - kOneFace, 2) * once / (1 - std::pow(kOneFace * once, 2)),
+    EXPECT_NEAR(mean.value, std::pow(1 - one_face, 2) * once / (1 - std::pow(one_face * once, 2)),
                 bound(mean));
   }
 }
@@ -105,7 +104,7 @@ TEST(AbsorbingSlab, KeepsThinFilms) {
                                        {300.f, 1e-2},
                                        {300.f, 1e-3},
                                        {300.f, 1e-4}})
-    for (const double index : {1., kIndex}) {
+    for (const double index : {1., water_index}) {
       const double density = 0.5 / thickness, left = 1.3e-7 * (10 + far);  // 1/m, m
       Slab slab(thickness, dielectric("water", index, V3f(float(density))), Facing::up);
       const V3d by(far, 0, -far);
@@ -114,7 +113,7 @@ TEST(AbsorbingSlab, KeepsThinFilms) {
       slab.shot.camera.target.keys[0].second += by;
       slab.shot.light[0].center += by;
       const Mean mean = channel_mean(render_frame(slab.shot, 1001, slab.geometry), 0);
-      const double face = index == 1 ? 0 : kOneFace, once = std::exp(-0.5);
+      const double face = index == 1 ? 0 : one_face, once = std::exp(-0.5);
       const double whole = std::pow(1 - face, 2) * once / (1 - std::pow(face * once, 2));
       EXPECT_GT(mean.value, whole - bound(mean)) << thickness << " m, " << far << " m away";
       EXPECT_LT(mean.value, whole * std::exp(density * left) + bound(mean))
@@ -130,7 +129,7 @@ TEST(AbsorbingSlab, TintsTheFloorByTheWayLightTook) {
   shot.fluid.spacing = 1e-4;
   Light sun;
   sun.type = LightType::sun;
-  sun.radiance = V3f(kPi64);
+  sun.radiance = V3f(pi64);
   sun.angle_deg = 2;  // wide enough to be met by surface samples: light sampling cannot pass water
   shot.light = {sun};
   shot.render.samples = 16384;
@@ -155,7 +154,7 @@ struct UnderWater {
 
   explicit UnderWater(int samples) : shot(plain_shot(samples, 64)) {
     add_ground(shot, 0, 200);
-    shot.material.push_back(dielectric("water", kIndex));
+    shot.material.push_back(dielectric("water", water_index));
     shot.camera.position = V3d(0, 1, 0);
     shot.camera.target = V3d(0, 2, 0);
     shot.camera.up = V3d(0, 0, -1);
@@ -165,11 +164,11 @@ struct UnderWater {
 
 /// What water reflects of unpolarised light from within, `angle` to the vertical.
 double reflected_within(double angle) {
-  const double s = kIndex * std::sin(angle);
+  const double s = water_index * std::sin(angle);
   if (s >= 1) return 1;
   const double i = std::cos(angle), t = std::sqrt(1 - s * s);
-  return 0.5 * (std::pow((kIndex * i - t) / (kIndex * i + t), 2) +
-                std::pow((i - kIndex * t) / (i + kIndex * t), 2));
+  return 0.5 * (std::pow((water_index * i - t) / (water_index * i + t), 2) +
+                std::pow((i - water_index * t) / (i + water_index * t), 2));
 }
 
 // The picture of the sky, summed, is that of the window's disc: its radius is right to a tenth of a
@@ -178,14 +177,14 @@ TEST(SnellsWindow, IsAsLargeAsRefractionSays) {
   UnderWater scene(64);
   scene.shot.light = {sky(1)};
   const Film film = render_frame(scene.shot, 1001, scene.geometry);
-  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
+  const double pixels_per_tangent = 32 / std::tan(60 * pi64 / 180);
   double shown = 0, expected = 0;
   for (size_t p = 0; p < film.rgba.size(); p += 4) shown += film.rgba[p];
-  constexpr int kFine = 2000;
-  for (int k = 0; k < kFine; ++k) {
-    const double r = 32 * (k + 0.5) / kFine;
+  constexpr int fine = 2000;
+  for (int k = 0; k < fine; ++k) {
+    const double r = 32 * (k + 0.5) / fine;
     expected +=
-        (1 - reflected_within(std::atan(r / pixels_per_tangent))) * 2 * kPi64 * r * 32 / kFine;
+        (1 - reflected_within(std::atan(r / pixels_per_tangent))) * 2 * pi64 * r * 32 / fine;
   }
   EXPECT_NEAR(shown, expected, 0.01 * expected);  // 1 % of a disc of 21 pixels: 0.1
 }
@@ -195,14 +194,14 @@ TEST(SnellsWindow, MirrorsTheFloor) {
   UnderWater scene(64);
   scene.shot.light = {panel({0, 0.5, 0}, 60, 60, 1, Facing::up)};
   const Film film = render_frame(scene.shot, 1001, scene.geometry);
-  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
+  const double pixels_per_tangent = 32 / std::tan(60 * pi64 / 180);
   double within = 0, expected = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
       const double r = std::hypot(x + 0.5 - 32, y + 0.5 - 32);
       const double angle = std::atan(r / pixels_per_tangent);
       const float value = film.rgba[4 * size_t(y * 64 + x)];
-      if (r > pixels_per_tangent * std::tan(std::asin(1 / kIndex)) + 2.2) {
+      if (r > pixels_per_tangent * std::tan(std::asin(1 / water_index)) + 2.2) {
         EXPECT_NEAR(value, 1, 1e-4) << x << ' ' << y;
       }
       if (r < 15) within += value, expected += reflected_within(angle);
@@ -216,8 +215,8 @@ TEST(SnellsWindow, EndsAtTheCriticalAngle) {
   UnderWater scene(4);
   scene.shot.light = {sky(1)};
   const Film film = render_frame(scene.shot, 1001, scene.geometry);
-  const double pixels_per_tangent = 32 / std::tan(60 * kPi64 / 180);
-  const double edge = pixels_per_tangent * std::tan(std::asin(1 / kIndex));
+  const double pixels_per_tangent = 32 / std::tan(60 * pi64 / 180);
+  const double edge = pixels_per_tangent * std::tan(std::asin(1 / water_index));
   int inside = 0, outside = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
@@ -239,12 +238,12 @@ TEST(SnellsWindow, EndsAtTheCriticalAngle) {
 TEST(SnellsWindow, ShowsOneMinusFresnelAtTheZenith) {
   Shot shot = plain_shot(1024, 8);
   add_ground(shot, 0, 200);
-  shot.material.push_back(dielectric("water", kIndex));
+  shot.material.push_back(dielectric("water", water_index));
   shot.light = {sky(1)};
   aim_narrow(shot, {0, 1, 0}, {0, 2, 0});
   const FrameGeometry geometry{box_mesh({-100, -1, -100}, {100, 2, 100}), {}};
   const Mean mean = channel_mean(render_frame(shot, 1001, geometry), 0);
-  EXPECT_NEAR(mean.value, 1 - kOneFace, bound(mean));
+  EXPECT_NEAR(mean.value, 1 - one_face, bound(mean));
 }
 
 TEST(WaterGuide, LeavesTheMeanAsItIs) {
@@ -277,22 +276,22 @@ TEST(WaterGuide, LeavesTheMeanAsItIs) {
 TEST(WaterGuide, HasTheDensityItClaims) {
   // The density integrates to 1 over the directions that reach the surface below the critical
   // angle, less what the cones hold beyond the horizon: none here.
-  KeptParts parts;
+  SceneCache cache;
   const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6)}, Lights::SampleEnvironment::automatic,
-                      parts);
-  const RefractedLightGuide guide(lights, float(kIndex));
+                      cache);
+  const RefractedLightGuide guide(lights, float(water_index));
   const V3f point(0.1f, 0, 0);
   double integral = 0, drawn = 0;
-  constexpr int kSteps = 2000;
+  constexpr int steps = 2000;
   V3d mean(0), mean_drawn(0);
-  for (int i = 0; i < kSteps; ++i)
-    for (int j = 0; j < kSteps; ++j) {
-      const double y = (i + 0.5) / kSteps, phi = 2 * kPi64 * (j + 0.5) / kSteps;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j) {
+      const double y = (i + 0.5) / steps, phi = 2 * pi64 * (j + 0.5) / steps;
       const V3f d(float(std::sqrt(1 - y * y) * std::cos(phi)), float(y),
                   float(std::sqrt(1 - y * y) * std::sin(phi)));
-      const double share = guide.pdf(point, d) * 2 * kPi64 / kSteps / kSteps;
-      integral += share;
-      mean += V3d(d) * share;
+      const double weight = guide.pdf(point, d) * 2 * pi64 / steps / steps;
+      integral += weight;
+      mean += V3d(d) * weight;
     }
   for (uint32_t k = 0; k < 1u << 16; ++k) {
     const Sampler sampler(PixelOrder::separate, 1, 0, 0, 16, k);
@@ -308,28 +307,28 @@ TEST(WaterGuide, HasTheDensityItClaims) {
 
 // What a surface under water draws: a diffuse direction, or one aimed at the lamp.
 TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
-  KeptParts parts;
+  SceneCache cache;
   const Lights lights({panel({0.8, 2, 0.3}, 0.4, 0.4, 6), sky(0.5f)},
-                      Lights::SampleEnvironment::automatic, parts);
-  const RefractedLightGuide guide(lights, float(kIndex));
+                      Lights::SampleEnvironment::automatic, cache);
+  const RefractedLightGuide guide(lights, float(water_index));
   const V3f point(0.1f, 0, 0), up(0, 1, 0);
   const ClothBsdf floor({0, 1, 0}, up, up, V3f(0.5f), V3f(0));
-  const float share = guide.share(point);
-  ASSERT_GT(share, 0.2);
-  ASSERT_LT(share, 0.9);
+  const float probability = guide.probability(point);
+  ASSERT_GT(probability, 0.2);
+  ASSERT_LT(probability, 0.9);
   const auto number = [](std::mt19937& random) {
-    return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random);
+    return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random);
   };
   const ChiSquare fit = chi_square(
       7,
       [&](std::mt19937& random) {
         const float u = number(random), v = number(random), w = number(random);
-        return sample_mixed(floor, guide, share, point, u, {v, w});
+        return sample_mixed(floor, guide, probability, point, u, {v, w});
       },
       [&](const V3f& d) {
         float pdf = 0;
         floor.value(d, pdf);
-        return pdf > 0 ? double(share * guide.pdf(point, d) + (1 - share) * pdf) : 0.;
+        return pdf > 0 ? double(probability * guide.pdf(point, d) + (1 - probability) * pdf) : 0.;
       });
   EXPECT_GT(fit.p_value, 0.01);
   // The guide's density grows without bound at the critical angle.
@@ -338,7 +337,7 @@ TEST(WaterGuide, IsDrawnInAMixtureOfTheDensitiesItSays) {
 
 TEST(WaterMesh, AloneIsTracedWithoutGaps) {
   Shot shot = plain_shot(1);
-  shot.material = {dielectric("water", kIndex), diffuse("cotton", 0.5f)};
+  shot.material = {dielectric("water", water_index), diffuse("cotton", 0.5f)};
   shot.fluid.material = "water";
   const TriangleMesh sheet = sheet_mesh(2, [](float, float) { return 3.f; });
   const Scene scene(shot, 1001, {sphere_mesh(2), {{"cloth", sheet}}}, {});
@@ -354,7 +353,7 @@ TEST(WaterMesh, LosesNoRayThroughItsEdges) {
   // From inside a closed convex mesh every ray meets an inner side; from outside, leaving outwards,
   // none comes back.
   Shot shot = plain_shot(1);
-  shot.material = {dielectric("water", kIndex)};
+  shot.material = {dielectric("water", water_index)};
   TriangleMesh mesh = sphere_mesh(5);
   translate(mesh, {10, 2, -3});  // away from the origin, where rounding is coarser
   const Scene scene(shot, 1001, {mesh, {}}, {});
@@ -392,7 +391,7 @@ TEST(WaterMesh, LosesNoRayThroughItsEdges) {
 /// those are.
 TEST(WaterMesh, LetsRaysGoOnWhereItFliesPast) {
   Shot shot = plain_shot(1);
-  shot.material = {dielectric("water", kIndex)};
+  shot.material = {dielectric("water", water_index)};
   shot.render.motion_blur = true;
   TriangleMesh mesh = sphere_mesh(4);
   mesh.velocity.assign(mesh.position.size(), V3f(100 * 24, 60 * 24, -80 * 24));  // m/s
@@ -424,7 +423,7 @@ TEST(WaterMesh, LetsRaysGoOnWhereItFliesPast) {
 
 TEST(WaterMesh, KnowsWhatLiesInside) {
   Shot shot = plain_shot(1);
-  shot.material = {dielectric("water", kIndex)};
+  shot.material = {dielectric("water", water_index)};
   const Scene scene(shot, 1001, {sphere_mesh(4), {}}, {});
   EXPECT_TRUE(scene.bodies_at({0.1f, 0.2f, -0.3f}, 0) != 0);
   EXPECT_TRUE(scene.bodies_at({0, -0.98f, 0}, 0) != 0);
@@ -433,4 +432,4 @@ TEST(WaterMesh, KnowsWhatLiesInside) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

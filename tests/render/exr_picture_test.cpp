@@ -16,7 +16,7 @@
 #include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 using Imath::Box2i;
@@ -339,4 +339,4 @@ TEST_F(ExrPicture, HeedsTheLimitOfMemory) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

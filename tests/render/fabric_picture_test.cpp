@@ -11,7 +11,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 Material fabric(float reflectance, float transmittance) {
@@ -81,12 +83,12 @@ TEST(WetSheet, HasTheBitsOfADryOneWhereItIsDry) {
   const auto features = [](const Draped& d) {
     return Scene(d.shot, 1001, d.geometry, {}).features();
   };
-  EXPECT_FALSE(features(without) & kGlossy);
-  EXPECT_FALSE(features(with) & kGlossy);
+  EXPECT_FALSE(features(without) & Feature::glossy);
+  EXPECT_FALSE(features(with) & Feature::glossy);
   const Film dry = render_frame(without.shot, 1001, without.geometry);
   EXPECT_EQ(render_frame(with.shot, 1001, with.geometry).rgba, dry.rgba);
   soak_along_x(sheet);
-  EXPECT_TRUE(features(with) & kGlossy);
+  EXPECT_TRUE(features(with) & Feature::glossy);
   EXPECT_NE(render_frame(with.shot, 1001, with.geometry).rgba, dry.rgba);
 }
 
@@ -220,4 +222,4 @@ TEST(FabricBits, AreTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -7,10 +7,10 @@
 
 #include "tests/render/lobes.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr float kWater = 1.333f;
+constexpr float water = 1.333f;
 
 struct Layer {
   double reflected, transmitted;
@@ -30,7 +30,7 @@ Layer layer_of_thin_ones(double s, double k) {
 
 // Of 2^24 thin layers each errs by 2^-48: 1e-6 of rounding is left, and float's of the colours.
 TEST(WetColours, AreThoseOfALayerWhosePowersChange) {
-  const WetFibres fibres(kWater);
+  const WetFibres fibres(water);
   for (const double s : {0.01, 0.3, 2., 6.})
     for (const double k : {0., 1e-6, 0.01, 0.3, 2.}) {
       const Layer dry = layer_of_thin_ones(s, k),
@@ -44,7 +44,7 @@ TEST(WetColours, AreThoseOfALayerWhosePowersChange) {
 
 // Without end, R = 1 + K/S - sqrt((K/S)^2 + 2 K/S); without scattering T falls as e^-K.
 TEST(WetColours, HoldForOpaqueAndForClearSheets) {
-  const WetFibres fibres(kWater);
+  const WetFibres fibres(water);
   for (const double r : {1., 0.8, 0.3, 0.02}) {
     const double x = (1 - r) * (1 - r) / (2 * r) * fibres.absorption / fibres.scattering;
     const SheetColours wet = wet_colours({V3f(float(r)), V3f(0)}, fibres);
@@ -84,7 +84,7 @@ TEST(WetColours, AreTheDryOnesInAirAndClearInOil) {
     EXPECT_NEAR(same.transmittance[c], dry.transmittance[c], 1e-5);
     EXPECT_NEAR(oil.reflectance[c], 0, 1e-5);
   }
-  const SheetColours wet = wet_colours(dry, WetFibres(kWater));
+  const SheetColours wet = wet_colours(dry, WetFibres(water));
   for (int c = 0; c < 3; ++c) {
     EXPECT_LT(wet.reflectance[c], dry.reflectance[c]);
     EXPECT_GT(wet.transmittance[c], dry.transmittance[c]);
@@ -94,7 +94,7 @@ TEST(WetColours, AreTheDryOnesInAirAndClearInOil) {
 
 /// A kind of fabric with the tables it needs.
 struct Kind {
-  float reflectance = 0.5f, transmittance = 0.2f, wetness = 0, film_alpha = 0.09f, eta = kWater;
+  float reflectance = 0.5f, transmittance = 0.2f, wetness = 0, film_alpha = 0.09f, eta = water;
   float sheen = 0, yarn = 0;
   AlbedoTable film = AlbedoTable::dielectric(film_alpha, eta);
 
@@ -115,7 +115,7 @@ struct Kind {
     return point;
   }
   FabricPoint at() const { return at(wetness); }
-  FabricBsdf seen(const V3f& outgoing) const { return {outgoing, kUp, kUp, at()}; }
+  FabricBsdf seen(const V3f& outgoing) const { return {outgoing, straight_up, straight_up, at()}; }
 };
 
 Kind kind(float reflectance, float transmittance, float wetness, float sheen = 0, float yarn = 0) {
@@ -126,7 +126,8 @@ Kind kind(float reflectance, float transmittance, float wetness, float sheen = 0
 }
 
 Scatter sample(const FabricBsdf& bsdf, const Draw& u) {
-  return u.side < bsdf.glint_share() ? bsdf.glints().sample(u.point) : bsdf.soft().sample(u.point);
+  return u.side < bsdf.glint_probability() ? bsdf.glints().sample(u.point)
+                                           : bsdf.soft().sample(u.point);
 }
 
 double density(const FabricBsdf& bsdf, const V3f& d) {
@@ -191,11 +192,11 @@ TEST(Fabric, ReturnsItsAlbedoWhenItIsNot) {
 }
 
 // Light that enters goes to and fro between the sheet and the films on its two sides, of which each
-// sends a share k2 of diffuse light back: added up bounce by bounce. k2 = 1 - (1 - <R>) / n^2.
+// sends a fraction k2 of diffuse light back: added up bounce by bounce. k2 = 1 - (1 - <R>) / n^2.
 TEST(Fabric, SoakedIsASheetBetweenTwoFilms) {
   const Kind soaked = kind(0.55f, 0.2f, 1);
   const SheetColours wet = soaked.at().wet;
-  const double k2 = 1 - (1 - double(soaked.film.mean_reflected())) / (kWater * kWater);
+  const double k2 = 1 - (1 - double(soaked.film.mean_reflected())) / (water * water);
   double front = 1, back = 0, out_front = 0, out_back = 0;
   for (int bounce = 0; bounce < 400; ++bounce) {
     const double r = wet.reflectance.x, t = wet.transmittance.x;
@@ -204,7 +205,7 @@ TEST(Fabric, SoakedIsASheetBetweenTwoFilms) {
     front = k2 * up, back = k2 * down;
   }
   for (const float cos : {1.f, 0.4f}) {
-    const AlbedoTable::Share film = soaked.film.at(cos);
+    const AlbedoTable::Albedo film = soaked.film.at(cos);
     const double reflected = film.reflected / film.total;
     EXPECT_NEAR(soaked.seen(leaving(cos)).albedo().x,
                 reflected + (1 - reflected) * (out_front + out_back), 1e-5);
@@ -315,12 +316,12 @@ TEST(Fabric, MakesOfPhotonsWhatItMakesOfLight) {
 /// The integral of f over the upper hemisphere, in 600 x 600 cells.
 template <class F>
 double over_hemisphere(const F& f) {
-  constexpr int kSteps = 600;
+  constexpr int steps = 600;
   double sum = 0;
-  for (int i = 0; i < kSteps; ++i)
-    for (int j = 0; j < kSteps; ++j)
-      sum += double(f(towards(float((i + 0.5) / kSteps), float(2 * kPi64 * (j + 0.5) / kSteps))));
-  return sum * 2 * kPi64 / kSteps / kSteps;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j)
+      sum += double(f(towards(float((i + 0.5) / steps), float(2 * pi64 * (j + 0.5) / steps))));
+  return sum * 2 * pi64 / steps / steps;
 }
 
 TEST(Sheen, ReturnsWhatItsTableSaysAndShinesAlongTheSurface) {
@@ -368,7 +369,7 @@ TEST(Yarn, IsTheIsotropicSurfaceWhenItsFibresWanderThatMuch) {
     o = normalized(o), i = normalized(i);
     float pdf = 0;
     const float value = YarnFacets{1}.value(o, i, pdf);
-    const GgxReflection::Facet facet = GgxReflection(o, kUp, kUp, 1).value(i);
+    const GgxReflection::Facet facet = GgxReflection(o, straight_up, straight_up, 1).value(i);
     EXPECT_NEAR(value, facet.value, 1e-4f * facet.value);
     EXPECT_NEAR(pdf, facet.pdf, 1e-4f * facet.pdf);
   }
@@ -398,13 +399,13 @@ TEST(Fabric, HasItsYarnsOnBothFaces) {
   }
   // The halfway normal leans along the sheared weft, across the warp: the warp alone shines.
   FabricPoint point = fabric.at();
-  const V3f o = towards(0.8f, float(kPi64 / 2)), i = towards(0.3f, float(kPi64 / 2));
+  const V3f o = towards(0.8f, float(pi64 / 2)), i = towards(0.3f, float(pi64 / 2));
   float pdf = 0;
-  const double both = FabricBsdf(o, kUp, kUp, point).glints().value(i, pdf).x;
+  const double both = FabricBsdf(o, straight_up, straight_up, point).glints().value(i, pdf).x;
   point.along_u = point.along_v;
-  const double weft = FabricBsdf(o, kUp, kUp, point).glints().value(i, pdf).x;
+  const double weft = FabricBsdf(o, straight_up, straight_up, point).glints().value(i, pdf).x;
   EXPECT_GT(both, 2 * weft);
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

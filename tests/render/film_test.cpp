@@ -14,12 +14,15 @@
 #include <random>
 
 #include "render/color/color.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "render/texture/texture.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
+using drench::test::TemporaryFolder;
 namespace {
 
 namespace fs = std::filesystem;
@@ -225,4 +228,4 @@ TEST(ViewTransform, WhitensBrightColours) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

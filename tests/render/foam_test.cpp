@@ -6,7 +6,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 FoamFrame spheres(const std::vector<V3f>& centers, float radius) {
@@ -41,8 +41,8 @@ FrameGeometry with_foam(FoamFrame foam) {
 // 2 tan(20 deg) wide.
 double coverage(double radius, double distance) {
   const double sine = radius / distance, tan2 = sine * sine / (1 - sine * sine);
-  const double half = std::tan(20 * kPi64 / 180);
-  return kPi64 * tan2 / (4 * half * half);
+  const double half = std::tan(20 * pi64 / 180);
+  return pi64 * tan2 / (4 * half * half);
 }
 
 TEST(FoamPicture, OfOneSphereCoversItsDisc) {
@@ -95,7 +95,7 @@ TEST(FoamPicture, IsBlurredByItsVelocity) {
   // third of that in the mean, and the distance grows as much.
   EXPECT_NEAR(channel_mean(film, 3).value, coverage(0.05, 2), 0.015 * coverage(0.05, 2));
   const auto alpha = [&](double x) {
-    const double half = 2 * std::tan(20 * kPi64 / 180);
+    const double half = 2 * std::tan(20 * pi64 / 180);
     const int column = int((x / half + 1) * 32), row = 32;
     return film.rgba[4 * size_t(row * 64 + column) + 3];
   };
@@ -158,4 +158,4 @@ TEST(FoamPicture, RefusesWhatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -9,7 +9,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 struct Stopped {};
@@ -43,20 +45,20 @@ struct Frame {
     without.checkpoint = {};
     return render_frame(shot, 1001, geometry, without);
   }
-  /// Renders until that share of the samples is there.
-  void stop_at(double share) {
+  /// Renders until that fraction of the samples is there.
+  void stop_at(double fraction) {
     EXPECT_THROW(render_frame(shot, 1001, geometry, options, nullptr,
                               [&](double done) {
-                                if (done >= share) throw Stopped{};
+                                if (done >= fraction) throw Stopped{};
                               }),
                  Stopped);
     EXPECT_TRUE(std::filesystem::is_regular_file(file()));
   }
   /// Samples that the frame needed in this call.
-  Film go_on(double& first_share) {
-    first_share = -1;
-    return render_frame(shot, 1001, geometry, options, &stats, [&](double share) {
-      if (first_share < 0) first_share = share;
+  Film go_on(double& first_fraction) {
+    first_fraction = -1;
+    return render_frame(shot, 1001, geometry, options, &stats, [&](double fraction) {
+      if (first_fraction < 0) first_fraction = fraction;
     });
   }
 };
@@ -72,7 +74,8 @@ TEST(FrameCheckpoint, GoesOnToTheSameBits) {
   Frame frame;
   const Film whole = frame.whole();
   double first = 0;
-  for (const double share : {0.05, 0.4, 0.7}) frame.stop_at(share);  // each goes on from the last
+  for (const double fraction : {0.05, 0.4, 0.7})
+    frame.stop_at(fraction);  // each goes on from the last
   expect_equal(frame.go_on(first), whole);
   EXPECT_GE(first, 0.6);
 }
@@ -124,4 +127,4 @@ TEST(FrameCheckpoint, OfOtherInputsOrDamagedCountsForNothing) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -4,7 +4,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 Shot furnace(int samples) {
@@ -80,4 +80,4 @@ TEST(Furnace, HidesClearDielectricSphereWithBothBranchesFollowed) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -10,7 +10,7 @@
 #include "render/scene/scene.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 Material gauze(float reflectance, float transmittance, double gap) {
@@ -75,9 +75,9 @@ TEST(Gap, LetsLightOntoTheGround) {
       options.estimator = estimator;
       const Mean open = channel_mean(render_frame(shot, 1001, {}, options), 0);
       const Mean mean = channel_mean(render_frame(shot, 1001, layers(count), options), 0);
-      const double share = std::pow(0.3, count), expected = open.value * share;
+      const double fraction = std::pow(0.3, count), expected = open.value * fraction;
       EXPECT_LT(mean.error, 0.03 * expected);
-      EXPECT_NEAR(mean.value, expected, bound(mean) + share * bound(open))
+      EXPECT_NEAR(mean.value, expected, bound(mean) + fraction * bound(open))
           << count << ' ' << int(estimator);
     }
 }
@@ -95,7 +95,7 @@ TEST(Gap, AddsUpInAFurnace) {
   EXPECT_NEAR(white.value, 1, bound(white));
 }
 
-// Layers show yarns and what is behind them in the same shares: albedo of 0.7 before one of 0.5.
+// Layers show yarns and what is behind them in the same fractions: albedo of 0.7 before one of 0.5.
 TEST(Gap, IsInTheLayers) {
   Shot shot = shot_with(gauze(0.5f, 0.2f, 0.4), 1024);
   add_ground(shot, 0.5f);
@@ -107,7 +107,7 @@ TEST(Gap, IsInTheLayers) {
   double mean = 0;
   const std::vector<float>& albedo = film.layer[0].value;
   for (const float value : albedo) mean += double(value) / double(albedo.size());
-  // 64 pixels of 1024 samples: a share of 0.4 errs by 0.002.
+  // 64 pixels of 1024 samples: a fraction of 0.4 errs by 0.002.
   EXPECT_NEAR(mean, 0.6 * 0.7 + 0.4 * 0.5, 4 * 0.2 * 0.002 + 1e-4);
 }
 
@@ -196,7 +196,7 @@ TEST(GapInWater, ReflectsTotally) {
   // Not at an edge of the mesh.
   const V3d at(0.3, 0, 0.2);
   const auto from = [&](double degrees) {
-    return at + V3d(0.3 * std::tan(degrees * kPi64 / 180), 0.3, 0);
+    return at + V3d(0.3 * std::tan(degrees * pi64 / 180), 0.3, 0);
   };
   aim_narrow(pool.shot, from(60), at);
   pool.shot.light = {panel({0, -2, 0}, 8, 8, 1, Facing::up)};
@@ -301,4 +301,4 @@ TEST(GapBits, AreOthersOnlyWhereSomethingHasGaps) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

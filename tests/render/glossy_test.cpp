@@ -10,7 +10,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 Material rough_glass(const std::string& name, double roughness, double ior = 1.5) {
@@ -187,23 +189,23 @@ TEST(GlossyLight, IsTheSameByAllEstimatorsWithALampInside) {
 TEST(GlossyLight, OfASquareIsTheIntegralOverIt) {
   const double alpha = 0.4;
   double expected = 0, white = 0;
-  constexpr int kSteps = 800;
+  constexpr int steps = 800;
   const auto lobe = [&](double tan2) {  // D G / (4 cos cos) cos of a half vector for cos(o) = 1
     const double cos = 1 / std::sqrt(1 + tan2), half2 = (1 - cos) / (1 + cos);  // tan^2(t/2)
     const double h2 = 1 / (1 + half2),
-                 d = alpha * alpha / (kPi64 * h2 * h2) / std::pow(alpha * alpha + half2, 2);
+                 d = alpha * alpha / (pi64 * h2 * h2) / std::pow(alpha * alpha + half2, 2);
     const double lambda = (std::sqrt(1 + alpha * alpha * tan2) - 1) / 2;
     return d / (1 + lambda) / 4;
   };
-  for (int i = 0; i < kSteps; ++i)
-    for (int j = 0; j < kSteps; ++j) {
-      const double x = -1 + 2 * (i + 0.5) / kSteps, z = -1 + 2 * (j + 0.5) / kSteps;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j) {
+      const double x = -1 + 2 * (i + 0.5) / steps, z = -1 + 2 * (j + 0.5) / steps;
       const double r2 = 1 + x * x + z * z;  // the lamp is 1 m above
-      expected += lobe(x * x + z * z) / (r2 * std::sqrt(r2)) * 4 / kSteps / kSteps;
+      expected += lobe(x * x + z * z) / (r2 * std::sqrt(r2)) * 4 / steps / steps;
     }
   for (int k = 0; k < 100000; ++k) {
     const double cos = (k + 0.5) / 100000;
-    white += lobe(1 / (cos * cos) - 1) * 2 * kPi64 / 100000;
+    white += lobe(1 / (cos * cos) - 1) * 2 * pi64 / 100000;
   }
   Shot shot = plain_shot(256);
   shot.material = {metal("ground", 1, std::sqrt(alpha))};
@@ -295,17 +297,17 @@ TEST(GlossyBits, AreOthersOnlyWhereSomethingIsGlossy) {
   Stage stage;
   stage.stand(dielectric("thing", 1.5), ball({0, 0.4f, 0}, 0.4f));
   const auto features = [&] { return Scene(stage.shot, 1001, stage.geometry, {}).features(); };
-  EXPECT_FALSE(features() & kGlossy);
+  EXPECT_FALSE(features() & Feature::glossy);
   const Film smooth = render_frame(stage.shot, 1001, stage.geometry);
   stage.shot.material.back().roughness = 0.009;
-  EXPECT_FALSE(features() & kGlossy);
+  EXPECT_FALSE(features() & Feature::glossy);
   EXPECT_EQ(render_frame(stage.shot, 1001, stage.geometry).rgba, smooth.rgba);
   stage.shot.material.back().roughness = 0.1;
-  EXPECT_TRUE(features() & kGlossy);
+  EXPECT_TRUE(features() & Feature::glossy);
   EXPECT_NE(render_frame(stage.shot, 1001, stage.geometry).rgba, smooth.rgba);
   for (const MaterialType type : {MaterialType::metal, MaterialType::coated}) {
     stage.shot.material.back().type = type;
-    EXPECT_TRUE(features() & kGlossy);
+    EXPECT_TRUE(features() & Feature::glossy);
   }
 }
 
@@ -413,4 +415,4 @@ TEST(NormalMap, SendsNothingThroughTheSurface) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

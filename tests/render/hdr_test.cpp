@@ -3,7 +3,7 @@
 #include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 class Hdr : public PictureTest {};
@@ -172,4 +172,4 @@ TEST_F(Hdr, IsTheSkyOfALight) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

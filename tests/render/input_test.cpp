@@ -6,7 +6,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 Shot small_shot() {
@@ -138,4 +138,4 @@ TEST(BadInput, ImpossibleSettingsAreRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

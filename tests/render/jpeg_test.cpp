@@ -18,7 +18,7 @@
 #include "pipeline/contract/error.h"
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 using Imath::V3d;
@@ -322,7 +322,7 @@ std::string with_segment(const std::string& jpeg, char marker, const std::string
 
 TEST_F(JpegTexture, ProfilesAreHonouredForColoursAlone) {
   const std::string whole = encode(16, 16, 3, std::vector<uint8_t>(16 * 16 * 3, 90), 90).bytes;
-  const std::string linear = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+  const std::string linear = IccOfTest(srgb_colorants, IccOfTest::gamma(1)).bytes();
   const std::string marked =
       with_segment(whole, '\xe2', std::string("ICC_PROFILE\0\1\1", 14) + linear);
   EXPECT_NEAR(read(whole).texel(0).x, linear_of_srgb(90 / 255.), 0.01);
@@ -340,4 +340,4 @@ TEST_F(JpegTexture, TurnedPicturesOfCamerasAreNamed) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

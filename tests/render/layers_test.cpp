@@ -19,7 +19,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 const FilmLayer& layer_of(const Film& film, const std::string& name) {
@@ -132,7 +134,7 @@ TEST(Layers, TellWhereAndWhatIsSeen) {
   const Film film = render_frame(shot, 1001, {});
   const V3d forward = (V3d(0, 0, 0) - V3d(0, 1, 4)).normalized();
   const V3d right(1, 0, 0), up = right % forward;
-  const double scale = 2 * std::tan(shot.camera.fov_deg.at(0) * kPi64 / 360) / 32;
+  const double scale = 2 * std::tan(shot.camera.fov_deg.at(0) * pi64 / 360) / 32;
   int seen = 0, missed = 0;
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x) {
@@ -198,7 +200,7 @@ TEST(Motion, IsThatOfThingsAndOfTheCamera) {
   ObstacleFrame moving{"box", box_mesh({-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.f})};
   for (V3f& v : moving.mesh.velocity) v = V3f(2.4f, -1.2f, 0);  // 0.1 and -0.05 m a frame
   geometry.obstacle = {moving};
-  const double pixels_per_m = 32 / (2 * std::tan(20 * kPi64 / 180) * 4);
+  const double pixels_per_m = 32 / (2 * std::tan(20 * pi64 / 180) * 4);
   const auto expect = [&](double x, double y, const std::string& what) {
     for (const bool blur : {false, true}) {
       shot.render.motion_blur = blur;
@@ -244,7 +246,7 @@ TEST(Motion, OfLateRowsStartsAtTheFrame) {
   geometry.obstacle = {moving};
   const Film film = render_frame(shot, 1001, geometry);
   // Its face is 4 m away at the frame and 3 m at the next.
-  const double growth = 32 / (2 * std::tan(20 * kPi64 / 180)) * (1. / 3 - 1. / 4);
+  const double growth = 32 / (2 * std::tan(20 * pi64 / 180)) * (1. / 3 - 1. / 4);
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x)
       for (size_t c = 0; c < 2; ++c)
@@ -282,18 +284,18 @@ TEST(Cryptomatte, CoversTheAreaOfThings) {
   double area = 0;
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x) {
-      const float share = at(film, "CryptoObject00", x, y, 1);
-      if (share > 0) {
+      const float fraction = at(film, "CryptoObject00", x, y, 1);
+      if (fraction > 0) {
         EXPECT_EQ(at(film, "CryptoObject00", x, y, 0), cryptomatte_id("ball"));
         EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 0), cryptomatte_id("steel"));
       }
-      EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 1), share);
+      EXPECT_EQ(at(film, "CryptoMaterial00", x, y, 1), fraction);
       EXPECT_EQ(at(film, "samples", x, y, 0), 64);
-      area += share;
+      area += fraction;
     }
   // The silhouette of a sphere of radius 1 seen from 40: tan(asin(1 / 40)).
-  const double radius = std::tan(std::asin(1. / 40)) * 32 / (2 * std::tan(2 * kPi64 / 180));
-  EXPECT_NEAR(area, kPi64 * radius * radius, 0.003 * area);
+  const double radius = std::tan(std::asin(1. / 40)) * 32 / (2 * std::tan(2 * pi64 / 180));
+  EXPECT_NEAR(area, pi64 * radius * radius, 0.003 * area);
 }
 
 TEST(Cryptomatte, RanksByShare) {
@@ -308,10 +310,10 @@ TEST(Cryptomatte, RanksByShare) {
 TEST(Variance, IsThatOfPicturesWithOtherSeeds) {
   Shot shot = pool_shot(64);
   shot.layers.variance = true;
-  constexpr int kSeeds = 48;
+  constexpr int seeds = 48;
   double told = 0;
   std::vector<double> sum(256), square(256);
-  for (int seed = 1; seed <= kSeeds; ++seed) {
+  for (int seed = 1; seed <= seeds; ++seed) {
     shot.render.seed = uint32_t(seed);
     shot.render.photons = 0;
     const Film film = render_frame(shot, 1001, pool_geometry());
@@ -319,11 +321,11 @@ TEST(Variance, IsThatOfPicturesWithOtherSeeds) {
       const double v = std::min(film.rgba[4 * p + 1], 2.f);
       sum[p] += v;
       square[p] += v * v;
-      told += layer_of(film, "variance").value[3 * p + 1] / kSeeds;
+      told += layer_of(film, "variance").value[3 * p + 1] / seeds;
     }
   }
   double real = 0;
-  for (size_t p = 0; p < 256; ++p) real += (square[p] - sum[p] * sum[p] / kSeeds) / (kSeeds - 1);
+  for (size_t p = 0; p < 256; ++p) real += (square[p] - sum[p] * sum[p] / seeds) / (seeds - 1);
   // Smaller nets know less of stratification: it may tell too much, hardly too little.
   EXPECT_GT(told, 0.8 * real);
   EXPECT_LT(told, 3 * real);
@@ -384,4 +386,4 @@ TEST(LayerFile, RefusesChannelsOfOneName) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

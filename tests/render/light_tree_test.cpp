@@ -11,10 +11,10 @@
 #include "tests/render/chi_square.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr int kMany = 60;
+constexpr int many = 60;
 
 /// Lamps of every shape about a point, turned all ways, large and small, far and near each other.
 std::vector<Light> many_lamps(uint32_t seed, const V3d& about, double spread, double size) {
@@ -22,7 +22,7 @@ std::vector<Light> many_lamps(uint32_t seed, const V3d& about, double spread, do
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> unit(0.1, 1);
   const auto vector = [&] { return V3d(normal(random), normal(random), normal(random)); };
-  std::vector<Light> lamps(kMany);
+  std::vector<Light> lamps(many);
   for (size_t k = 0; k < lamps.size(); ++k) {
     Light& lamp = lamps[k];
     lamp.name = "lamp" + std::to_string(k);
@@ -42,15 +42,15 @@ std::vector<Light> many_lamps(uint32_t seed, const V3d& about, double spread, do
 
 /// Every third a shining body, the others lamps.
 struct Crowd {
-  KeptParts parts;
+  SceneCache cache;
   std::vector<TriangleMesh> ball;
   Lights lights;
 
   explicit Crowd(uint32_t seed)
-      : lights(many_lamps(seed, {0, 0, 0}, 2, 0.2), Lights::SampleEnvironment::never, parts) {
+      : lights(many_lamps(seed, {0, 0, 0}, 2, 0.2), Lights::SampleEnvironment::never, cache) {
     std::mt19937 random(seed + 1);
     std::normal_distribution<float> normal;
-    for (int k = 0; k < kMany / 2; ++k) {
+    for (int k = 0; k < many / 2; ++k) {
       ball.push_back(sphere_mesh(2));
       for (V3f& p : ball.back().position) p = p * 0.1f + V3f(normal(random), 0, normal(random));
     }
@@ -72,13 +72,13 @@ struct Crowd {
 };
 
 /// Points among the lamps, far from all, and beside them.
-constexpr int kSpreadPoints = 160;
+constexpr int spread_points = 160;
 std::vector<V3f> points(const Lights& lights) {
   std::mt19937 random(7);
   std::normal_distribution<float> normal;
   std::vector<V3f> out;
   for (const float spread : {0.3f, 2.f, 6.f, 200.f})
-    for (int k = 0; k < kSpreadPoints / 4; ++k)
+    for (int k = 0; k < spread_points / 4; ++k)
       out.push_back(V3f(normal(random), normal(random), normal(random)) * spread);
   for (const ShapeLight& lamp : lights.shapes())
     for (const float off : {1e-4f, 0.01f, 0.3f}) out.push_back(lamp.center + lamp.normal * off);
@@ -105,9 +105,9 @@ TEST(LightTree, DrawsWithTheProbabilitiesThatItStates) {
       }
       // What lies in clusters of which nothing shines here is lost to the draw.
       EXPECT_LE(total, double(cut.total) * (1 + 1e-5));
-      constexpr int kDraws = 2000;
+      constexpr int draws = 2000;
       double lost = 0;
-      for (int k = 0; k < kDraws; ++k) {
+      for (int k = 0; k < draws; ++k) {
         const auto [light, part] = tree.choose(cut, from, unit(random) * cut.total, importance);
         if (!(part > 0)) {
           ++lost;
@@ -126,8 +126,8 @@ TEST(LightTree, DrawsWithTheProbabilitiesThatItStates) {
         chi2 += (got - want) * (got - want) / want;
         ++cells;
       };
-      for (size_t k = 0; k < count; ++k) add(expected[k] / double(cut.total) * kDraws, seen[k]);
-      add(std::max(0., 1 - total / double(cut.total)) * kDraws, lost);
+      for (size_t k = 0; k < count; ++k) add(expected[k] / double(cut.total) * draws, seen[k]);
+      add(std::max(0., 1 - total / double(cut.total)) * draws, lost);
       if (few_expected > 10) add(few_expected, few_seen);
       if (cells > 1) {
         EXPECT_GT(chi_square_tail(chi2, cells - 1), 1e-6) << from;
@@ -142,7 +142,7 @@ TEST(LightTree, DrawsNearlyByWhatEachLightGives) {
   const Crowd crowd(2);
   double worst = 0, sum = 0;
   std::vector<V3f> at = points(crowd.lights);
-  at.resize(kSpreadPoints);  // beside a lamp its cluster gives more than it is taken for
+  at.resize(spread_points);  // beside a lamp its cluster gives more than it is taken for
   for (const V3f& from : at) {
     const auto importance = crowd.importance(from);
     const LightTree::Cut cut = crowd.lights.tree().cut(2, from, importance);
@@ -164,9 +164,9 @@ TEST(LightTree, DrawsNearlyByWhatEachLightGives) {
 
 TEST(LightTree, MeetsWhatALookAtEachLampMeets) {
   for (const double spread : {0.3, 2., 500.}) {
-    KeptParts parts;
+    SceneCache cache;
     Lights lights(many_lamps(5, {1000, -3, 20}, spread, 0.2), Lights::SampleEnvironment::never,
-                  parts);
+                  cache);
     lights.finish();
     ASSERT_FALSE(lights.tree().empty());
     std::mt19937 random(11);
@@ -233,4 +233,4 @@ TEST(LightTree, GivesPhotonsAndWalksThePictureOfPaths) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

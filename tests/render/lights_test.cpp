@@ -5,18 +5,20 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
-constexpr float kReflectance = 0.5f;
+constexpr float reflectance = 0.5f;
 
 /// Radiance that a diffuse ground shows under an irradiance.
-double shown(double irradiance) { return kReflectance * irradiance / kPi64; }
+double shown(double irradiance) { return reflectance * irradiance / pi64; }
 
 /// A shot that sees the ground's origin from the side.
 Shot ground_shot(int samples) {
   Shot shot = plain_shot(samples);
-  add_ground(shot, kReflectance);
+  add_ground(shot, reflectance);
   aim_narrow(shot, {3, 2, 0}, {0, 0, 0});
   return shot;
 }
@@ -25,12 +27,12 @@ TEST(RectangleLight, GivesFormFactorOfParallelUnitSquares) {
   // F between unit squares 1 m apart is 0.19982 (Howell, configuration C-11). Seen from far above
   // the picture is the square's plane to scale, so the picture's sum is the power it sends back.
   Shot shot = plain_shot(64, 32);
-  add_ground(shot, kReflectance, 0.5);
-  aim_narrow(shot, {0, 1000, 0}, {0, 0, 0}, 2 * std::atan(1. / 1000) * 180 / kPi64);
+  add_ground(shot, reflectance, 0.5);
+  aim_narrow(shot, {0, 1000, 0}, {0, 0, 0}, 2 * std::atan(1. / 1000) * 180 / pi64);
   shot.light = {panel({0, 1, 0}, 0.5, 0.5, 3)};
   RenderOptions options;
   const Mean mean = mean_over_seeds(shot, {}, options, 16);
-  const double seen_area = 4, expected = kReflectance * 3 * 0.199825 / seen_area;
+  const double seen_area = 4, expected = reflectance * 3 * 0.199825 / seen_area;
   EXPECT_NEAR(mean.value, expected, 4 * mean.error + 1e-4 * expected);
 }
 
@@ -44,7 +46,7 @@ TEST(SphereLight, GivesIrradianceOfItsSolidAngle) {
   sphere.radiance = V3f(2);
   shot.light = {sphere};
   const Mean mean = channel_mean(render_frame(shot, 1001, {}), 0);
-  EXPECT_NEAR(mean.value, shown(kPi64 * 2 * (0.5 * 0.5) / (1.5 * 1.5)), bound(mean));
+  EXPECT_NEAR(mean.value, shown(pi64 * 2 * (0.5 * 0.5) / (1.5 * 1.5)), bound(mean));
 }
 
 Light disk(const V3d& center, const V3d& direction, double radius, float radiance) {
@@ -62,7 +64,7 @@ TEST(DiskLight, GivesItsIrradianceOnTheAxis) {
   Shot shot = ground_shot(256);
   shot.light = {disk({0, 1.5, 0}, {0, -2, 0}, 0.8, 2)};
   const Mean mean = channel_mean(render_frame(shot, 1001, {}), 0);
-  EXPECT_NEAR(mean.value, shown(kPi64 * 2 * 0.64 / (0.64 + 1.5 * 1.5)), bound(mean));
+  EXPECT_NEAR(mean.value, shown(pi64 * 2 * 0.64 / (0.64 + 1.5 * 1.5)), bound(mean));
   shot.light[0].direction = {0, 1, 0};
   EXPECT_EQ(channel_mean(render_frame(shot, 1001, {}), 0).value, 0);
 }
@@ -89,7 +91,7 @@ TEST(SkyLight, GivesPiTimesItsRadiance) {
     RenderOptions options;
     options.environment = sampling;
     const Mean mean = channel_mean(render_frame(shot, 1001, {}, options), 0);
-    EXPECT_NEAR(mean.value, shown(kPi64 * 0.7), bound(mean));
+    EXPECT_NEAR(mean.value, shown(pi64 * 0.7), bound(mean));
   }
 }
 
@@ -187,4 +189,4 @@ TEST(EnvironmentMap, ShowsRotatedColumnsAndUpwardRows) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

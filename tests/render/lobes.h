@@ -9,13 +9,13 @@
 #include "tests/render/chi_square.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
-inline const V3f kUp(0, 0, 1);
+inline const V3f straight_up(0, 0, 1);
 
 struct Uniform {
   std::mt19937& random;
-  float one() { return std::uniform_real_distribution<float>(0, kOneMinusEpsilon)(random); }
+  float one() { return std::uniform_real_distribution<float>(0, one_minus_epsilon)(random); }
   V2f two() {
     const float x = one();
     return {x, one()};
@@ -41,15 +41,15 @@ inline Draw numbers(Uniform u) {
 /// @param sample  Scatter(Draw)
 template <class Sample>
 double furnace_of(const Sample& sample) {
-  constexpr int kPoints = 1 << 18;
+  constexpr int points = 1 << 18;
   constexpr double root = 1.2207440846057596;
-  const auto part = [](double x) { return std::min(float(x - std::floor(x)), kOneMinusEpsilon); };
+  const auto part = [](double x) { return std::min(float(x - std::floor(x)), one_minus_epsilon); };
   double sum = 0;
-  for (int k = 0; k < kPoints; ++k) {
+  for (int k = 0; k < points; ++k) {
     const double x = k + 0.5;
     const Draw u{{part(x / root), part(x / root / root)}, part(x / root / root / root)};
     const Scatter s = sample(u);
-    if (s.pdf > 0) sum += double(s.weight.x) / kPoints;
+    if (s.pdf > 0) sum += double(s.weight.x) / points;
   }
   return sum;
 }
@@ -81,4 +81,4 @@ int disagreements(const Lobe& lobe, const Scatter& s) {
   return differ(s.pdf, pdf) || differ(s.weight.x * s.pdf, value.x);
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -10,7 +10,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 const FilmLayer& layer_of(const Film& film, const std::string& name) {
@@ -169,7 +169,7 @@ TEST(SeeThroughWater, ShowsThePlateWhereItBendsTheViewALittle) {
     FrameGeometry geometry;
     geometry.fluid = box_mesh({-1, -2, -1}, {1, 0, 1});
     for (V3f& p : geometry.fluid.position)
-      if (p.y == 0) p.y = float(std::tan(angle * kPi64 / 180)) * p.x;
+      if (p.y == 0) p.y = float(std::tan(angle * pi64 / 180)) * p.x;
     geometry.fluid.normal.clear();
     const Mean alpha = channel_mean(render_frame(shot, 1001, geometry), 3);
     if (angle < 30) {
@@ -303,7 +303,7 @@ TEST(ShadowCatcher, AddsTheLightOfObjects) {
   // A square of half size a above a corner of each quarter: F = 4 x (1/2pi)(2 x/sqrt(1+x^2)
   // atan(x/sqrt(1+x^2))) with x = a/h = 0.5.
   const double x = 0.5, root = std::sqrt(1 + x * x);
-  const double form = 4 / (2 * kPi64) * 2 * x / root * std::atan(x / root);
+  const double form = 4 / (2 * pi64) * 2 * x / root * std::atan(x / root);
   for (int c = 0; c < 3; ++c) {
     const Mean beauty = channel_mean(film, c);
     EXPECT_NEAR(beauty.value, 0.4 * form * (3 - c), bound(beauty));
@@ -493,9 +493,9 @@ TEST(ShadowCatcher, IsSeenThroughClearWater) {
   geometry.fluid = box_mesh({0.2f, -1, -1}, {0.4f, 1, 1});  // before it, not over it
   aim_narrow(shot, {1, 0.5, 0}, {-0.5, 0, 0});
   const Film film = render_frame(shot, 1001, geometry);
-  const double way = 0.2 * std::sqrt(1.5 * 1.5 + 0.5 * 0.5) / 1.5;
-  EXPECT_NEAR(channel_mean(film, 3).value, 1 - std::exp(-0.8 * way), 1e-3);
+  const double length = 0.2 * std::sqrt(1.5 * 1.5 + 0.5 * 0.5) / 1.5;
+  EXPECT_NEAR(channel_mean(film, 3).value, 1 - std::exp(-0.8 * length), 1e-3);
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -5,11 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "render/integrator/photons.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/scene.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// A square in y = 0 around the origin that faces down, of two triangles.
@@ -47,7 +47,7 @@ TEST(MeshLight, GivesFormFactorOfParallelUnitSquares) {
   // behind it, the picture is the ground's plane to scale, and its sum the power it sends back.
   Shot shot = plain_shot(64, 32);
   add_ground(shot, 0.5f, 0.5);
-  aim_narrow(shot, {0, 0.99, 0}, {0, 0, 0}, 2 * std::atan(1. / 0.99) * 180 / kPi64);
+  aim_narrow(shot, {0, 0.99, 0}, {0, 0, 0}, 2 * std::atan(1. / 0.99) * 180 / pi64);
   FrameGeometry geometry;
   add_shining(shot, geometry, square(0.5f), 3, {0, 1, 0});
   const Mean mean = mean_over_seeds(shot, geometry, {}, 16);
@@ -87,17 +87,17 @@ TEST(MeshLight, IsDrawnByAreaWhereItIsAtTheTime) {
   std::vector<V3f> close = mesh.position;
   for (V3f& p : close) p = p * 3 + V3f(0, 1, 0);
   const MeshLight light({mesh.triangle, {mesh.position.data(), close.data()}}, V3f(1));
-  constexpr uint32_t kDraws = 1 << 16;
+  constexpr uint32_t draws = 1 << 16;
   for (const float time : {0.f, 0.4f, 1.f}) {
     const double half = 0.5 * (1 + 2 * time), height = 2 + time;
     const V3f from(0, -2, 0);
     double solid_angle = 0;
     std::vector<double> count(64);
-    for (uint32_t k = 0; k < kDraws; ++k) {
+    for (uint32_t k = 0; k < draws; ++k) {
       const Sampler sampler(PixelOrder::separate, 1, 0, 0, 16, k);
       const LightSample s = light.sample(from, time, sampler.two(1));
       ASSERT_GT(s.pdf, 0);
-      solid_angle += 1. / s.pdf / kDraws;
+      solid_angle += 1. / s.pdf / draws;
       const V3f p = from + s.direction * s.distance;
       ASSERT_NEAR(p.y, time, 1e-5);
       const auto cell = [&](float x) { return std::clamp(int((x / half + 1) * 4), 0, 7); };
@@ -109,7 +109,7 @@ TEST(MeshLight, IsDrawnByAreaWhereItIsAtTheTime) {
     }
     const double expected = 4 * std::asin(half * half / (half * half + height * height));
     EXPECT_NEAR(solid_angle, expected, 1e-3 * expected) << time;
-    for (const double n : count) EXPECT_NEAR(n, kDraws / 64., 0.05 * kDraws / 64) << time;
+    for (const double n : count) EXPECT_NEAR(n, draws / 64., 0.05 * draws / 64) << time;
   }
 }
 
@@ -128,7 +128,7 @@ TEST(MeshLight, ThatMovesLightsAsItFlies) {
     irradiance += 400 * 0.04 * 0.04 / std::pow(1 + x * x, 2) / 1000;
   }
   const Mean mean = mean_over_seeds(shot, geometry, {}, 8);
-  EXPECT_NEAR(mean.value, 0.5 * irradiance / kPi64, 4 * mean.error + 1e-3 * mean.value);
+  EXPECT_NEAR(mean.value, 0.5 * irradiance / pi64, 4 * mean.error + 1e-3 * mean.value);
   EXPECT_LT(mean.error, 0.005 * mean.value);
 }
 
@@ -213,4 +213,4 @@ TEST(MeshLight, AboveWaterIsAimedAt) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -7,27 +7,28 @@
 #include "render/bsdf/bsdf_rough.h"
 #include "tests/render/lobes.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 RoughBsdf rough(float cos, float alpha, float eta, const AlbedoTable& albedo) {
-  return {leaving(cos), kUp, kUp, alpha, eta, albedo};
+  return {leaving(cos), straight_up, straight_up, alpha, eta, albedo};
 }
 
 MetalBsdf metal(float cos, float alpha, const MetalFresnel& fresnel, const AlbedoTable& albedo) {
-  return {leaving(cos), kUp, kUp, alpha, fresnel, albedo};
+  return {leaving(cos), straight_up, straight_up, alpha, fresnel, albedo};
 }
 
 CoatedBsdf coated(float cos, float alpha, float eta, float reflectance, const AlbedoTable& coat) {
-  return {leaving(cos), kUp, kUp, alpha, eta, V3f(reflectance), coat};
+  return {leaving(cos), straight_up, straight_up, alpha, eta, V3f(reflectance), coat};
 }
 
-const MetalFresnel kMirror(V3f(1), V3f(1));
+const MetalFresnel mirror(V3f(1), V3f(1));
 
 Scatter sample(const RoughBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point, u.side); }
 Scatter sample(const MetalBsdf& bsdf, const Draw& u) { return bsdf.sample(u.point); }
 Scatter sample(const CoatedBsdf& bsdf, const Draw& u) {
-  return u.side < bsdf.coat_share() ? bsdf.coat().sample(u.point) : bsdf.base().sample(u.point);
+  return u.side < bsdf.coat_probability() ? bsdf.coat().sample(u.point)
+                                          : bsdf.base().sample(u.point);
 }
 
 template <class Bsdf>
@@ -72,7 +73,7 @@ TEST(Metal, ReturnsAllLightInAWhiteFurnace) {
   for (const float alpha : {0.f, 0.01f, 0.05f, 0.2f, 0.5f, 1.f}) {
     const AlbedoTable albedo = AlbedoTable::mirrors(alpha);
     for (const float cos : {1.f, 0.8f, 0.4f, 0.15f, 0.04f, 0.01f}) {
-      const MetalBsdf bsdf = metal(cos, alpha, kMirror, albedo);
+      const MetalBsdf bsdf = metal(cos, alpha, mirror, albedo);
       EXPECT_NEAR(furnace(bsdf), 1, 0.005) << alpha << ' ' << cos;
       EXPECT_NEAR(bsdf.albedo().x, 1, 1e-5);
     }
@@ -136,7 +137,7 @@ TEST(Metal, DrawsWithTheDensityItStates) {
   uint32_t seed = 100;
   for (const float alpha : {0.15f, 0.4f, 1.f})
     for (const float cos : {0.9f, 0.5f, 0.1f}) {
-      const MetalBsdf bsdf = metal(cos, alpha, kMirror, AlbedoTable());
+      const MetalBsdf bsdf = metal(cos, alpha, mirror, AlbedoTable());
       const ChiSquare fit = chi_square(
           ++seed, [&](std::mt19937& random) { return sample(bsdf, numbers({random})); },
           [&](const V3f& d) { return density(bsdf, d); });
@@ -163,25 +164,25 @@ TEST(Coated, DrawsWithTheDensityItStates) {
 
 // About normals bent off the real surface, from any side.
 TEST(Facets, DrawWithTheDensityTheyStateAboutBentNormals) {
-  constexpr int kFrames = 5;
-  constexpr float kAlpha = 0.3f;
-  const AlbedoTable glass = AlbedoTable::dielectric(kAlpha, 1.5f),
-                    mirrors = AlbedoTable::mirrors(kAlpha);
+  constexpr int frames = 5;
+  constexpr float facet_alpha = 0.3f;
+  const AlbedoTable glass = AlbedoTable::dielectric(facet_alpha, 1.5f),
+                    mirrors = AlbedoTable::mirrors(facet_alpha);
   uint32_t seed = 400;
   Tilted t;
   const auto check = [&](const auto& bsdf, const char* name) {
     const ChiSquare fit = chi_square(
         ++seed, [&](std::mt19937& random) { return sample(bsdf, numbers({random})); },
         [&](const V3f& d) { return density(bsdf, d); });
-    EXPECT_GT(fit.p_value, least_p(3 * kFrames)) << name << ' ' << seed;
+    EXPECT_GT(fit.p_value, least_p(3 * frames)) << name << ' ' << seed;
     EXPECT_NEAR(fit.integral, fit.drawn, 0.005) << name << ' ' << seed;
   };
-  for (int k = 0; k < kFrames; ++k) {
+  for (int k = 0; k < frames; ++k) {
     t.next();
     const V3f &o = t.outgoing, &g = t.geometric, &n = t.shading;
-    check(RoughBsdf(o, g, n, kAlpha, 1.5f, glass), "rough");
-    check(MetalBsdf(o, g, n, kAlpha, kMirror, mirrors), "metal");
-    check(CoatedBsdf(o, g, n, kAlpha, 1.5f, V3f(0.6f), glass), "coated");
+    check(RoughBsdf(o, g, n, facet_alpha, 1.5f, glass), "rough");
+    check(MetalBsdf(o, g, n, facet_alpha, mirror, mirrors), "metal");
+    check(CoatedBsdf(o, g, n, facet_alpha, 1.5f, V3f(0.6f), glass), "coated");
   }
 }
 
@@ -309,33 +310,33 @@ TEST(Metal, HasTheColoursItIsGiven) {
   }
 }
 
-// Facets of 1e-4 stand as one: Fresnel's share goes the mirror's way, the rest by Snell's law.
+// Facets of 1e-4 stand as one: Fresnel's part goes the mirror's direction, the rest by Snell's law.
 TEST(RoughDielectric, BecomesTheSmoothOne) {
   for (const float eta : {1.5f, 1 / 1.5f})
     for (const float cos : {1.f, 0.9f, 0.5f}) {
       const AlbedoTable table = AlbedoTable::dielectric(1e-4f, eta);
       const RoughBsdf bsdf = rough(cos, 1e-4f, eta, table);
-      const InterfaceSplit split = split_at_interface(-leaving(cos), kUp, eta);
+      const InterfaceSplit split = split_at_interface(-leaving(cos), straight_up, eta);
       std::mt19937 random(3);
       double reflected = 0, far = 0;
-      constexpr int kDraws = 40000;
-      for (int k = 0; k < kDraws; ++k) {
+      constexpr int draws = 40000;
+      for (int k = 0; k < draws; ++k) {
         const Scatter s = sample(bsdf, numbers({random}));
         ASSERT_GT(s.pdf, 0);
         ASSERT_NEAR(s.weight.x, 1, 1e-3);
         const bool through = bsdf.through(s.direction);
-        reflected += through ? 0. : 1. / kDraws;
+        reflected += through ? 0. : 1. / draws;
         const V3f off = s.direction - (through ? split.refracted : split.reflected);
-        far += off.length() > 0.01f ? 1. / kDraws : 0.;
+        far += off.length() > 0.01f ? 1. / draws : 0.;
       }
       // Facets turn a mirrored ray by twice their slope: alpha^2 / 0.005^2 of GGX's are steeper
       // than that, 0.0004, and seen from aslant up to three times as many.
       EXPECT_LT(far, 0.002);
       const double r = split.reflectance;
-      EXPECT_NEAR(reflected, r, 4 * std::sqrt(r * (1 - r) / kDraws) + 1e-4);
+      EXPECT_NEAR(reflected, r, 4 * std::sqrt(r * (1 - r) / draws) + 1e-4);
       EXPECT_NEAR(table.at(cos).reflected, r, 1e-3);
     }
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

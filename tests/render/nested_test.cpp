@@ -4,10 +4,10 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr double kWater = 1.333, kGlass = 1.5;
+constexpr double water_index = 1.333, glass_index = 1.5;
 
 double one_face(double a, double b) { return std::pow((a - b) / (a + b), 2); }
 
@@ -21,8 +21,8 @@ struct Layers {
   double depth_of_glass;  // as the priorities have it
 
   Layers(int water_priority, Facing light) : depth_of_glass(water_priority > 0 ? 0.3 : 0.5) {
-    shot.material = {dielectric("water", kWater, V3f(0.3f, 0.8f, 0)),
-                     dielectric("glass", kGlass, V3f(1.1f, 0.2f, 0))};
+    shot.material = {dielectric("water", water_index, V3f(0.3f, 0.8f, 0)),
+                     dielectric("glass", glass_index, V3f(1.1f, 0.2f, 0))};
     shot.material[0].priority = water_priority;
     shot.obstacle.emplace_back();
     shot.obstacle.back().name = shot.obstacle.back().material = "glass";
@@ -35,8 +35,8 @@ struct Layers {
   /// Of all reflections between the three faces; one way through glass and through water keeps g
   /// and w.
   double expected(int channel, Facing light) const {
-    const double top = one_face(1, kGlass), middle = one_face(kGlass, kWater),
-                 bottom = one_face(kWater, 1);
+    const double top = one_face(1, glass_index), middle = one_face(glass_index, water_index),
+                 bottom = one_face(water_index, 1);
     const double g = std::exp(-shot.material[1].absorption[channel] * depth_of_glass),
                  w = std::exp(-shot.material[0].absorption[channel] * (1.2 - depth_of_glass));
     const double below = 1 / (1 - middle * bottom * w * w);
@@ -67,7 +67,7 @@ struct Sunk {
   FrameGeometry geometry;
 
   Sunk() {
-    shot.material = {dielectric("water", kWater), dielectric("glass", kGlass)};
+    shot.material = {dielectric("water", water_index), dielectric("glass", glass_index)};
     shot.obstacle.emplace_back();
     shot.obstacle.back().name = shot.obstacle.back().material = "glass";
     geometry.fluid = box_mesh({-3, -0.1f, -3}, {3, 0.8f, 3});
@@ -122,4 +122,4 @@ TEST(NestedBodies, AreRefusedBeyondTheirNumber) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

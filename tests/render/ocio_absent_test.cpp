@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/error.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
 namespace {
 
 TEST(OcioView, SaysWhatToInstall) {
@@ -16,4 +18,4 @@ TEST(OcioView, SaysWhatToInstall) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -7,11 +7,14 @@
 #include <fstream>
 
 #include "render/color/color.h"
-#include "render/color/view_transform.h"
+#include "render/display/view_transform.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
+using drench::test::TemporaryFolder;
 namespace {
 
 namespace fs = std::filesystem;
@@ -141,4 +144,4 @@ TEST_F(OcioViewTest, SaysWhatThereIsWhenANameIsWrong) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -15,7 +15,7 @@
 #define NUMBER oidnGetDeviceInt
 #endif
 
-namespace drench::test {
+namespace drench::render::test {
 
 int alive = 0;
 
@@ -61,16 +61,16 @@ struct Filter {
   }
 };
 
-}  // namespace drench::test
+}  // namespace drench::render::test
 
-using drench::test::Device;
-using drench::test::Filter;
+using drench::render::test::Device;
+using drench::render::test::Filter;
 
 #pragma GCC visibility push(default)
 
 extern "C" {
 
-int oidn_double_alive() { return drench::test::alive; }
+int oidn_double_alive() { return drench::render::test::alive; }
 
 Device* oidnNewDevice(int) { return new Device; }
 void FLAG(Device)(Device* device, const char* name, bool value) {

@@ -12,7 +12,9 @@
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
 namespace {
 
 using Plane = NoisyPicture::Plane;
@@ -97,4 +99,4 @@ TEST(Oidn, TakesNoiseAwayWhereItIsInstalled) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

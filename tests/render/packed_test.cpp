@@ -6,7 +6,7 @@
 
 #include <random>
 
-namespace drench {
+namespace drench::render::test {
 namespace {
 
 TEST(Packed, GivesTheBitsOfNumberByNumber) {
@@ -31,4 +31,4 @@ TEST(Packed, GivesTheBitsOfNumberByNumber) {
 }
 
 }  // namespace
-}  // namespace drench
+}  // namespace drench::render::test

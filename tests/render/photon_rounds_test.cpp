@@ -8,7 +8,9 @@
 #include "tests/render/puddle.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 /// A wavy puddle under a lamp and a sky, 32 x 32 pixels, without walks.
@@ -21,7 +23,7 @@ struct Puddle {
   Puddle() {
     shot.render.width = shot.render.height = 32;
     shot.light = {panel({0.8, 2, 0.3}, 0.15, 0.15, 40), sky(0.2f)};
-    options.walks = Walks::none;
+    options.walks = ManifoldWalks::none;
   }
   Film picture() { return render_frame(shot, 1001, geometry, options, &stats); }
 };
@@ -130,10 +132,10 @@ TEST(PhotonRounds, GiveTheSameBitsAfterStops) {
   const TemporaryFolder folder;
   frame.options.checkpoint.file = folder / "frame.samples";
   frame.options.checkpoint.inputs = {1, 2};
-  for (const double share : {0.05, 0.3, 0.6, 0.9, 0.9999})
+  for (const double fraction : {0.05, 0.3, 0.6, 0.9, 0.9999})
     EXPECT_THROW(render_frame(frame.shot, 1001, frame.geometry, frame.options, nullptr,
                               [&](double done) {
-                                if (done >= share) throw Stopped{};
+                                if (done >= fraction) throw Stopped{};
                               }),
                  Stopped);
   EXPECT_EQ(frame.picture().rgba, whole.rgba);
@@ -245,4 +247,4 @@ TEST(PhotonError, IsNoneWithoutPhotons) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

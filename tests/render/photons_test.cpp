@@ -10,18 +10,18 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "tests/render/puddle.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-constexpr double kIndex = 1.333;
+constexpr double water_index = 1.333;
 
-/// Calls f(direction of flight, power, share) for the photons near a point, whosever hand.
+/// Calls f(direction of flight, power, weight) for the photons near a point, whosever subset.
 template <class F>
 void for_each_near(const PhotonMap& map, const V3f& at, const F& f) {
-  for (unsigned hand = 0; hand < map.hands(); ++hand)
-    map.for_each_near(hand, at, V3f(0, 1, 0),
-                      [&](const V3f& flight, const V3f& power, float share, float) {
-                        f(flight, power, share / float(map.hands()));
+  for (unsigned subset = 0; subset < map.subsets(); ++subset)
+    map.for_each_near(subset, at, V3f(0, 1, 0),
+                      [&](const V3f& flight, const V3f& power, float weight, float) {
+                        f(flight, power, weight / float(map.subsets()));
                       });
 }
 
@@ -32,7 +32,7 @@ double irradiance(const PhotonMap& map, double s, int n = 40) {
     for (int j = 0; j < n; ++j)
       for_each_near(
           map, V3f(float(s * (2 * (i + 0.5) / n - 1)), 0, float(s * (2 * (j + 0.5) / n - 1))),
-          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
+          [&](const V3f&, const V3f& power, float weight) { sum += double(power.x) * weight; });
   return sum / n / n;
 }
 
@@ -40,7 +40,7 @@ PhotonMap photons_of(const Shot& shot, const TriangleMesh& fluid, uint32_t count
                      uint32_t seed = 1) {
   const Scene scene(shot, 1001, {fluid, {}}, {});
   uint64_t rays = 0;
-  PhotonMap map = trace_photons(scene, seed, count, 64, Walks::none, rays).photons;
+  PhotonMap map = trace_photons(scene, seed, count, 64, ManifoldWalks::none, rays).photons;
   EXPECT_GT(rays, count / 8);
   return map;
 }
@@ -55,19 +55,20 @@ Shot pool_shot(double index, float absorption) {
 // Under level water, E cos(a) (1 - F(a)) e^(-s d / cos(b)) / n^2. A million photons, of which some
 // 20,000 lie in the square: 4 of their standard errors.
 TEST(Photons, LieUnderLevelWaterAsSnellAndFresnelSay) {
-  Shot shot = pool_shot(kIndex, 0.7f);
-  const double a = 0.6, depth = 0.4, cos_b = std::sqrt(1 - std::pow(std::sin(a) / kIndex, 2));
+  Shot shot = pool_shot(water_index, 0.7f);
+  const double a = 0.6, depth = 0.4, cos_b = std::sqrt(1 - std::pow(std::sin(a) / water_index, 2));
   shot.light = {sun({std::sin(a), -std::cos(a), 0}, 0.5)};
-  const double parallel = (kIndex * std::cos(a) - cos_b) / (kIndex * std::cos(a) + cos_b);
-  const double perpendicular = (std::cos(a) - kIndex * cos_b) / (std::cos(a) + kIndex * cos_b);
+  const double parallel = (water_index * std::cos(a) - cos_b) / (water_index * std::cos(a) + cos_b);
+  const double perpendicular =
+      (std::cos(a) - water_index * cos_b) / (std::cos(a) + water_index * cos_b);
   const double fresnel = (parallel * parallel + perpendicular * perpendicular) / 2;
   const PhotonMap map = photons_of(shot, box_mesh({-5, -0.1f, -5}, {5, float(depth), 5}), 1000000);
-  const double expected =
-      2 * std::cos(a) * (1 - fresnel) * std::exp(-0.7 * depth / cos_b) / (kIndex * kIndex);
+  const double expected = 2 * std::cos(a) * (1 - fresnel) * std::exp(-0.7 * depth / cos_b) /
+                          (water_index * water_index);
   EXPECT_NEAR(irradiance(map, 1.5), expected, 0.02 * expected);
 }
 
-// A lamp's light falls as the form factor of its square says, whatever the share of the surface.
+// A lamp's light falls as the form factor of its square says, whatever the fraction of the surface.
 TEST(Photons, OfALampCarryItsFormFactor) {
   Shot shot = pool_shot(1, 0);  // water that bends nothing
   shot.light = {panel({0, 2, 0}, 0.1, 0.1, 50)};
@@ -142,7 +143,7 @@ TEST(Photons, OfADiskGiveThePictureThatPathsGive) {
 
 // Foam is too small for a density of photons: paths bring its light, and the picture is theirs.
 TEST(Photons, LeaveFoamToPaths) {
-  Shot shot = pool_shot(kIndex, 0.3f);
+  Shot shot = pool_shot(water_index, 0.3f);
   shot.render.samples = 1024;
   shot.camera.position = V3d(0, 2, 0.1);
   shot.camera.target = V3d(0, 0.2, 0);
@@ -169,7 +170,7 @@ TEST(Photons, AreAllFoundOnce) {
                          V3f(0, k % 3 ? -1.f : 1.f, 0), V3f(0, k % 2 ? -1.f : 1.f, 0),
                          V3f(1 + place(random)), 0.5f + 0.5f * place(random)});
     const PhotonMap map(photons, 64);
-    EXPECT_EQ(map.hands(), count == 100000 ? 4 : 1);
+    EXPECT_EQ(map.subsets(), count == 100000 ? 4 : 1);
     const float r2 = map.radius() * map.radius();
     for (int k = 0; k < (count > 3000 ? 100 : 2000); ++k) {
       const V3f at = k % 2 ? photons[size_t(k) % photons.size()].position
@@ -179,15 +180,15 @@ TEST(Photons, AreAllFoundOnce) {
         const V3f off = p.position - at;
         const double square = dot(off, off) / r2;
         if (square < 1 && off.y * off.y <= 0.25f * r2)
-          side[p.direction.y < 0 ? 0 : 1] += double(p.power.x) * 2 * (1 - square) / (kPi64 * r2);
+          side[p.direction.y < 0 ? 0 : 1] += double(p.power.x) * 2 * (1 - square) / (pi64 * r2);
       }
-      for_each_near(map, at, [&](const V3f&, const V3f& power, float share) {
-        near += double(power.x) * share;
+      for_each_near(map, at, [&](const V3f&, const V3f& power, float weight) {
+        near += double(power.x) * weight;
       });
       Irradiance found;
-      for (unsigned hand = 0; hand < map.hands(); ++hand) {
-        const GatheredLight part = map.irradiance(hand, at, V3f(0, 1, 0), V3f(0, 1, 0));
-        found.add(part.all, 1 / float(map.hands()));
+      for (unsigned subset = 0; subset < map.subsets(); ++subset) {
+        const GatheredLight part = map.irradiance(subset, at, V3f(0, 1, 0), V3f(0, 1, 0));
+        found.add(part.all, 1 / float(map.subsets()));
       }
       const double slack = 1e-4 * (1 + side[0] + side[1]);
       ASSERT_NEAR(found.front.x, side[0], slack) << count << " " << k;
@@ -200,7 +201,7 @@ TEST(Photons, AreAllFoundOnce) {
 // Smooth normals on coarse triangles: no photon far brighter than the others, which would be a
 // disc.
 TEST(Photons, AreNoneFarBrighterThanOthers) {
-  Shot shot = pool_shot(kIndex, 0);
+  Shot shot = pool_shot(water_index, 0);
   shot.light = {sun({0.6, -1, 0.2}, 0.5)};
   TriangleMesh drop = sphere_mesh(3);
   for (V3f& p : drop.position)
@@ -231,28 +232,26 @@ TriangleMesh roof_tiles() {
     mesh.triangle.push_back({first, first + 1, first + 2});
     mesh.triangle.push_back({first, first + 2, first + 3});
   };
-  constexpr int kTiles = 400;
-  constexpr float kHalf = 5, kWidth = 2 * kHalf / kTiles, kBelow = -0.1f;
-  for (int k = 0; k < kTiles; ++k) {
-    const float x = -kHalf + kWidth * float(k), next = -kHalf + kWidth * float(k + 1);
-    const float rise = kWidth * std::tan(15 * kPi / 180), odd = k % 2 == 0 ? 0.f : rise;
+  constexpr int tiles = 400;
+  constexpr float half = 5, tile_width = 2 * half / tiles, below = -0.1f;
+  for (int k = 0; k < tiles; ++k) {
+    const float x = -half + tile_width * float(k), next = -half + tile_width * float(k + 1);
+    const float rise = tile_width * std::tan(15 * pi / 180), odd = k % 2 == 0 ? 0.f : rise;
     const float y = 0.4f + odd, there = 0.4f + rise - odd;
-    quad({V3f(x, y, kHalf), {next, there, kHalf}, {next, there, -kHalf}, {x, y, -kHalf}},
-         V3f(0, 1, 0));
-    quad(
-        {V3f(x, kBelow, -kHalf), {next, kBelow, -kHalf}, {next, kBelow, kHalf}, {x, kBelow, kHalf}},
-        V3f(0, -1, 0));
-    quad({V3f(x, kBelow, kHalf), {next, kBelow, kHalf}, {next, there, kHalf}, {x, y, kHalf}},
+    quad({V3f(x, y, half), {next, there, half}, {next, there, -half}, {x, y, -half}}, V3f(0, 1, 0));
+    quad({V3f(x, below, -half), {next, below, -half}, {next, below, half}, {x, below, half}},
+         V3f(0, -1, 0));
+    quad({V3f(x, below, half), {next, below, half}, {next, there, half}, {x, y, half}},
          V3f(0, 0, 1));
-    quad({V3f(next, kBelow, -kHalf), {x, kBelow, -kHalf}, {x, y, -kHalf}, {next, there, -kHalf}},
+    quad({V3f(next, below, -half), {x, below, -half}, {x, y, -half}, {next, there, -half}},
          V3f(0, 0, -1));
   }
   for (const float side : {-1.f, 1.f}) {
-    const float x = side * kHalf;
-    quad({V3f(x, kBelow, kHalf * side),
-          {x, kBelow, -kHalf * side},
-          {x, 0.4f, -kHalf * side},
-          {x, 0.4f, kHalf * side}},
+    const float x = side * half;
+    quad({V3f(x, below, half * side),
+          {x, below, -half * side},
+          {x, 0.4f, -half * side},
+          {x, 0.4f, half * side}},
          V3f(side, 0, 0));
   }
   return mesh;
@@ -261,18 +260,18 @@ TriangleMesh roof_tiles() {
 // Where light grazes the real faces few photons fall, each of which counts for more: what passes is
 // what the smooth normals say. Of 70 degrees half the faces see 85.
 TEST(Photons, PassAsManyAsSmoothNormalsSay) {
-  Shot shot = pool_shot(kIndex, 0);
-  const double a = 70 * double(kPi) / 180;
+  Shot shot = pool_shot(water_index, 0);
+  const double a = 70 * double(pi) / 180;
   shot.light = {sun({std::sin(a), -std::cos(a), 0}, 0.5)};
-  const double passes = 1 - double(fresnel_reflectance(float(std::cos(a)), float(kIndex)));
-  const double expected = 2 * std::cos(a) * passes / (kIndex * kIndex);
+  const double passes = 1 - double(fresnel_reflectance(float(std::cos(a)), float(water_index)));
+  const double expected = 2 * std::cos(a) * passes / (water_index * water_index);
   EXPECT_NEAR(irradiance(photons_of(shot, roof_tiles(), 1000000), 1.5), expected, 0.02 * expected);
 }
 
 // Blur and noise vanish together: on lines across the waves' caustics noise falls with the number
 // of photons to the power -1/4, 1.78 a decade, blur to twice that. The reference has its own tenth.
 TEST(Photons, ConvergeAsTheirNumberGrows) {
-  Shot shot = pool_shot(kIndex, 0);
+  Shot shot = pool_shot(water_index, 0);
   shot.light = {sun({0.2, -1, 0.1}, 0.5)};
   const auto lines = [&](uint32_t count, uint32_t seed) {
     const PhotonMap map = photons_of(shot, waves(), count, seed);
@@ -281,7 +280,7 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
       double sum = 0;
       for_each_near(
           map, V3f(-0.5f + 0.005f * float(k % 200), 0, -0.5f + 0.1f * float(k / 200)),
-          [&](const V3f&, const V3f& power, float share) { sum += double(power.x) * share; });
+          [&](const V3f&, const V3f& power, float weight) { sum += double(power.x) * weight; });
       values.push_back(sum);
     }
     return values;
@@ -303,7 +302,7 @@ TEST(Photons, ConvergeAsTheirNumberGrows) {
 
 // Their blur is told, less with more samples; where there are none, none.
 TEST(Photons, TellTheirBlur) {
-  Shot shot = pool_shot(kIndex, 0);
+  Shot shot = pool_shot(water_index, 0);
   shot.light = {sun({0.2, -1, 0.1}, 0.5)};
   shot.render.width = shot.render.height = 64;
   double before = 1e9;
@@ -324,31 +323,31 @@ TEST(Photons, TellTheirBlur) {
 
 // A sample finds the photons of its own eighth of the shutter; all eighths have as much light.
 TEST(Photons, AreThoseOfTheirTime) {
-  constexpr int kCount = 300000;
+  constexpr int photon_count = 300000;
   std::mt19937 random(5);
   std::uniform_real_distribution<float> place(-1, 1);
   std::vector<Photon> photons;
-  for (int k = 0; k < kCount; ++k) {
-    const float turn = (float((k * 7) % kCount) + 0.5f) / kCount;
-    photons.push_back(
-        {V3f(place(random), 0, place(random)), V3f(0, -1, 0), V3f(0, 1, 0), V3f(1, turn, 0), turn});
+  for (int k = 0; k < photon_count; ++k) {
+    const float time_sample = (float((k * 7) % photon_count) + 0.5f) / photon_count;
+    photons.push_back({V3f(place(random), 0, place(random)), V3f(0, -1, 0), V3f(0, 1, 0),
+                       V3f(1, time_sample, 0), time_sample});
   }
-  EXPECT_EQ(PhotonMap(photons, 4).hands(), 4u) << "no more than a pixel has samples";
+  EXPECT_EQ(PhotonMap(photons, 4).subsets(), 4u) << "no more than a pixel has samples";
   const PhotonMap map(photons, 64);
-  ASSERT_EQ(map.hands(), 8u);
-  for (const float turn : {0.f, 0.3f, 0.61f, 0.9999999f, 1.f}) {
-    const float eighth = std::min(std::floor(turn * 8), 7.f) / 8;
+  ASSERT_EQ(map.subsets(), 8u);
+  for (const float time_sample : {0.f, 0.3f, 0.61f, 0.9999999f, 1.f}) {
+    const float eighth = std::min(std::floor(time_sample * 8), 7.f) / 8;
     double light = 0, points = 0;
     for (float x = -0.8f; x < 0.8f; x += 0.05f)
       for (float z = -0.8f; z < 0.8f; z += 0.05f, ++points)
-        map.for_each_near(map.hand_at(turn), V3f(x, 0, z), V3f(0, 1, 0),
-                          [&](const V3f&, const V3f& power, float share, float) {
+        map.for_each_near(map.subset_at(time_sample), V3f(x, 0, z), V3f(0, 1, 0),
+                          [&](const V3f&, const V3f& power, float weight, float) {
                             const float its = power.y / power.x;
                             ASSERT_GE(its, eighth);
                             ASSERT_LT(its, eighth + 0.125f);
-                            light += double(power.x) * share;
+                            light += double(power.x) * weight;
                           });
-    EXPECT_NEAR(light / points, kCount / 4., 0.03 * kCount / 4) << turn;
+    EXPECT_NEAR(light / points, photon_count / 4., 0.03 * photon_count / 4) << time_sample;
   }
 }
 
@@ -391,7 +390,7 @@ TEST(Photons, KnowALampAmongDropsFromOneInADrop) {
 
 // What has no lamps or no fluid does without, and its picture keeps its bits.
 TEST(Photons, AreNotTracedWithoutLampsOrFluid) {
-  Shot shot = pool_shot(kIndex, 0.3f);
+  Shot shot = pool_shot(water_index, 0.3f);
   shot.camera.position = V3d(0, 3, 1);
   shot.light = {sky(0.2f)};
   Shot with = shot;
@@ -403,4 +402,4 @@ TEST(Photons, AreNotTracedWithoutLampsOrFluid) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -19,7 +19,11 @@
 #include "render/texture/texture.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::error_of;
+using drench::test::TemporaryFolder;
+using drench::test::write_quickly;
 
 /// What `f` writes to stderr, which is free again even where it throws.
 inline std::string said_by(const std::function<void()>& f) {
@@ -180,10 +184,10 @@ class IccOfTest {
   std::vector<std::pair<std::string, std::string>> tags_;
 };
 
-inline constexpr std::array<std::array<double, 3>, 3> kSrgbColorants{
+inline constexpr std::array<std::array<double, 3>, 3> srgb_colorants{
     {{0.4360, 0.2225, 0.0139}, {0.3851, 0.7169, 0.0971}, {0.1431, 0.0606, 0.7141}}};
 /// Display P3 adapted to D50, as Apple's profile has them.
-inline constexpr std::array<std::array<double, 3>, 3> kP3Colorants{
+inline constexpr std::array<std::array<double, 3>, 3> p3_colorants{
     {{0.5151, 0.2412, -0.0011}, {0.2920, 0.6922, 0.0419}, {0.1571, 0.0666, 0.7841}}};
 inline Imf::Chromaticities display_p3() {
   return {{0.680f, 0.320f}, {0.265f, 0.690f}, {0.150f, 0.060f}, {0.3127f, 0.3290f}};
@@ -222,4 +226,4 @@ class PictureTest : public testing::Test {
   int count_ = 0;
 };
 
-}  // namespace drench::test
+}  // namespace drench::render::test

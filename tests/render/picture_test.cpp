@@ -3,7 +3,7 @@
 #include "render/light/environment.h"
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 class PictureFormat : public PictureTest {};
@@ -96,4 +96,4 @@ TEST_F(PictureFormat, SkiesHeedTheLimitOfMemory) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

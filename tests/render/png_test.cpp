@@ -4,7 +4,7 @@
 
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 class Png : public PictureTest {};
@@ -170,11 +170,11 @@ TEST_F(Png, ChromaticitiesAreHonoured) {
 TEST_F(Png, ProfilesOfMatrixAndCurvesAreHonoured) {
   PngOfTest png = ramp(8);
   const Texture plain = read(png.bytes());
-  png.icc = IccOfTest(kSrgbColorants, IccOfTest::srgb()).bytes();
+  png.icc = IccOfTest(srgb_colorants, IccOfTest::srgb()).bytes();
   const Texture same = read(png.bytes());
-  png.icc = IccOfTest(kP3Colorants, IccOfTest::srgb()).bytes();
+  png.icc = IccOfTest(p3_colorants, IccOfTest::srgb()).bytes();
   const Texture wide = read(png.bytes());
-  png.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+  png.icc = IccOfTest(srgb_colorants, IccOfTest::gamma(1)).bytes();
   const Texture linear = read(png.bytes());
   const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
   for (size_t k = 0; k < 256; ++k) {
@@ -233,9 +233,9 @@ TEST_F(Png, CodePointsThatAreDamagedAreNotApplied) {
 TEST_F(Png, GreyProfilesGiveLightnessOrLuminance) {
   PngOfTest png{.width = 256, .type = PNG_COLOR_TYPE_GRAY};
   for (int k = 0; k < 256; ++k) png.samples.push_back(uint16_t(k));
-  png.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1), "GRAYXYZ ").bytes();
+  png.icc = IccOfTest(srgb_colorants, IccOfTest::gamma(1), "GRAYXYZ ").bytes();
   const Texture luminance = read(png.bytes());
-  png.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1), "GRAYLab ").bytes();
+  png.icc = IccOfTest(srgb_colorants, IccOfTest::gamma(1), "GRAYLab ").bytes();
   const Texture lightness = read(png.bytes());
   for (size_t k = 0; k < 256; ++k) {
     const double l = 100 * double(k) / 255;  // CIE 15: the inverse of L* = 116 f(Y) - 16
@@ -249,7 +249,7 @@ TEST_F(Png, GreyProfilesGiveLightnessOrLuminance) {
 TEST_F(Png, ProfilesOfTablesAndMatrixAreNamed) {
   PngOfTest png = ramp(8);
   const Texture plain = read(png.bytes());
-  IccOfTest icc(kP3Colorants, IccOfTest::gamma(1));
+  IccOfTest icc(p3_colorants, IccOfTest::gamma(1));
   icc.add("A2B0", "mft2, a table");
   png.icc = icc.bytes();
   std::string said;
@@ -261,7 +261,7 @@ TEST_F(Png, ProfilesOfTablesAndMatrixAreNamed) {
 TEST_F(Png, ProfilesThatCannotBeUsedAreNamed) {
   PngOfTest png = ramp(8);
   const Texture plain = read(png.bytes());
-  png.icc = IccOfTest(kSrgbColorants, "mft2, a table").bytes();
+  png.icc = IccOfTest(srgb_colorants, "mft2, a table").bytes();
   std::string said;
   const Texture texture = read(png.bytes(), &said);
   EXPECT_TRUE(tells(said, {"ICC profile 'of the test'", "picture.2", "sRGB"}));
@@ -276,7 +276,7 @@ TEST_F(Png, NormalsAreNeverConverted) {
       if (chunk == 1) png.gamma = 1;
       if (chunk == 2) png.srgb = true;
       if (chunk == 3) png.chrm = {0.3127, 0.329, 0.68, 0.32, 0.265, 0.69, 0.15, 0.06};
-      if (chunk == 4) png.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(1.8)).bytes();
+      if (chunk == 4) png.icc = IccOfTest(p3_colorants, IccOfTest::gamma(1.8)).bytes();
       const Texture normals = read_normals(png.bytes());
       for (int k = 0; k < 256; ++k) {
         const double expected = depth == 8 ? (k - 128) / 127. : (k * 257 - 32768) / 32767.;
@@ -342,4 +342,4 @@ TEST_F(Png, TakesNoMoreMemoryThanItsPixelsAndHeedsTheLimit) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

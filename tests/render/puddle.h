@@ -3,7 +3,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 /// Of 2 W/m^2 on a surface that faces it.
 inline Light sun(const V3d& direction, double angle_deg) {
@@ -36,4 +36,4 @@ inline TriangleMesh waves() {
   return mesh;
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

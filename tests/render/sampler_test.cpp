@@ -8,29 +8,31 @@
 #include <set>
 
 #include "render/film/filter.h"
-#include "render/integrator/sampler.h"
 #include "render/light/environment.h"
 #include "render/light/lights.h"
+#include "render/sampler.h"
 #include "render/sampling.h"
 #include "render/scene/scene_cache.h"
 #include "tests/render/support.h"
 #include "tests/temporary_folder.h"
 
-namespace drench::test {
+namespace drench::render::test {
+
+using drench::test::TemporaryFolder;
 namespace {
 
 TEST(Sampler, FillsEveryElementaryIntervalOnce) {
   // A pixel's 2^m points are a (0, m, 2)-net: one point in every 2^-a x 2^-(m-a) box.
-  constexpr int kLog2 = 8;
+  constexpr int log2 = 8;
   for (const auto order : {PixelOrder::morton, PixelOrder::separate})
     for (uint32_t pixel = 0; pixel < 16; ++pixel)
-      for (int a = 0; a <= kLog2; ++a) {
+      for (int a = 0; a <= log2; ++a) {
         std::set<std::pair<int, int>> boxes;
-        for (uint32_t s = 0; s < 1u << kLog2; ++s) {
-          const V2f p = Sampler(order, 7, pixel * 37, pixel, kLog2, s).two(3 + pixel);
-          boxes.insert({int(p.x * float(1 << a)), int(p.y * float(1 << (kLog2 - a)))});
+        for (uint32_t s = 0; s < 1u << log2; ++s) {
+          const V2f p = Sampler(order, 7, pixel * 37, pixel, log2, s).two(3 + pixel);
+          boxes.insert({int(p.x * float(1 << a)), int(p.y * float(1 << (log2 - a)))});
         }
-        ASSERT_EQ(boxes.size(), 1u << kLog2) << "a = " << a << ", pixel " << pixel;
+        ASSERT_EQ(boxes.size(), 1u << log2) << "a = " << a << ", pixel " << pixel;
       }
 }
 
@@ -45,16 +47,16 @@ TEST(Sampler, StratifiesOneDimension) {
 
 TEST(Sampler, KeepsDimensionsUncorrelated) {
   // Products of centred numbers of two dimensions average to 0 with deviation 1/12 / sqrt(n).
-  constexpr uint32_t kSide = 64, kSamples = 4;
+  constexpr uint32_t side = 64, samples = 4;
   for (uint32_t other = 1; other < 12; ++other) {
     double sum = 0;
-    for (uint32_t y = 0; y < kSide; ++y)
-      for (uint32_t x = 0; x < kSide; ++x)
-        for (uint32_t s = 0; s < kSamples; ++s) {
+    for (uint32_t y = 0; y < side; ++y)
+      for (uint32_t x = 0; x < side; ++x)
+        for (uint32_t s = 0; s < samples; ++s) {
           const Sampler sampler(PixelOrder::morton, 3, x, y, 2, s);
           sum += (sampler.two(0).x - 0.5) * (sampler.two(other).y - 0.5);
         }
-    const double n = kSide * kSide * kSamples;
+    const double n = side * side * samples;
     EXPECT_LT(std::abs(sum / n), 5 / 12. / std::sqrt(n)) << other;
   }
 }
@@ -90,13 +92,13 @@ TEST(PixelFilter, HasTheWindowsVariance) {
   // a0), here with the signs of a window centred on 0: + 0.48829, + 0.14128, + 0.01168.
   const PixelFilter filter;
   double square = 0;
-  constexpr int kSteps = 200000;
-  for (int k = 0; k < kSteps; ++k)
-    square += std::pow(filter.offset({float((k + 0.5) / kSteps), 0.5f}).x, 2);
-  const double w = PixelFilter::kWidth, a0 = 0.35875;
+  constexpr int steps = 200000;
+  for (int k = 0; k < steps; ++k)
+    square += std::pow(filter.offset({float((k + 0.5) / steps), 0.5f}).x, 2);
+  const double w = PixelFilter::width, a0 = 0.35875;
   const double expected =
-      w * w / 12 + w * w / (2 * kPi64 * kPi64) * (-0.48829 + 0.14128 / 4 - 0.01168 / 9) / a0;
-  EXPECT_NEAR(square / kSteps, expected, 0.005 * expected);  // 1024 straight pieces
+      w * w / 12 + w * w / (2 * pi64 * pi64) * (-0.48829 + 0.14128 / 4 - 0.01168 / 9) / a0;
+  EXPECT_NEAR(square / steps, expected, 0.005 * expected);  // 1024 straight pieces
   EXPECT_NEAR(filter.offset({0.5f, 0.5f}).x, 0, 1e-3);
 }
 
@@ -104,24 +106,24 @@ TEST(PixelFilter, HasTheWindowsVariance) {
 /// Bins are equal areas of the sphere; bins that expect less than 10 are pooled.
 double chi_square_deviate(const std::function<V3f(std::mt19937&)>& draw,
                           const std::function<double(const V3f&)>& density) {
-  constexpr int kRows = 48, kColumns = 96, kFine = 24, kDraws = 400000;
-  std::vector<double> expected(kRows * kColumns), seen(kRows * kColumns);
-  for (int r = 0; r < kRows * kFine; ++r)
-    for (int c = 0; c < kColumns * kFine; ++c) {
-      const double y = 1 - 2 * (r + 0.5) / (kRows * kFine), s = std::sqrt(1 - y * y);
-      const double phi = 2 * kPi64 * (c + 0.5) / (kColumns * kFine);
-      expected[r / kFine * kColumns + c / kFine] +=
-          density({float(s * std::cos(phi)), float(y), float(s * std::sin(phi))}) * 4 * kPi64 /
-          (double(kRows) * kFine * kColumns * kFine) * kDraws;
+  constexpr int rows = 48, columns = 96, fine = 24, draws = 400000;
+  std::vector<double> expected(rows * columns), seen(rows * columns);
+  for (int r = 0; r < rows * fine; ++r)
+    for (int c = 0; c < columns * fine; ++c) {
+      const double y = 1 - 2 * (r + 0.5) / (rows * fine), s = std::sqrt(1 - y * y);
+      const double phi = 2 * pi64 * (c + 0.5) / (columns * fine);
+      expected[r / fine * columns + c / fine] +=
+          density({float(s * std::cos(phi)), float(y), float(s * std::sin(phi))}) * 4 * pi64 /
+          (double(rows) * fine * columns * fine) * draws;
     }
   std::mt19937 random(20);
-  for (int k = 0; k < kDraws; ++k) {
+  for (int k = 0; k < draws; ++k) {
     const V3f d = draw(random);
-    double phi = std::atan2(d.z, d.x) / (2 * kPi64);
+    double phi = std::atan2(d.z, d.x) / (2 * pi64);
     phi -= std::floor(phi);
-    const int row = std::clamp(int((1 - d.y) / 2 * kRows), 0, kRows - 1);
-    const int column = std::min(int(phi * kColumns), kColumns - 1);
-    seen[row * kColumns + column] += 1;
+    const int row = std::clamp(int((1 - d.y) / 2 * rows), 0, rows - 1);
+    const int column = std::min(int(phi * columns), columns - 1);
+    seen[row * columns + column] += 1;
   }
   double chi = 0, pooled_expected = 0, pooled_seen = 0;
   int bins = 0;
@@ -144,22 +146,22 @@ double chi_square_deviate(const std::function<V3f(std::mt19937&)>& draw,
 }
 
 V2f uniform2(std::mt19937& random) {
-  std::uniform_real_distribution<float> u(0, kOneMinusEpsilon);
+  std::uniform_real_distribution<float> u(0, one_minus_epsilon);
   const float x = u(random);
   return {x, u(random)};
 }
 
 /// 1 % over the nine below (Sidak): p > 0.0011, a deviate of 3.06. The densities have edges, which
 /// the 24 x 24 points of a bin place to a fraction of a percent.
-constexpr double kWorstDeviate = 3.06;
+constexpr double worst_deviate = 3.06;
 
 TEST(ChiSquare, CosineHemisphere) {
   const V3f axis = V3f(0.3f, 0.8f, -0.5f).normalized();
   const Basis basis(axis);
   EXPECT_LT(
       chi_square_deviate([&](auto& r) { return basis.world(sample_cosine(uniform2(r))); },
-                         [&](const V3f& d) { return std::max(0., double(d.dot(axis))) / kPi64; }),
-      kWorstDeviate);
+                         [&](const V3f& d) { return std::max(0., double(d.dot(axis))) / pi64; }),
+      worst_deviate);
 }
 
 TEST(ChiSquare, Cone) {
@@ -167,8 +169,8 @@ TEST(ChiSquare, Cone) {
   const Basis basis(axis);
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) { return basis.world(sample_cone(uniform2(r), 0.3f)); },
-                [&](const V3f& d) { return d.dot(axis) > 0.7f ? 1 / (2 * kPi64 * 0.3) : 0; }),
-            kWorstDeviate);
+                [&](const V3f& d) { return d.dot(axis) > 0.7f ? 1 / (2 * pi64 * 0.3) : 0; }),
+            worst_deviate);
 }
 
 double shape_density(const Lights& lights, const V3f& from, const V3f& d) {
@@ -177,15 +179,15 @@ double shape_density(const Lights& lights, const V3f& from, const V3f& d) {
 }
 
 void expect_shape_density(const std::vector<Light>& list, const V3f& from) {
-  KeptParts parts;
-  const Lights lights(list, Lights::SampleEnvironment::automatic, parts);
+  SceneCache cache;
+  const Lights lights(list, Lights::SampleEnvironment::automatic, cache);
   EXPECT_LT(chi_square_deviate(
                 [&](auto& r) {
                   const float u = uniform2(r).x;
                   return lights.sample(from, 0, u, uniform2(r)).direction;
                 },
                 [&](const V3f& d) { return shape_density(lights, from, d); }),
-            kWorstDeviate);
+            worst_deviate);
 }
 
 TEST(ChiSquare, RectangleLight) {
@@ -244,7 +246,7 @@ TEST(ChiSquare, EnvironmentGradientAndMap) {
     EXPECT_LT(
         chi_square_deviate([&](auto& r) { return environment->sample(uniform2(r)).direction; },
                            [&](const V3f& d) { return environment->pdf(d); }),
-        kWorstDeviate);
+        worst_deviate);
 }
 
 TEST(AliasTable, DrawsInProportion) {
@@ -252,18 +254,18 @@ TEST(AliasTable, DrawsInProportion) {
   const AliasTable table(weights);
   const double total = std::accumulate(weights.begin(), weights.end(), 0.);
   std::vector<double> seen(weights.size());
-  constexpr int kDraws = 1 << 16;
-  for (int k = 0; k < kDraws; ++k) {
-    float u = (float(k) + 0.5f) / kDraws;
+  constexpr int draws = 1 << 16;
+  for (int k = 0; k < draws; ++k) {
+    float u = (float(k) + 0.5f) / draws;
     seen[table.sample(u)] += 1;
     ASSERT_GE(u, 0);
     ASSERT_LT(u, 1);
   }
   for (size_t k = 0; k < weights.size(); ++k) {
-    EXPECT_NEAR(seen[k] / kDraws, weights[k] / total, 6. / kDraws);  // evenly spaced draws
+    EXPECT_NEAR(seen[k] / draws, weights[k] / total, 6. / draws);  // evenly spaced draws
     EXPECT_FLOAT_EQ(table.probability(uint32_t(k)), float(weights[k] / total));
   }
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

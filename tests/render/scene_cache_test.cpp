@@ -6,7 +6,7 @@
 #include "render/scene/scene_cache.h"
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 struct Still {
@@ -29,7 +29,7 @@ struct Still {
     shot.light = {panel({-1, 4, 0}, 0.6, 0.5, 3), sky(0.5f)};
     geometry.fluid = sphere_mesh(3);
     geometry.obstacle = {{"box", box_mesh({0.8f, 0, 0}, {1.4f, 0.8f, 0.6f})}};
-    shared.parts = std::make_shared<KeptParts>();
+    shared.cache = std::make_shared<SceneCache>();
   }
   void move_fluid(float y) {
     for (V3f& p : geometry.fluid.position) p.y += y;
@@ -37,7 +37,7 @@ struct Still {
   }
 };
 
-TEST(KeptParts, LeaveThePictureAsItIs) {
+TEST(SceneCache, LeaveThePictureAsItIs) {
   Still scene;
   for (const int frame : {1001, 1002, 1003}) {
     scene.move_fluid(0.2f);
@@ -47,28 +47,28 @@ TEST(KeptParts, LeaveThePictureAsItIs) {
   }
 }
 
-TEST(KeptParts, HoldObjectsThatStandBetweenFrames) {
+TEST(SceneCache, HoldObjectsThatStandBetweenFrames) {
   Still scene;
   scene.move_fluid(0.2f);
-  KeptParts& parts = *scene.shared.parts;
+  SceneCache& cache = *scene.shared.cache;
   Digest box;
   {
     const Scene frame(scene.shot, 1001, scene.geometry, scene.shared);
     EXPECT_EQ(frame.object(0).contents, Digest{});  // the fluid moves
     box = frame.object(1).contents;
-    EXPECT_FALSE(parts.take(box));  // at work
+    EXPECT_FALSE(cache.take(box));  // at work
   }
-  std::optional<SceneObject> kept = parts.take(box);
+  std::optional<SceneObject> kept = cache.take(box);
   ASSERT_TRUE(kept);
-  EXPECT_FALSE(parts.take(box));
+  EXPECT_FALSE(cache.take(box));
   RTCScene built = kept->scene.get();
-  parts.give_back(std::move(*kept));
+  cache.give_back(std::move(*kept));
   const Scene next(scene.shot, 1002, scene.geometry, scene.shared);
   EXPECT_EQ(next.object(1).scene.get(), built);
-  EXPECT_FALSE(parts.take(box));
+  EXPECT_FALSE(cache.take(box));
 }
 
-TEST(KeptParts, LetGoOfWhatCreeps) {
+TEST(SceneCache, LetGoOfWhatCreeps) {
   Still scene;
   std::vector<Digest> contents;
   for (int frame = 1001; frame <= 1006; ++frame) {
@@ -76,8 +76,8 @@ TEST(KeptParts, LetGoOfWhatCreeps) {
     contents.push_back(Scene(scene.shot, frame, scene.geometry, scene.shared).object(1).contents);
   }
   for (size_t k = 0; k < contents.size(); ++k)
-    EXPECT_EQ(scene.shared.parts->take(contents[k]).has_value(), k >= 2) << k;
+    EXPECT_EQ(scene.shared.cache->take(contents[k]).has_value(), k >= 2) << k;
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

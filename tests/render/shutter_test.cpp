@@ -4,19 +4,19 @@
 #include <gtest/gtest.h>
 
 #include "render/film/filter.h"
-#include "render/integrator/sampler.h"
+#include "render/sampler.h"
 #include "render/scene/camera.h"
 #include "tests/render/strip.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
-/// Share of the light that has come by a time, for shares of opening and closing.
+/// Fraction of the light that has come by a time, for fractions of opening and closing.
 double come_by(double time, double opening, double closing) {
-  constexpr int kSteps = 4000;
+  constexpr int steps = 4000;
   double by = 0, all = 0;
-  for (int k = 0; k < kSteps; ++k) {
-    const double t = (k + 0.5) / kSteps;
+  for (int k = 0; k < steps; ++k) {
+    const double t = (k + 0.5) / steps;
     const double rise = opening > 0 ? std::min(t / opening, 1.) : 1;
     const double fall = closing > 0 ? std::min((1 - t) / closing, 1.) : 1;
     const double open = std::min(rise, fall);
@@ -33,7 +33,7 @@ TEST(ShutterCurve, DrawsTimesAsItIsOpen) {
     camera.shutter_opening = opening;
     camera.shutter_closing = closing;
     const ShutterCurve curve(camera);
-    for (const float u : {0.f, 0.01f, 0.2f, 0.37f, 0.5f, 0.81f, 0.99f, kOneMinusEpsilon}) {
+    for (const float u : {0.f, 0.01f, 0.2f, 0.37f, 0.5f, 0.81f, 0.99f, one_minus_epsilon}) {
       const float t = curve.time(u, 0.3f);
       EXPECT_GE(t, 0);
       EXPECT_LE(t, 1);
@@ -61,16 +61,17 @@ TEST(ShutterCurve, RefusesWhatClosesBeforeItIsOpen) {
 }
 
 TEST(ShutterCurve, FadesTheStreakOfAMovingStrip) {
-  constexpr double kWidth = 4, kTravel = 24;
+  constexpr double strip_width = 4, travel = 24;
   for (const auto& [opening, closing] : {std::pair(0.5, 0.5), {0.1, 0.6}}) {
-    Strip strip(kWidth, kTravel);
+    Strip strip(strip_width, travel);
     strip.shot.camera.shutter_opening = opening;
     strip.shot.camera.shutter_closing = closing;
     const std::vector<double> dark =
         darkness_of_columns(render_frame(strip.shot, 1001, strip.geometry));
     // It covers x while its middle, at (t - 1/2) travel, is within half a width of it.
     const auto coverage = [&](double x) {
-      const double from = (x - kWidth / 2) / kTravel + 0.5, to = (x + kWidth / 2) / kTravel + 0.5;
+      const double from = (x - strip_width / 2) / travel + 0.5,
+                   to = (x + strip_width / 2) / travel + 0.5;
       return come_by(to, opening, closing) - come_by(from, opening, closing);
     };
     const PixelFilter filter;
@@ -82,28 +83,28 @@ TEST(ShutterCurve, FadesTheStreakOfAMovingStrip) {
       EXPECT_NEAR(dark[column], expected, 0.01) << column;
       sum += dark[column];
     }
-    EXPECT_NEAR(sum, kWidth, 0.01 * kWidth);
+    EXPECT_NEAR(sum, strip_width, 0.01 * strip_width);
   }
 }
 
 /// Green of each pixel and what it varies by, from pictures of several seeds.
 struct Spread {
-  static constexpr int kPictures = 16;
+  static constexpr int pictures = 16;
   std::vector<double> mean, variance;  // of the mean
 
   /// @param picture  Film(seed)
   template <class Picture>
   explicit Spread(const Picture& picture) {
-    for (uint32_t seed = 0; seed < kPictures; ++seed) {
+    for (uint32_t seed = 0; seed < pictures; ++seed) {
       const Film film = picture(seed);
       mean.resize(film.rgba.size() / 4), variance.resize(mean.size());
       for (size_t p = 0; p < mean.size(); ++p) {
         const double v = film.rgba[4 * p + 1];
-        mean[p] += v / kPictures, variance[p] += v * v / kPictures;
+        mean[p] += v / pictures, variance[p] += v * v / pictures;
       }
     }
     for (size_t p = 0; p < mean.size(); ++p)
-      variance[p] = (variance[p] - mean[p] * mean[p]) / (kPictures - 1);
+      variance[p] = (variance[p] - mean[p] * mean[p]) / (pictures - 1);
   }
 };
 
@@ -155,16 +156,16 @@ struct Deforming {
     return out;
   }
   Film mean_of_stills(uint32_t seed) const {
-    constexpr int kStills = 64;
+    constexpr int still_count = 64;
     Shot seen = shot;
     seen.render.motion_blur = false;
     seen.render.samples = 4;
     Film sum{seen.render.width, seen.render.height, {}};
-    for (int k = 0; k < kStills; ++k) {
-      seen.render.seed = 1000 + seed * kStills + uint32_t(k);
-      const Film film = render_frame(seen, 1001, still((k + 0.5) / kStills));
+    for (int k = 0; k < still_count; ++k) {
+      seen.render.seed = 1000 + seed * still_count + uint32_t(k);
+      const Film film = render_frame(seen, 1001, still((k + 0.5) / still_count));
       sum.rgba.resize(film.rgba.size());
-      for (size_t p = 0; p < film.rgba.size(); ++p) sum.rgba[p] += film.rgba[p] / kStills;
+      for (size_t p = 0; p < film.rgba.size(); ++p) sum.rgba[p] += film.rgba[p] / still_count;
     }
     return sum;
   }
@@ -190,18 +191,18 @@ TEST(VelocityBlur, OfWhatDeformsIsTheMeanOfStillsBetweenItsTwoShapes) {
 }
 
 TEST(RollingShutter, SlantsAMovingStripByItsLatenessAndBlursItNoMore) {
-  constexpr double kWidth = 4, kTravel = 8, kLate = 1.5;
-  Strip strip(kWidth, kTravel);
-  strip.shot.camera.rolling_shutter = kLate;
+  constexpr double strip_width = 4, travel = 8, late = 1.5;
+  Strip strip(strip_width, travel);
+  strip.shot.camera.rolling_shutter = late;
   const Film film = render_frame(strip.shot, 1001, strip.geometry);
   const PixelFilter filter;
   double filter_square = 0;
   for (int q = 0; q < 4096; ++q)
     filter_square += std::pow(filter.offset({(q + 0.5f) / 4096, 0.5f}).x, 2) / 4096;
   // Slant within a row's filter, uniform strip and uniform travel: their variances add.
-  const double slope = kLate * kTravel / 16;
+  const double slope = late * travel / 16;
   const double variance =
-      (kWidth * kWidth + kTravel * kTravel) / 12 + (1 + slope * slope) * filter_square;
+      (strip_width * strip_width + travel * travel) / 12 + (1 + slope * slope) * filter_square;
   for (int y = 2; y < 14; ++y) {  // rows whose filter does not reach beyond the film
     double sum = 0, moment = 0, square = 0;
     for (int x = 0; x < 64; ++x) {
@@ -209,7 +210,7 @@ TEST(RollingShutter, SlantsAMovingStripByItsLatenessAndBlursItNoMore) {
       sum += dark, moment += dark * at, square += dark * at * at;
     }
     const double middle = moment / sum;
-    EXPECT_NEAR(sum, kWidth, 0.02 * kWidth) << y;
+    EXPECT_NEAR(sum, strip_width, 0.02 * strip_width) << y;
     EXPECT_NEAR(middle, slope * (y + 0.5), 0.15) << y;
     EXPECT_NEAR(square / sum - middle * middle, variance, 0.06 * variance) << y;
   }
@@ -219,7 +220,7 @@ TEST(RollingShutter, KeepsTheFirstRowOnTimeForAMovingCameraToo) {
   // A pan seen by rows: the camera that moves left is the strip that moves right.
   Strip strip(4, 8), still(4, 0);
   still.shot.camera.rolling_shutter = strip.shot.camera.rolling_shutter = 1;
-  const double reach = 8 * Strip::kPixel / 2;
+  const double reach = 8 * Strip::pixel / 2;
   for (Animated<V3d>* key : {&still.shot.camera.position, &still.shot.camera.target}) {
     const V3d middle = key->keys.front().second;
     key->keys = {{1000.75, middle + V3d(reach, 0, 0)}, {1001.75, middle - V3d(3 * reach, 0, 0)}};
@@ -235,4 +236,4 @@ TEST(RollingShutter, KeepsTheFirstRowOnTimeForAMovingCameraToo) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

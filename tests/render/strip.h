@@ -5,7 +5,7 @@
 
 #include "tests/render/support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
 /// Mean darkness of every column of a film of a black thing before a sky of radiance 1.
 inline std::vector<double> darkness_of_columns(const Film& film) {
@@ -20,7 +20,7 @@ inline std::vector<double> darkness_of_columns(const Film& film) {
 struct Strip {
   Shot shot = plain_shot(256);
   FrameGeometry geometry;
-  static constexpr double kPixel = 0.02;  // m: 64 pixels over 1.28 m at distance 1
+  static constexpr double pixel = 0.02;  // m: 64 pixels over 1.28 m at distance 1
 
   Strip(double width, double travel) {
     shot.render.width = 64;
@@ -28,17 +28,17 @@ struct Strip {
     shot.render.motion_blur = true;
     shot.camera.position = V3d(0, 0, 1);
     shot.camera.target = V3d(0, 0, 0);
-    shot.camera.fov_deg = 2 * std::atan(0.64) * 180 / kPi64;
+    shot.camera.fov_deg = 2 * std::atan(0.64) * 180 / pi64;
     shot.light = {sky(1)};
     shot.material = {diffuse("cotton", 0)};
     TriangleMesh mesh;
-    const float half = float(width * kPixel / 2);
+    const float half = float(width * pixel / 2);
     mesh.position = {{-half, -0.2f, 0}, {half, -0.2f, 0}, {half, 0.2f, 0}, {-half, 0.2f, 0}};
     mesh.triangle = {{0, 1, 2}, {0, 2, 3}};
     const double shutter = (shot.camera.shutter_close - shot.camera.shutter_open) / 24;  // s
-    mesh.velocity.assign(4, V3f(float(travel * kPixel / shutter), 0, 0));
+    mesh.velocity.assign(4, V3f(float(travel * pixel / shutter), 0, 0));
     geometry.cloth = {{"cloth", mesh}};
   }
 };
 
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -11,10 +11,11 @@
 
 #include "pipeline/contract/error.h"
 #include "render/options.h"
+#include "render/renderer.h"
 
-namespace drench::test {
+namespace drench::render::test {
 
-inline constexpr double kPi64 = std::numbers::pi;
+inline constexpr double pi64 = std::numbers::pi;
 
 /// A shot that renders nothing yet: 16 x 16 pixels, no ground, no light, no blur, no photons, which
 /// err in all pixels together.
@@ -232,13 +233,13 @@ inline void expect_photons_as_paths(Shot shot, const FrameGeometry& geometry) {
   const Mean paths = mean_over_seeds(shot, geometry, {}, 16);
   EXPECT_LT(paths.error, 0.01 * paths.value);
   shot.render.photons = 6;
-  for (const Walks walks : {Walks::none, Walks::some}) {
+  for (const ManifoldWalks walks : {ManifoldWalks::none, ManifoldWalks::some}) {
     RenderOptions options;
     options.walks = walks;
     const Mean photons = mean_over_seeds(shot, geometry, options, 16);
     EXPECT_NEAR(photons.value, paths.value,
                 4 * std::hypot(photons.error, paths.error) + 0.005 * paths.value)
-        << (walks == Walks::some ? "with walks" : "without");
+        << (walks == ManifoldWalks::some ? "with walks" : "without");
   }
 }
 
@@ -258,4 +259,4 @@ inline void expect_estimators_agree(const Shot& shot, const FrameGeometry& geome
   EXPECT_NEAR(bsdf.value, mis.value, 4 * std::hypot(bsdf.error, mis.error));
 }
 
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -6,7 +6,7 @@
 
 #include "tests/render/picture_support.h"
 
-namespace drench::test {
+namespace drench::render::test {
 namespace {
 
 /// One picture of a file, samples as numbers by pixel and channel.
@@ -261,7 +261,7 @@ TEST_F(Tiff, WhatIsLeftOutIsAWarning) {
 
 TEST_F(Tiff, ProfileIsHonoured) {
   TiffOfTest tiff;
-  tiff.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+  tiff.icc = IccOfTest(srgb_colorants, IccOfTest::gamma(1)).bytes();
   const Texture texture = read(tiff);
   for (int x = 0; x < tiff.width; ++x)
     EXPECT_NEAR(rec709_of(texture.texel(size_t(x))).x, tiff.sample(x, 0, 0) / 255, 1e-3);
@@ -273,9 +273,9 @@ TEST_F(Tiff, ProfileOfFloatsIsHonouredIfItIsLinear) {
     TiffOfTest tiff{.bits = bits, .format = SAMPLEFORMAT_IEEEFP};
     const Texture plain = read(tiff);
     const ColorMatrix matrix = color_conversion(display_p3(), acescg_chromaticities());
-    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(1)).bytes();
+    tiff.icc = IccOfTest(p3_colorants, IccOfTest::gamma(1)).bytes();
     const Texture linear = read(tiff);
-    tiff.icc = IccOfTest(kP3Colorants, IccOfTest::gamma(2.2)).bytes();
+    tiff.icc = IccOfTest(p3_colorants, IccOfTest::gamma(2.2)).bytes();
     std::string said;
     const Texture curved = read(tiff, &said);
     EXPECT_TRUE(tells(said, {"ICC profile 'of the test'", "linear sRGB"}));
@@ -320,7 +320,7 @@ TEST_F(Tiff, TransferFunctionIsNamed) {
 TEST_F(Tiff, NormalsAreNotConverted) {
   for (const int bits : {8, 16}) {
     TiffOfTest tiff{.bits = bits};
-    tiff.icc = IccOfTest(kSrgbColorants, IccOfTest::gamma(1)).bytes();
+    tiff.icc = IccOfTest(srgb_colorants, IccOfTest::gamma(1)).bytes();
     const auto path = next();
     tiff.write(path);
     const Texture normals = read_normal_map(path);
@@ -447,4 +447,4 @@ TEST_F(Tiff, WhatIsCutOffIsRefused) {
 }
 
 }  // namespace
-}  // namespace drench::test
+}  // namespace drench::render::test

@@ -261,7 +261,7 @@ TEST_P(FastBall, DoesNotPassAFreeSheet) {
 }
 
 // What sheet and water lose obstacles get. Later, between the ball and the sheet that it has
-// wrapped itself into, squeezed particles give velocity up, as PathTest::bounce says.
+// wrapped itself into, squeezed particles give velocity up, as ContinuousCollision::bounce says.
 TEST(ClothOnObstacles, MomentumIsKept) {
   Shot shot = empty_shot();
   shot.fluid.solver = FluidSolver::incompressible;

@@ -74,7 +74,7 @@ Shot block_over_sheet(V3d velocity) {
 Shot jet_at_sheet(V3d velocity, int substeps) {
   Shot shot = block_over_sheet(velocity);
   if (substeps == 1) return shot;
-  const Stepper run(shot);
+  Stepper run(shot);
   const double wanted_limit = run.stable_dt() / (substeps - 0.4);
   const double ratio = run.scene.parameters.cloth_dt_limit / wanted_limit;
   shot.cloth[0].adjacent_stiffness *= ratio * ratio;
@@ -83,7 +83,7 @@ Shot jet_at_sheet(V3d velocity, int substeps) {
 }
 
 /// Stable steps of at most `substeps` cloth steps, every path counted: none may cross.
-/// @return particles that the path test held back.
+/// @return particles that the collision test held back.
 uint64_t expect_no_crossing(const Shot& shot, int steps, int substeps, int least_near_steps) {
   Stepper run(shot);
   PathCount count(run);

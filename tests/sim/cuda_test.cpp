@@ -15,6 +15,7 @@
 
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
+#include "sim/stepper.h"
 
 namespace drench {
 namespace {
@@ -109,20 +110,15 @@ const Situation situations[] = {
 };
 void PrintTo(const Situation& s, std::ostream* out) { *out << s.name; }
 
-void advance(sim::Scene scene, sim::Solver& solver, int steps) {
+std::unique_ptr<sim::Solver> advance(const sim::Scene& scene, std::unique_ptr<sim::Solver> solver,
+                                     int steps) {
+  sim::Stepper run(scene, std::move(solver));
   const double dt = step_of(scene.parameters);
-  const int substeps = std::max(1, int(std::ceil(dt / scene.parameters.cloth_dt_limit)));
-  solver.load(scene.start);
-  for (int s = 0; s < steps; ++s) {
-    scene.obstacles.place(solver, s * dt, (s + 1) * dt);
-    scene.sinks.place(solver, s * dt, (s + 1) * dt);
-    if (scene.parameters.air_density > 0) solver.blow(scene.wind.at((s + 1) * dt));
-    solver.step(dt, substeps);
-  }
+  for (int s = 0; s < steps; ++s) run.step(dt);
+  return std::move(run.solver);
 }
 sim::HostState after(const sim::Scene& scene, std::unique_ptr<sim::Solver> solver, int steps) {
-  advance(scene, *solver, steps);
-  return solver->save();
+  return advance(scene, std::move(solver), steps)->save();
 }
 sim::HostState on_cpu(const sim::Scene& scene, int steps) {
   return after(scene, sim::cpu::make_solver(scene.parameters, scene.cloth), steps);
@@ -213,7 +209,7 @@ std::vector<double> probed(const sim::Scene& scene, std::unique_ptr<sim::Solver>
   queries[3].kind = sim::ProbeKind::energy;
   queries[4].kind = sim::ProbeKind::volume;
   queries[5].kind = sim::ProbeKind::cloth_force, queries[5].end = scene.cloth.vertices();
-  advance(scene, *solver, 10);
+  solver = advance(scene, std::move(solver), 10);
   std::vector<double> all;
   for (const auto& answer : solver->probe(queries))
     all.insert(all.end(), answer.begin(), answer.end());

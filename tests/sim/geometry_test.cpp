@@ -173,7 +173,7 @@ TEST(FreeEdge, TheSheetItselfDoesPush) {
 // A triangle rises 1 mm in the first substep and springs back to 0.5 mm in the second, while a
 // particle that followed it at 0.8 mm goes on: the boxes are those of the step's start, 0.8 mm
 // below.
-TEST(PathTest, FindsATriangleThatSpringsBackWithinTheStep) {
+TEST(ContinuousCollision, FindsATriangleThatSpringsBackWithinTheStep) {
   sim::cpu::State state;
   state.parameters.spacing = 0.01f, state.parameters.support_radius = 0.02f;
   state.parameters.particle_mass = 1e-3f;
@@ -190,11 +190,11 @@ TEST(PathTest, FindsATriangleThatSpringsBackWithinTheStep) {
   };
   put(c.position, 0), put(c.start, 0), put(c.next, 1e-3f);
   sim::cpu::build_polygon_grid(state, state.parameters.support_radius);
-  const float moved = path_test_of(state, 0).cloth_moved;
+  const float moved = continuous_collision_of(state, 0).cloth_moved;
   EXPECT_NEAR(moved, 1e-3f, 1e-9f);
   put(c.position, 1e-3f), put(c.next, 5e-4f);
   const F3 from{0.005f, 0.005f, 0.8e-3f}, to{0.005f, 0.005f, 1.65e-3f};
-  const auto hit = path_test_of(state, moved).first_hit(from, to);
+  const auto hit = continuous_collision_of(state, moved).first_hit(from, to);
   EXPECT_EQ(hit.triangle, 0);
   EXPECT_NEAR(hit.time, 0.2 / 1.35, 1e-5);  // 0.8 + 0.85 t = 1 - 0.5 t
 }

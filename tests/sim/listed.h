@@ -1,6 +1,7 @@
 #pragma once
 // An incompressible fluid with its neighbour lists, open to tests of rows.
 
+#include "sim/columns.h"
 #include "sim/neighbours/sort_particles.h"
 #include "sim/passes/pressure/incompressible.h"
 #include "tests/sim/support.h"
@@ -37,16 +38,17 @@ struct Listed {
     state.parameters = sim::build_scene(shot).parameters;
     sim::cpu::FluidState& f = state.fluid;
     f.count = count;
-    f.position.resize(count), f.velocity.resize(count), state.swap_float.resize(count);
-    for (sim::cpu::Column<int>* c : {&f.id, &f.cell, &f.order}) c->resize(count);
-    for (sim::cpu::Column<float>* c : {&f.density, &f.pressure_term}) c->resize(count);
+    using enum sim::ColumnGroup;
+    sim::cpu::resize_particles(
+        state,
+        position | velocity | cells | density | pressure | lists | projection | solve | scratch,
+        size_t(count));
     const sim::cpu::VecView x = f.position.view();
     for (int i = 0; i < count; ++i) {
       const V3d& p = places[size_t(i)];
       x.set(i, {float(p.x), float(p.y), float(p.z)});
     }
     sim::cpu::PressureState& s = state.pressure;
-    s.resize(count);
     sim::cpu::sort_particles(state);
     sim::cpu::find_neighbours(state);
     s.control.data()->done = 0;

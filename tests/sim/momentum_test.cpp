@@ -57,9 +57,9 @@ TEST_P(Momentum, OfFluidAndClothIsKeptInASplash) {
   EXPECT_GT(drift.cloth, 3e-3);
 }
 
-// A heavy sheet stops a fast block, where the path test acts as well: its impulses must balance
+// A heavy sheet stops a fast block, where the collision test acts as well: its impulses must balance
 // too.
-TEST_P(Momentum, IsKeptWhereThePathTestActs) {
+TEST_P(Momentum, IsKeptWhereCollisionsAct) {
   const Drift drift = drift_of(V3d(0, -10, 0), 20, GetParam());
   EXPECT_LT(drift.worst, 1e-5);
   if (GetParam() == FluidSolver::weakly_compressible) {
@@ -67,7 +67,7 @@ TEST_P(Momentum, IsKeptWhereThePathTestActs) {
   }
 }
 
-// Sheets six times as heavy as the water between them close on it until the path test stops them,
+// Sheets six times as heavy as the water between them close on it until the collision test stops them,
 // too: 0.08 kg of vertex by 0.008 kg of particle. Nothing is faster than twice an even outflow from
 // a disc, speed R / (2 gap), when 30 mm are left.
 TEST(HeavySheets, KeepMomentumWhereParticlesStopThem) {

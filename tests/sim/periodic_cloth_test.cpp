@@ -256,7 +256,7 @@ int crossings(Stepper& run, const V3d& period, int steps, double dt) {
 TEST(JoinedSheet, NothingCrossesAtTheSeam) {
   struct Case {
     V3d velocity;
-    double stiffness;  // N/m; soft cotton gives way until the path test has to act
+    double stiffness;  // N/m; soft cotton gives way until the collision test has to act
     int steps;
   };
   for (const auto& [velocity, stiffness, steps] :

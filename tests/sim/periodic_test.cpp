@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "pipeline/contract/files/files.h"
+#include "sim/columns.h"
 #include "sim/passes/pressure/incompressible.h"
 #include "sim/passes/pressure/measure_density.h"
 #include "sim/simulator.h"
@@ -159,7 +160,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   const auto solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
   solver->load(scene.start);
   solver->refresh();  // density by cells
-  const std::vector<float> density = solver->density();
+  const std::vector<float> expected = solver->density();
   const double h = scene.parameters.support_radius;
   const sim::cpu::ImageWalls walls = sim::cpu::image_walls_of(scene.parameters);
 
@@ -167,11 +168,12 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   state.parameters = scene.parameters;
   sim::cpu::FluidState& f = state.fluid;
   const int n = f.count = int(scene.start.id.size());
-  f.position.resize(n), f.velocity.resize(n), state.swap_float.resize(n);
-  for (auto* c : {&f.id, &f.cell, &f.order}) c->resize(size_t(n));
-  for (auto* c : {&f.density, &f.pressure_term}) c->resize(size_t(n));
+  using enum sim::ColumnGroup;
+  sim::cpu::resize_particles(
+      state,
+      position | velocity | cells | density | pressure | lists | projection | solve | scratch,
+      size_t(n));
   sim::cpu::PressureState& s = state.pressure;
-  s.resize(size_t(n));
   for (int i = 0; i < n; ++i) {
     const V3d p = at(scene.start.position, size_t(i));
     f.position.view().set(i, {float(p.x), float(p.y), float(p.z)}), f.id.data()[i] = i;
@@ -184,7 +186,8 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   const auto place = [&](int i) { return at(scene.start.position, size_t(f.id.data()[i])); };
   Random random(3);
   for (int i = 0; i < n; ++i)
-    s.scratch_a.data()[i] = {float(random() - 0.5), float(random() - 0.5), float(random() - 0.5), 0.f};
+    s.scratch_a.data()[i] = {float(random() - 0.5), float(random() - 0.5), float(random() - 0.5),
+                             0.f};
   sim::cpu::density_rate(state);
   for (int i = 0; i < n; ++i) {
     std::vector<int> found, expected;
@@ -211,7 +214,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
         scene.parameters.particle_mass / scene.parameters.lattice_sum / (h * h * h);
     const double rho = scale * sum + 1000 * wall.value;
     EXPECT_NEAR(f.density.data()[i], rho, 1e-4 * rho);
-    EXPECT_NEAR(density[size_t(f.id.data()[i])], rho, 1e-4 * rho) << "measured";
+    EXPECT_NEAR(expected[size_t(f.id.data()[i])], rho, 1e-4 * rho) << "measured";
     rate *= scale / (h * h);
     rate += 1000 * V3d(wall.gradient.x, wall.gradient.y, wall.gradient.z).dot(vector(i));
     EXPECT_NEAR(s.product.data()[i], rate, 5);  // of a few 10^4 kg/(m^3 s)

@@ -23,7 +23,7 @@ INSTANTIATE_TEST_SUITE_P(All, SkipTerm, testing::ValuesIn(skip_terms().begin(), 
 
 struct Found {
   Names pass, group;
-  unsigned allocated = 0;
+  sim::ColumnSet allocated;
 };
 /// The plan of a shot and the columns that it has after some steps.
 Found found_in(const Shot& shot) {

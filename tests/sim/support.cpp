@@ -1,7 +1,6 @@
 #include "tests/sim/support.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -46,32 +45,19 @@ void pin_edges(Cloth& sheet) {
 Stepper::Stepper(const Shot& shot, const LevelSetMaker& make_level_set)
     : Stepper(sim::build_scene(shot, make_level_set)) {}
 
-Stepper::Stepper(sim::Scene scene_) : scene(std::move(scene_)) {
-  solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
-  solver->load(scene.start);
-  scene.obstacles.place(*solver, 0, 0);
-  scene.sinks.place(*solver, 0, 0);
-  limits = solver->measure();
+namespace {
+
+sim::Stepper on_cpu(sim::Scene scene) {
+  std::unique_ptr<sim::Solver> solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
+  return {std::move(scene), std::move(solver)};
 }
 
-double Stepper::stable_dt() const { return sim::stable_step(scene.parameters, limits).dt; }
-double Stepper::next_dt() { return scene.obstacles.limit(time, stable_dt()); }
+}  // namespace
 
-void Stepper::step(double dt) {
-  const double parts = std::ceil(dt / scene.parameters.cloth_dt_limit - 1e-6);
-  scene.obstacles.place(*solver, time, time + dt);
-  scene.sinks.place(*solver, time, time + dt);
-  if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(time + dt));
-  if (scene.motion.moves()) solver->drive(scene.motion.over(time, time + dt));
-  limits = solver->step(dt, scene.cloth.vertices() > 0 ? std::max(1, int(parts)) : 1);
-  time += dt, ++steps;
-}
+Stepper::Stepper(sim::Scene scene) : sim::Stepper(on_cpu(std::move(scene))) {}
 
 void Stepper::advance(double end) {
-  while (time < end - 1e-12) {
-    const double rest = scene.obstacles.stop(time, end) - time;
-    step(rest / std::ceil(rest / next_dt() - 1e-9));
-  }
+  while (time < end) step_towards(end, next_dt());
 }
 
 V3d at(const sim::HostVec& v, size_t i) { return V3d(v.x[i], v.y[i], v.z[i]); }

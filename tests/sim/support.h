@@ -5,13 +5,13 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "pipeline/contract/shot/shot.h"
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
+#include "sim/stepper.h"
 
 namespace drench::sim_tests {
 
@@ -25,22 +25,15 @@ Cloth& add_sheet(Shot& shot, double size, double height, int cells);
 /// Pins all four edges of a sheet added by add_sheet.
 void pin_edges(Cloth& sheet);
 
-/// A solver on the CPU, stepped as the Simulator does it but with every state open to the test.
-struct Stepper {
-  sim::Scene scene;
-  std::unique_ptr<sim::Solver> solver;
-  sim::Limits limits;
-  double time = 0;  // s
-  int steps = 0;
-
+/// The Simulator's steps, on the CPU.
+struct Stepper : sim::Stepper {
   explicit Stepper(const Shot& shot, const LevelSetMaker& make_level_set = {});
   explicit Stepper(sim::Scene scene);
   /// The largest stable step, s.
-  double stable_dt() const;
+  double stable_dt() { return stable_limit().dt; }
   /// The same with obstacles moving.
-  double next_dt();
-  /// One step of dt seconds; cloth is sub-stepped as its own limit asks.
-  void step(double dt);
+  double next_dt() { return limit().dt; }
+  using sim::Stepper::step;
   void step() { step(next_dt()); }
   /// Steps of the largest stable size until `end` s.
   void advance(double end);
@@ -52,7 +45,7 @@ double energy_across(const sim::HostVec& velocity);
 /// Index of every id in the columns of a state.
 std::vector<int> place_of_id(const sim::HostState& state);
 
-/// Momentum of fluid and cloth, kg m/s. What the path test took from particles and cloth has not
+/// Momentum of fluid and cloth, kg m/s. What the collision test took from particles and cloth has not
 /// received yet counts as taken from the cloth.
 V3d total_momentum(const sim::Scene& scene, const sim::HostState& state);
 /// Sum of m max(speed, least_speed) over particles and free vertices, kg m/s.

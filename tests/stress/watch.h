@@ -27,7 +27,7 @@ struct Figures {
   double drift = 0;   // of the momentum, over sum m max(speed, sqrt(gH)); 0 unless it is closed
   int crossings = 0;  // pairs of particle and triangle in all substeps
   int capped = 0;     // steps whose pressure solve took all the iterations there are
-  uint64_t guard_hits = 0;  // particles that the path test held back
+  uint64_t guard_hits = 0;  // particles that the collision test held back
   bool finite = true;       // and no blow-up that the solver would report
   bool whole = true;        // no particle lost or doubled
 };

@@ -85,7 +85,7 @@ TEST(ThinWater, IsAsThickAsTheColourSays) {
       line += spline(stretch * std::abs(i) / support);
     }
     const double scale = 8 / (pi * std::pow(support, 3));
-    EXPECT_NEAR(sheet_thickness(float(plane * scale), support) * stretch * stretch, 1, 0.03);
+    EXPECT_NEAR(film_thickness(float(plane * scale), support) * stretch * stretch, 1, 0.03);
     EXPECT_NEAR(pi * std::pow(thread_radius(float(line * scale), support), 2) * stretch, 1, 0.03);
   }
 }
@@ -98,7 +98,7 @@ TEST(ThinWater, HasTheIsoValueAndTheInflectionAtItsSurface) {
     for (const double voxel : {0.1, 0.25, 0.5, 1.0})
       for (const double thickness : {0.3, 0.6, 1.0}) {
         const ColourKernel kernel(float(support), float(voxel), 0.45f);
-        const Squeeze sheet = squeeze_sheet(float(thickness), float(voxel), kernel);
+        const Squeeze sheet = squeeze_film(float(thickness), float(voxel), kernel);
         const auto plane = [&](double z) {
           return sheet.weight * thickness * 8 / pi * over_plane(z / sheet.half_axis) /
                  sheet.half_axis;
@@ -127,26 +127,26 @@ TEST(ThinWater, HasTheIsoValueAndTheInflectionAtItsSurface) {
 // Variances of evenly filled shapes about their mean, weighted by 1 - q^2, in closed form.
 TEST(ThinWater, IsToldFromBodies) {
   const Thinness plane = thinness(V3f(1 / 6.f, 1 / 6.f, 0), 5);
-  EXPECT_EQ(plane.sheet, 1);
+  EXPECT_EQ(plane.film, 1);
   EXPECT_EQ(plane.thread, 0);  // a disc
   const Thinness line = thinness(V3f(0.2f, 0, 0), 3);
-  EXPECT_EQ(line.sheet, 0);
+  EXPECT_EQ(line.film, 0);
   EXPECT_EQ(line.thread, 1);
   for (const float count : {10.f, 30.f}) {  // body, and at its surface
     const Thinness inside = thinness(V3f(1 / 7.f), count);
-    EXPECT_EQ(inside.sheet + inside.thread, 0);
+    EXPECT_EQ(inside.film + inside.thread, 0);
   }
   // Half a ball: along its axis 1/7 - m^2, m = (1/6) / (8/15), from the integrals of z (1 - z^2)^2.
   const float m = 15 / 48.f;
   const Thinness surface = thinness(V3f(1 / 7.f, 1 / 7.f, 1 / 7.f - m * m), 15);
-  EXPECT_EQ(surface.sheet + surface.thread, 0);
+  EXPECT_EQ(surface.film + surface.thread, 0);
   // The rim of a sheet, half a disc: 1/6 - m^2, m = (4/15) / (pi/4), is sheet still.
   const float rim = 1 / 6.f - float(std::pow(16 / (15 * pi), 2));
-  EXPECT_EQ(thinness(V3f(1 / 6.f, rim, 0), 3.5f).sheet, 1);
+  EXPECT_EQ(thinness(V3f(1 / 6.f, rim, 0), 3.5f).film, 1);
   // A pair a spacing apart at support 2.5: weights 1 and 0.84, places 0 and 0.4.
   const float second = 0.84f / 1.84f;
   const Thinness pair = thinness(V3f(0.16f * second * (1 - second), 0, 0), 1.84f);
-  EXPECT_EQ(pair.sheet + pair.thread, 0);
+  EXPECT_EQ(pair.film + pair.thread, 0);
   EXPECT_EQ(thinness(V3f(0), 1).thread, 0);  // a drop
 }
 
@@ -173,7 +173,7 @@ TEST(ThinWater, HasTheFieldThatItsEllipsoidsSumTo) {
   const Prepared p(frame);
   ASSERT_GT(p.binned.ellipsoids.shape.size(), 130u);
   const ColourField field =
-      evaluate_field(p.binned, p.kernel, p.interior, Sheets{}, InteriorBlocks::evaluate, 1e9);
+      evaluate_field(p.binned, p.kernel, p.interior, ClothSolids{}, InteriorBlocks::evaluate, 1e9);
   for (size_t b = 0; b < field.block.size(); ++b)
     for (int k = 0; k < block_size; k += 7) {
       const V3d point(field.block[b].block * block_edge + V3i(k % 8, k / 8 % 8, k / 64));
@@ -200,8 +200,8 @@ TEST(ThinWater, IsSqueezedAcrossItsSheet) {
   double colour = 0;
   for (int i = -3; i <= 3; ++i)
     for (int k = -3; k <= 3; ++k) colour += spline(1.2 * std::hypot(i, k) / 2.5);
-  const float thickness = sheet_thickness(float(colour) * p.kernel.scale(), 2.5f);
-  const Squeeze squeeze = squeeze_sheet(thickness, 0.5f, p.kernel);
+  const float thickness = film_thickness(float(colour) * p.kernel.scale(), 2.5f);
+  const Squeeze squeeze = squeeze_film(thickness, 0.5f, p.kernel);
   const float ratio = 2.5f / squeeze.half_axis;
   size_t seen = 0;
   for (uint32_t j = 0; j < p.binned.source.size(); ++j) {

@@ -52,7 +52,7 @@ TEST(ColourField, IsTheSumOverAllParticles) {
     const auto interior = count_interior(binned);
     weigh_particles(binned, kernel, interior, SurfaceKernel::isotropic);
     const ColourField field =
-        evaluate_field(binned, kernel, interior, Sheets{}, InteriorBlocks::evaluate, 1e9);
+        evaluate_field(binned, kernel, interior, ClothSolids{}, InteriorBlocks::evaluate, 1e9);
     ASSERT_GT(field.block.size(), 8u);
     for (size_t b = 0; b < field.block.size(); ++b)
       for (int k = 0; k < block_size; k += 7) {

@@ -117,7 +117,7 @@ TEST(Overlap, DoesNotPullWaterThroughCloth) {
   SurfaceStats stats;
   const std::vector<TriangleMesh> sheet{cloth};
   const TriangleMesh mesh =
-      surface_frame(water, {}, {.sheets = sheet, .obstacles = solid}, InteriorBlocks::skip, &stats);
+      surface_frame(water, {}, {.cloth = sheet, .obstacles = solid}, InteriorBlocks::skip, &stats);
   EXPECT_EQ(defects_of(mesh), Defects{});
   EXPECT_EQ(stats.crossing, 0u);
   EXPECT_EQ(crossings_of(mesh, cloth), 0u);

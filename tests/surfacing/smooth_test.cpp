@@ -96,7 +96,7 @@ TEST(Smoothing, TreatsACavityAsItsDrop) {
 }
 
 /// Of one block, which a sheet comes near without touching the mesh.
-Sheets sheet_beside(LatticeMesh& mesh) {
+ClothSolids sheet_beside(LatticeMesh& mesh) {
   Lattice lattice;
   lattice.voxel = 1;
   const V3f middle = mesh.position[0];
@@ -144,8 +144,8 @@ TEST(Slivers, GoWithoutHolesOrFolds) {
       if (least_facing(mesh, middle) < 0.5f) mesh.position[v] = from;
     }
     const LatticeMesh before = mesh;
-    const Sheets sheets = sheet_beside(mesh);
-    SheetContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
+    const ClothSolids sheets = sheet_beside(mesh);
+    ClothContact contact{std::vector<int8_t>(mesh.position.size(), 0), mesh.position};
     std::vector<V3f> normal = normals_of(mesh, rings);
     const double slivers = surfacing_checks::sliver_share(as_triangle_mesh(mesh), 10);
     EXPECT_GT(slivers, 0.1);
@@ -172,9 +172,9 @@ TEST(Slivers, LeaveTheSmallestPartWhole) {
   mesh.position = {V3f(100, 100, 100), V3f(101, 100, 100), V3f(101, 100.1f, 100),
                    V3f(101, 100, 100.1f)};
   mesh.triangle = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-  const Sheets sheets = sheet_beside(mesh);
+  const ClothSolids sheets = sheet_beside(mesh);
   VertexRings rings = rings_of(mesh);
-  SheetContact contact;
+  ClothContact contact;
   std::vector<V3f> normal = normals_of(mesh, rings);
   EXPECT_GT(surfacing_checks::sliver_share(as_triangle_mesh(mesh), 10), 0.5);
   EXPECT_EQ(remove_slivers(mesh, rings, contact, sheets, normal), 0u);

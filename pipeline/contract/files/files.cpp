@@ -129,7 +129,7 @@ void make_parent(const fs::path& path) {
   if (code) fail_to_write(path.parent_path(), code.value());
 }
 
-/// Brings the file to the disk, reads it again for its digest and puts it in its place.
+/// Brings the file to the disk, reads it again for its digest and gives it its name.
 WrittenFile commit(const Temporary& temporary, const fs::path& path,
                    const std::optional<Digest>& expected) {
   WrittenFile written{.path = path, .size = 0, .digest = {}};

@@ -1,5 +1,5 @@
 #pragma once
-// Files are written whole or not at all: a temporary name beside the place, checked, fsynced,
+// Files are written whole or not at all: a temporary name in the same folder, checked, fsynced,
 // renamed.
 
 #include <cstdint>

@@ -1,19 +1,19 @@
 #include "pipeline/contract/files/foam_file.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files/vdb_archive.h"
-#include "pipeline/contract/geometry/point_grid.h"
+#include "pipeline/contract/files/point_file.h"
 
 namespace drench {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-using VelocityArray = points::TypedAttributeArray<openvdb::Vec3f, points::NullCodec>;
-using KindArray = points::TypedAttributeArray<int8_t, points::NullCodec>;
 
 void check_frame(const fs::path& path, const FoamFrame& frame) {
   const size_t n = frame.position.size();
@@ -35,38 +35,20 @@ void check_frame(const fs::path& path, const FoamFrame& frame) {
   }
 }
 
-points::PointDataGrid::Ptr grid_of(const FoamFrame& frame) {
-  const IndexedPoints made = point_grid(frame.position, frame.spacing);
-  if (!made.grid->tree().empty()) {
-    made.add_column<VelocityArray>("v", converted<openvdb::Vec3f>(frame.velocity));
-    made.add_column<IdArray>("id", converted<int32_t>(frame.id));
-    made.add_column<FloatArray>("age", frame.age);
-    made.add_column<FloatArray>("pscale", frame.radius);
-    made.add_column<KindArray>("kind", converted<int8_t>(frame.kind));
-  }
-  made.grid->setName("foam");
-  made.grid->insertMeta("spacing", openvdb::FloatMetadata(frame.spacing));
-  made.grid->insertMeta("next_id", openvdb::Int64Metadata(int64_t(frame.next_id)));
-  made.grid->insertMeta("count", openvdb::Int64Metadata(int64_t(frame.position.size())));
-  return made.grid;
-}
-
-void append_leaf(const points::PointDataGrid& grid, const Leaf& leaf, FoamFrame& frame) {
-  append_motion(grid, leaf, frame.position, frame.velocity);
-  append_column<int32_t>(leaf, "id", frame.id);
-  append_column<float>(leaf, "age", frame.age);
-  append_column<float>(leaf, "pscale", frame.radius);
-  append_column<int8_t>(leaf, "kind", frame.kind);
-}
-
-FoamFrame frame_of(const openvdb::GridBase::Ptr& base) {
-  const auto grid = openvdb::gridPtrCast<points::PointDataGrid>(base);
-  if (!grid || grid->getName() != "foam") throw std::runtime_error("it holds no foam");
+FoamFrame frame_of(const PointReader& points) {
+  if (!points.holds_points() || points.name() != "foam")
+    throw std::runtime_error("it holds no foam");
   FoamFrame frame;
-  frame.spacing = meta_value<float>(*grid, "spacing");
-  frame.next_id = uint32_t(meta_value<int64_t>(*grid, "next_id"));
-  const size_t count = checked_count(*grid);
-  for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) append_leaf(*grid, *leaf, frame);
+  frame.spacing = points.real("spacing");
+  frame.next_id = uint32_t(points.integer("next_id"));
+  const size_t count = points.count();
+  auto [position, velocity] = points.motion();
+  frame.position = std::move(position);
+  frame.velocity = std::move(velocity);
+  frame.id = points.column<uint32_t>("id");
+  frame.age = points.column<float>("age");
+  frame.radius = points.column<float>("pscale");
+  frame.kind = points.column<FoamKind>("kind");
   for (const size_t rows : {frame.position.size(), frame.id.size(), frame.age.size(),
                             frame.radius.size(), frame.kind.size()})
     if (rows != count) throw std::runtime_error("some particles are missing");
@@ -87,14 +69,22 @@ FoamFrame frame_of(const openvdb::GridBase::Ptr& base) {
 
 WrittenFile write_foam(const fs::path& path, const FoamFrame& frame) {
   check_frame(path, frame);
-  initialize_vdb();
-  return write_file_whole(path, vdb_bytes({grid_of(frame)}));
+  PointWriter points("foam", frame.position, frame.spacing);
+  points.add("v", frame.velocity, Precision::full);
+  points.add("id", frame.id);
+  points.add("age", frame.age, Precision::full);
+  points.add("pscale", frame.radius, Precision::full);
+  points.add("kind", frame.kind);
+  points.set("next_id", int64_t(frame.next_id));
+  return points.write(path);
 }
 
 FoamFrame read_foam(const fs::path& path) {
-  return read_points(path, "a foam cache",
-                     "the run makes it again, and the frames after it if it comes out different",
-                     frame_of);
+  FoamFrame frame;
+  read_point_file(path, "a foam cache",
+                  "the run makes it again, and the frames after it if it comes out different",
+                  [&](const PointReader& points) { frame = frame_of(points); });
+  return frame;
 }
 
 }  // namespace drench

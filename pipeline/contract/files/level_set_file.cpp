@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <openvdb/math/Proximity.h>
-#include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tree/LeafManager.h>
 
 #include <cmath>
@@ -8,6 +7,7 @@
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files/particles_file.h"
 #include "pipeline/contract/files/vdb_archive.h"
+#include "pipeline/contract/geometry/mesh_to_volume.h"
 
 namespace drench {
 
@@ -15,24 +15,6 @@ namespace {
 
 constexpr float band = 3;              // voxels, a side
 constexpr float largest_half = 65504;  // m/s
-const int no_triangle = int(openvdb::util::INVALID_IDX);
-
-/// A TriangleMesh as OpenVDB's converter wants it: in voxels.
-struct VoxelMesh {
-  const TriangleMesh& mesh;
-  double voxel;  // m
-
-  size_t polygonCount() const { return mesh.triangle.size(); }
-  size_t pointCount() const { return mesh.position.size(); }
-  size_t vertexCount(size_t) const { return 3; }
-  openvdb::Vec3d corner(size_t triangle, int k) const {
-    const Imath::V3f& x = mesh.position[mesh.triangle[triangle][k]];
-    return openvdb::Vec3d(x.x, x.y, x.z) / voxel;
-  }
-  void getIndexSpacePoint(size_t triangle, size_t k, openvdb::Vec3d& x) const {
-    x = corner(triangle, int(k));
-  }
-};
 
 void check(const std::filesystem::path& path, const TriangleMesh& mesh, double voxel) {
   if (!(voxel > 0) || mesh.velocity.size() != mesh.position.size())
@@ -101,14 +83,10 @@ openvdb::Vec3SGrid::Ptr velocities(const VoxelMesh& mesh, const openvdb::FloatGr
 WrittenFile write_level_set(const std::filesystem::path& path, const TriangleMesh& mesh,
                             double voxel) {
   check(path, mesh, voxel);
-  initialize_vdb();
   const VoxelMesh in_voxels{mesh, voxel};
-  const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-  openvdb::Int32Grid closest(no_triangle);
-  const auto surface = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-      in_voxels, *transform, band, band, /*flags=*/0, &closest);
+  const auto [surface, closest] = closest_triangles(in_voxels, band);
   surface->setName("surface");
-  return write_file_whole(path, vdb_bytes({surface, velocities(in_voxels, *surface, closest)}));
+  return write_file_whole(path, vdb_bytes({surface, velocities(in_voxels, *surface, *closest)}));
 }
 
 }  // namespace drench

@@ -27,7 +27,7 @@ enum class CornerData { none, uv, uv_and_normal };
 /// @param cut_by  where the vertices are when polygons are cut, m or any unit; as in the file if
 /// empty.
 /// @return velocities are 0 where the file has none; `point` where vertices were split.
-/// @throws Error naming the file, the place in it and the reason.
+/// @throws Error naming the file, the location in it and the reason.
 TriangleMesh read_mesh(const std::filesystem::path& path, CornerData corners = CornerData::none,
                        std::span<const Imath::V3f> cut_by = {});
 

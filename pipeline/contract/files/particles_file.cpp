@@ -1,21 +1,19 @@
 #include "pipeline/contract/files/particles_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files/vdb_archive.h"
-#include "pipeline/contract/geometry/point_grid.h"
+#include "pipeline/contract/files/point_file.h"
 
 namespace drench {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-using VelocityArray = points::TypedAttributeArray<openvdb::Vec3f, points::TruncateCodec>;
-using HalfArray = points::TypedAttributeArray<float, points::TruncateCodec>;
-using SourceArray = IdArray;  // one number in a block is kept once
 
 constexpr float largest_half = 65504;
 
@@ -62,38 +60,10 @@ void check_frame(const fs::path& path, const ParticleFrame& frame) {
   }
 }
 
-void add_real(const IndexedPoints& made, const char* name, const std::vector<float>& column) {
-  if (column.empty()) return;
+/// Halves, unless a value is too large for one.
+Precision precision_of(const std::vector<float>& column) {
   const auto [least, most] = std::minmax_element(column.begin(), column.end());
-  if (std::max(-*least, *most) < largest_half) {
-    made.add_column<HalfArray>(name, column);
-  } else {
-    made.add_column<FloatArray>(name, column);
-  }
-}
-
-points::PointDataGrid::Ptr grid_of(const ParticleFrame& frame) {
-  const IndexedPoints made = point_grid(frame.position, frame.spacing);
-  const points::PointDataGrid::Ptr& grid = made.grid;
-  if (!grid->tree().empty()) {
-    made.add_column<VelocityArray>("v", converted<openvdb::Vec3f>(frame.velocity));
-    for (const auto& [name, values] : real_columns) add_real(made, name, frame.*values);
-    if (!frame.id.empty()) made.add_column<IdArray>("id", converted<int32_t>(frame.id));
-    if (!frame.source.empty())
-      made.add_column<SourceArray>("source", converted<int32_t>(frame.source));
-  }
-  grid->setName("particles");
-  grid->insertMeta("spacing", openvdb::FloatMetadata(frame.spacing));
-  grid->insertMeta("rest_density", openvdb::FloatMetadata(frame.rest_density));
-  grid->insertMeta("count", openvdb::Int64Metadata(int64_t(frame.position.size())));
-  return grid;
-}
-
-void append_leaf(const points::PointDataGrid& grid, const Leaf& leaf, ParticleFrame& frame) {
-  append_motion(grid, leaf, frame.position, frame.velocity);
-  for (const auto& [name, values] : real_columns) append_column<float>(leaf, name, frame.*values);
-  append_column<int32_t>(leaf, "id", frame.id);
-  append_column<int32_t>(leaf, "source", frame.source);
+  return std::max(-*least, *most) < largest_half ? Precision::half : Precision::full;
 }
 
 void sort_by_id(ParticleFrame& frame) {
@@ -105,16 +75,18 @@ void sort_by_id(ParticleFrame& frame) {
   reorder(frame.source, order);
 }
 
-ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
-  const auto grid = openvdb::gridPtrCast<points::PointDataGrid>(base);
-  if (!grid) throw std::runtime_error("it holds no particles");
+ParticleFrame frame_of(const PointReader& points) {
+  if (!points.holds_points()) throw std::runtime_error("it holds no particles");
   ParticleFrame frame;
-  frame.spacing = meta_value<float>(*grid, "spacing");
-  frame.rest_density = meta_value<float>(*grid, "rest_density");
-  const size_t count = checked_count(*grid);
-  frame.position.reserve(count);
-  frame.velocity.reserve(count);
-  for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) append_leaf(*grid, *leaf, frame);
+  frame.spacing = points.real("spacing");
+  frame.rest_density = points.real("rest_density");
+  const size_t count = points.count();
+  auto [position, velocity] = points.motion();
+  frame.position = std::move(position);
+  frame.velocity = std::move(velocity);
+  for (const auto& [name, values] : real_columns) frame.*values = points.column<float>(name);
+  frame.id = points.column<uint32_t>("id");
+  frame.source = points.column<uint8_t>("source");
   const auto fits = [&](const auto& column) { return column.empty() || column.size() == count; };
   bool whole = frame.position.size() == count && fits(frame.id) && fits(frame.source);
   for (const auto& [name, values] : real_columns) whole = whole && fits(frame.*values);
@@ -127,12 +99,23 @@ ParticleFrame frame_of(const openvdb::GridBase::Ptr& base) {
 
 WrittenFile write_particles(const fs::path& path, const ParticleFrame& frame) {
   check_frame(path, frame);
-  initialize_vdb();
-  return write_file_whole(path, vdb_bytes({grid_of(frame)}));
+  PointWriter points("particles", frame.position, frame.spacing);
+  points.add("v", frame.velocity, Precision::half);
+  for (const auto& [name, values] : real_columns) {
+    const std::vector<float>& column = frame.*values;
+    if (!column.empty()) points.add(name, column, precision_of(column));
+  }
+  if (!frame.id.empty()) points.add("id", frame.id);
+  if (!frame.source.empty()) points.add("source", frame.source);
+  points.set("rest_density", frame.rest_density);
+  return points.write(path);
 }
 
 ParticleFrame read_particles(const fs::path& path) {
-  return read_points(path, "a particle cache", "the simulation will write it again", frame_of);
+  ParticleFrame frame;
+  read_point_file(path, "a particle cache", "the simulation will write it again",
+                  [&](const PointReader& points) { frame = frame_of(points); });
+  return frame;
 }
 
 }  // namespace drench

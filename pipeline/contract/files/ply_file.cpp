@@ -424,9 +424,9 @@ class PlyReader {
     if (point_.empty() || point_.size() != mesh.position.size()) return;
     for (size_t v = 0; v < point_.size(); ++v) {
       const double point = point_[v];
-      const bool is_same_place = point >= 0 && point < double(point_.size()) &&
+      const bool is_same_point = point >= 0 && point < double(point_.size()) &&
                                  mesh.position[size_t(point)] == mesh.position[v];
-      if (!is_same_place) return mesh.point.clear();  // of a program that means something else
+      if (!is_same_point) return mesh.point.clear();  // of a program that means something else
       mesh.point.push_back(uint32_t(point));
     }
   }

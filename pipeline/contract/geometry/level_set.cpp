@@ -1,7 +1,6 @@
 #include "pipeline/contract/geometry/level_set.h"
 
 #include <fmt/format.h>
-#include <openvdb/tools/MeshToVolume.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -13,8 +12,9 @@
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "pipeline/contract/files/vdb_archive.h"
 #include "pipeline/contract/frames.h"
+#include "pipeline/contract/geometry/bounds.h"
+#include "pipeline/contract/geometry/mesh_to_volume.h"
 #include "pipeline/contract/geometry/shells.h"
 #include "pipeline/contract/geometry/triangle.h"
 
@@ -25,42 +25,10 @@ namespace {
 using Imath::V3d, Imath::V3f;
 using openvdb::FloatGrid;
 
-/// How OpenVDB finds what is inside: by filling from the outside, cavities and pockets included, or
-/// not at all.
-enum class Inside { filled, unknown };
-
-FloatGrid::Ptr narrow_band(const TriangleMesh& mesh, double voxel, double band, Inside inside) {
-  std::vector<openvdb::Vec3s> positions;
-  positions.reserve(mesh.position.size());
-  for (const V3f& x : mesh.position) positions.emplace_back(x.x, x.y, x.z);
-  std::vector<openvdb::Vec3I> triangles;
-  triangles.reserve(mesh.triangle.size());
-  for (const auto& t : mesh.triangle) triangles.emplace_back(t.x, t.y, t.z);
-  initialize_vdb();
-  const auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-  const float width = float(band / voxel) + 1;
-  if (mesh.triangle.empty()) return FloatGrid::create(float(band) + float(voxel));
-  if (inside == Inside::unknown) {
-    return openvdb::tools::meshToUnsignedDistanceField<FloatGrid>(*transform, positions, triangles,
-                                                                  {}, width);
-  }
-  return openvdb::tools::meshToSignedDistanceField<FloatGrid>(*transform, positions, triangles, {},
-                                                              width, width);
-}
-
-struct Box {
-  V3d low{1e300}, high{-1e300};
-};
-
-Box bounds_of(const TriangleMesh& mesh) {
-  Box box;
-  for (const V3f& p : mesh.position) {
-    for (int k = 0; k < 3; ++k) {
-      box.low[k] = std::min(box.low[k], double(p[k]));
-      box.high[k] = std::max(box.high[k], double(p[k]));
-    }
-  }
-  return box;
+Bounds bounds_of(const TriangleMesh& mesh) {
+  Bounds bounds;
+  for (const V3f& p : mesh.position) bounds.add(V3d(p));
+  return bounds;
 }
 
 double blocks_of(const LevelSet& set) {
@@ -82,7 +50,7 @@ void frame_blocks(const openvdb::CoordBBox& box, LevelSet& set) {
 }
 
 /// Voxels of the band around what a mesh has within bounds.
-openvdb::CoordBBox voxels_of(const Box& mesh, const LevelSetBounds& bounds, double voxel,
+openvdb::CoordBBox voxels_of(const Bounds& mesh, const LevelSetBounds& bounds, double voxel,
                              double band) {
   openvdb::Coord low, high;
   for (int k = 0; k < 3; ++k) {
@@ -96,7 +64,7 @@ openvdb::CoordBBox voxels_of(const Box& mesh, const LevelSetBounds& bounds, doub
 }
 
 /// Within this of a triangle distances are exact, voxels. OpenVDB takes the nearest of the
-/// triangles that it has handed from voxel to voxel: up to 0.2 voxels too far on a fine sphere, one
+/// triangles that it passes from voxel to voxel: up to 0.2 voxels too far on a fine sphere, one
 /// below.
 constexpr double refined = 2;
 
@@ -448,7 +416,7 @@ std::vector<V3d> cut(const std::vector<V3d>& polygon, int k, double at, double s
 }
 
 /// What of the triangles lies in a box: no closed mesh, but at the same distances near it.
-Faces part_within(const TriangleMesh& mesh, const Shells& shells, const Box& box) {
+Faces part_within(const TriangleMesh& mesh, const Shells& shells, const Bounds& box) {
   Faces faces;
   TriangleMesh& part = faces.mesh;
   for (size_t source = 0; source < mesh.triangle.size(); ++source) {
@@ -479,9 +447,9 @@ double bytes_of(const TriangleMesh& mesh, double voxel, double total) {
     const V3d a(mesh.position[t.x]), b(mesh.position[t.y]), c(mesh.position[t.z]);
     area += 0.5 * (b - a).cross(c - a).length();
   }
-  constexpr double layers = 3, a_block = 13000, a_triangle = 300, a_place = 32;
+  constexpr double layers = 3, a_block = 13000, a_triangle = 300, a_list = 32;
   const double blocks = layers * area / (LevelSet::side * LevelSet::side * voxel * voxel);
-  return blocks * a_block + double(mesh.triangle.size()) * a_triangle + total * a_place;
+  return blocks * a_block + double(mesh.triangle.size()) * a_triangle + total * a_list;
 }
 
 /// A failing allocation within OpenVDB ends the program, since its trees allocate where they are
@@ -515,8 +483,8 @@ LevelSet make_level_set(const TriangleMesh& mesh, double voxel, double band,
                         const LevelSetBounds& bounds) {
   if (!(voxel > 0) || !(band >= voxel)) throw std::logic_error("make_level_set: voxel or band");
   constexpr double worth_cutting = 256.0 * (1 << 20);
-  const Box whole = bounds_of(mesh);
-  Box reach;
+  const Bounds whole = bounds_of(mesh);
+  Bounds reach;
   bool beyond = false;
   for (int k = 0; k < 3; ++k) {
     beyond |= whole.low[k] < bounds.low[k] || whole.high[k] > bounds.high[k];

@@ -80,7 +80,7 @@ void MeshBuilder::cut(const Polygon& polygon) {
     throw Error(fmt::format(
         "{}: a face of {} corners {}; its first corner is ({:.6g}, {:.6g}, {:.6g}). Cut it into "
         "triangles where it is modelled",
-        place_of_(polygon.number), n,
+        location_of_(polygon.number), n,
         n > most_corners ? fmt::format("is not convex and has more than {}", most_corners)
                          : "crosses itself",
         position[0].x, position[0].y, position[0].z));
@@ -213,7 +213,7 @@ void MeshBuilder::warn() const {
     say(
         fmt::format("{} faces of fewer than three corners were left out, the first at {}; they "
                     "enclose nothing",
-                    short_faces_, place_of_(first_short_face_)));
+                    short_faces_, location_of_(first_short_face_)));
   }
   if (lost_corners_ > 0) {
     say(

@@ -22,11 +22,11 @@ class MeshBuilder {
     uint32_t vertex = none, uv = none, normal = none;
   };
 
-  /// @param place_of  a face's place in the file from its number: "file.obj:12"
+  /// @param location_of  a face's location in the file from its number: "file.obj:12"
   /// @param cut_by  see read_mesh
   MeshBuilder(const std::filesystem::path& path, CornerData wanted,
-              std::span<const Imath::V3f> cut_by, std::function<std::string(uint64_t)> place_of)
-      : path_(path), wanted_(wanted), cut_by_(cut_by), place_of_(std::move(place_of)) {}
+              std::span<const Imath::V3f> cut_by, std::function<std::string(uint64_t)> location_of)
+      : path_(path), wanted_(wanted), cut_by_(cut_by), location_of_(std::move(location_of)) {}
 
   /// Vertex columns, in the file's order; their triangles are left to add_face.
   TriangleMesh mesh;
@@ -62,7 +62,7 @@ class MeshBuilder {
   std::filesystem::path path_;
   CornerData wanted_;
   std::span<const Imath::V3f> cut_by_;
-  std::function<std::string(uint64_t)> place_of_;
+  std::function<std::string(uint64_t)> location_of_;
   std::vector<Polygon> polygon_;
   std::vector<Corner> polygon_corner_;
   std::vector<Corner> corner_;  // three a triangle, unless none are wanted

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <regex>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/geometry/shells.h"
@@ -42,11 +42,13 @@ struct Field {
   int digits = 0;
 };
 Field frame_field(const std::string& name) {
-  static const std::regex field("%(?:0([1-9]))?d");
-  std::smatch match;
-  if (!std::regex_search(name, match, field)) return {};
-  return {size_t(match.position(0)), size_t(match.length(0)),
-          match[1].matched ? std::stoi(match[1]) : 0};
+  for (size_t at = name.find('%'); at != std::string::npos; at = name.find('%', at + 1)) {
+    const std::string_view rest = std::string_view(name).substr(at);
+    if (rest.starts_with("%d")) return {at, 2, 0};
+    if (rest.size() >= 4 && rest[1] == '0' && rest[2] >= '1' && rest[2] <= '9' && rest[3] == 'd')
+      return {at, 4, rest[2] - '0'};
+  }
+  return {};
 }
 
 /// Between two corners of open edges, of the first thousand.
@@ -84,7 +86,7 @@ std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& firs
       "The nearest of their corners are {:.3g} apart, in the file's unit; gaps up to {:.3g} are "
       "closed. It needs an inside: close its holes, merge its vertices by distance, and orient it "
       "in one way",
-      narrowest_gap(mesh, open), weld_share * diagonal_of(mesh));
+      narrowest_gap(mesh, open), weld_fraction * diagonal_of(mesh));
 }
 
 [[noreturn]] void refuse_open(const TriangleMesh& mesh, const std::filesystem::path& file,
@@ -103,7 +105,7 @@ std::string fault_at(const TriangleMesh& mesh, const std::vector<uint32_t>& firs
 
 /// Joins vertices where the surface is open by less than rounding. @throws Error if it stays open.
 void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
-  const Welded welded = weld(mesh, weld_share * diagonal_of(mesh));
+  const Welded welded = weld(mesh, weld_fraction * diagonal_of(mesh));
   const auto open = free_edges(mesh, welded.first);
   if (!open.empty()) refuse_open(mesh, file, welded.first, open);
   size_t moved = 0;
@@ -122,7 +124,7 @@ void close_gaps(TriangleMesh& mesh, const std::filesystem::path& file) {
   }
 }
 
-/// Leaves out triangles of which two corners are at one place: they enclose nothing.
+/// Leaves out triangles of which two corners are at one point: they enclose nothing.
 void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
   const auto& at = mesh.position;
   const size_t dropped = std::erase_if(mesh.triangle, [&](const Triangle& t) {
@@ -136,7 +138,7 @@ void drop_collapsed(TriangleMesh& mesh, const std::filesystem::path& file) {
                                dropped));
 }
 
-/// Leaves out vertices that no triangle has: they are no places of a solid.
+/// Leaves out vertices that no triangle has: they are no points of a solid.
 void drop_unused_vertices(TriangleMesh& mesh, const std::filesystem::path& file) {
   const size_t n = mesh.position.size();
   constexpr auto unused = uint32_t(-1);

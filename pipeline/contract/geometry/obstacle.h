@@ -43,8 +43,8 @@ using SequenceShape = std::vector<V3f>;
 SequenceShape read_sequence_shape(const Shot& shot, const Obstacle& obstacle);
 
 /// A closed mesh in its own coordinates times `scale`, m, turned away from what is solid: see
-/// shells.h. Gaps of less than weld_share of its diagonal are closed, and triangles of which two
-/// corners are at one place left out, with a warning; the latter are kept in a sequence, where they
+/// shells.h. Gaps of less than weld_fraction of its diagonal are closed, and triangles of which two
+/// corners are at one point left out, with a warning; the latter are kept in a sequence, where they
 /// may open in another frame.
 /// @throws Error if the file cannot be read, has no triangles or is not closed.
 TriangleMesh read_closed_mesh(const std::filesystem::path& file, double scale,
@@ -65,7 +65,7 @@ TriangleMesh read_obstacle_mesh(const Shot& shot, const Obstacle& obstacle, int 
 void check_obstacle_meshes(const Shot& shot);
 
 /// @throws Error if two meshes of a sequence differ in more than where their vertices are and which
-/// way their triangles are turned.
+/// side their triangles are turned.
 void check_same_topology(const TriangleMesh& mesh, const TriangleMesh& other,
                          const Obstacle& obstacle);
 

@@ -43,8 +43,8 @@ Triangles fan(size_t n) {
   return triangles;
 }
 
-/// Less than this share of the square of its longest edge, twice the area of a triangle is that of
-/// a sliver: its corners are on a line but for rounding.
+/// Less than this fraction of the square of its longest edge, twice the area of a triangle is that
+/// of a sliver: its corners are on a line but for rounding.
 constexpr double sliver = 1e-5;
 
 bool is_sliver(const V2d& a, const V2d& b, const V2d& c) {
@@ -53,7 +53,7 @@ bool is_sliver(const V2d& a, const V2d& b, const V2d& c) {
 }
 
 /// Turns left or goes on at every corner, and once around in all: no star either. Corners at the
-/// place of the one before do not count.
+/// position of the one before do not count.
 bool is_convex(const std::vector<V2d>& p) {
   const size_t n = p.size();
   size_t last = n - 1;
@@ -114,12 +114,12 @@ class EarCutter {
     uint32_t at = 0;
     for (uint32_t k = 0; k < p_.size() && left > 3; ++k) {
       if (p_[k] != p_[next_[k]]) continue;
-      at = clip(k), --left;  // two corners at one place
+      at = clip(k), --left;  // two corners at one point
     }
     for (; left > 3; --left) {
       const std::optional<uint32_t> ear = find_ear(at, left);
       if (!ear) return {};
-      at = next_[clip(*ear)];  // not the same corner again: slivers would share it
+      at = next_[clip(*ear)];  // not the same corner again: slivers would have it in common
     }
     triangles_.push_back({previous_[at], at, next_[at]});
     return std::move(triangles_);
@@ -150,8 +150,8 @@ class EarCutter {
     return thin ? thin : straight;
   }
 
-  /// Whether no corner lies in the triangle at k, or beyond its cut by a share `beyond` of the
-  /// cut's length. Corners at the place of one of its own do not count: a slit comes back there.
+  /// Whether no corner lies in the triangle at k, or beyond its cut by a fraction `beyond` of the
+  /// cut's length. Corners at the position of one of its own do not count: a slit comes back there.
   bool is_empty(uint32_t k, double beyond) const {
     const V2d &a = p_[previous_[k]], &b = p_[k], &c = p_[next_[k]];
     const double outside = -beyond * (c - a).length2();

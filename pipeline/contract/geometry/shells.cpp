@@ -6,6 +6,8 @@
 #include <set>
 #include <tuple>
 
+#include "pipeline/contract/geometry/bounds.h"
+
 namespace drench {
 
 namespace {
@@ -38,36 +40,36 @@ class Unions {
   std::vector<uint32_t> parent_;
 };
 
-/// One number for all vertices at one place.
-std::vector<uint32_t> places_of(const TriangleMesh& mesh) {
+/// One number for all vertices at one point.
+std::vector<uint32_t> points_of(const TriangleMesh& mesh) {
   const auto& at = mesh.position;
   const auto before = [&](uint32_t a, uint32_t b) {
     return std::tie(at[a].x, at[a].y, at[a].z) < std::tie(at[b].x, at[b].y, at[b].z);
   };
-  std::vector<uint32_t> order(at.size()), place(at.size());
+  std::vector<uint32_t> order(at.size()), point(at.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), before);
   uint32_t number = 0;
   for (size_t i = 0; i < order.size(); ++i) {
     if (i > 0 && before(order[i - 1], order[i])) ++number;
-    place[order[i]] = number;
+    point[order[i]] = number;
   }
-  return place;
+  return point;
 }
 
 struct Edge {
   uint32_t low, high, triangle;
-  int way;  // 1: from low to high, -1
+  int direction;  // 1: from low to high, -1
   bool same(const Edge& o) const { return low == o.low && high == o.high; }
 };
 
-/// @param place  of a vertex.
-std::vector<Edge> edges_of(const TriangleMesh& mesh, const std::vector<uint32_t>& place) {
+/// @param point  of a vertex.
+std::vector<Edge> edges_of(const TriangleMesh& mesh, const std::vector<uint32_t>& point) {
   std::vector<Edge> edges;
   edges.reserve(3 * mesh.triangle.size());
   for (uint32_t t = 0; t < mesh.triangle.size(); ++t) {
     for (int c = 0; c < 3; ++c) {
-      const uint32_t a = place[mesh.triangle[t][c]], b = place[mesh.triangle[t][(c + 1) % 3]];
+      const uint32_t a = point[mesh.triangle[t][c]], b = point[mesh.triangle[t][(c + 1) % 3]];
       if (a != b) edges.push_back({std::min(a, b), std::max(a, b), t, a < b ? 1 : -1});
     }
   }
@@ -98,9 +100,9 @@ bool close_sets(const std::vector<Edge>& edges, Unions& sets) {
       const auto known = std::find_if(open.begin(), open.end(),
                                       [set](const auto& one) { return one.first == set; });
       if (known == open.end()) {
-        open.emplace_back(set, edges[e].way);
+        open.emplace_back(set, edges[e].direction);
       } else {
-        known->second += edges[e].way;
+        known->second += edges[e].direction;
       }
     }
     std::erase_if(open, [](const auto& one) { return one.second == 0; });
@@ -109,7 +111,7 @@ bool close_sets(const std::vector<Edge>& edges, Unions& sets) {
   return any;
 }
 
-/// Across edges of two triangles, by their vertices and then by places, which seams of textures
+/// Across edges of two triangles, by their vertices and then by points, which seams of textures
 /// have several vertices at. Across edges of more only as close_sets does, so that shells which
 /// touch along an edge or a face stay apart.
 std::vector<int> shells_of(const TriangleMesh& mesh, int& count) {
@@ -122,19 +124,12 @@ std::vector<int> shells_of(const TriangleMesh& mesh, int& count) {
   std::vector<uint32_t> own(mesh.position.size());
   std::iota(own.begin(), own.end(), 0u);
   unite_pairs(edges_of(mesh, own));
-  const std::vector<Edge> edges = edges_of(mesh, places_of(mesh));
+  const std::vector<Edge> edges = edges_of(mesh, points_of(mesh));
   unite_pairs(edges);
   while (close_sets(edges, sets)) {
   }
   return sets.numbers(count);
 }
-
-struct Bounds {
-  V3d low{1e300}, high{-1e300};
-  void add(const V3d& p) {
-    for (int k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
-  }
-};
 
 /// What two bounds have in common; empty if they do not overlap by more than a rounding.
 Bounds common(const Bounds& a, const Bounds& b) {
@@ -151,10 +146,10 @@ constexpr int rays_a_side = 32;
 constexpr double all_but = 1e-3;  // of a volume, that may stick out of what holds it
 
 /// Of a shell's volume, what lies in another: by rays along each of the axes.
-struct Share {
+struct Fraction {
   double least = 1, most = 0;
   bool is_all() const { return std::min(least, most) > 1 - all_but; }
-  void add(double share) { least = std::min(least, share), most = std::max(most, share); }
+  void add(double fraction) { least = std::min(least, fraction), most = std::max(most, fraction); }
 };
 
 /// Relations of the shells of a mesh, by lengths along rays.
@@ -170,7 +165,7 @@ class Nesting {
 
  private:
   void measure_own_rays(int shell, int axis);
-  Share share(int of, int in) const;
+  Fraction fraction(int of, int in) const;
   bool overlap(int one, int other) const;
   ShellRays rays_through(const Bounds& box, const std::vector<int>& of, int axis) const;
 
@@ -178,8 +173,8 @@ class Nesting {
   Shells& shells_;
   std::vector<std::vector<uint32_t>> triangles_;  // of a shell
   std::vector<Bounds> bounds_;
-  std::vector<std::vector<std::pair<int, Share>>> shares_;  // of a shell, in those around it
-  std::vector<std::pair<int, int>> within_;                 // the first lies in the second
+  std::vector<std::vector<std::pair<int, Fraction>>> fractions_;  // of a shell, in those around it
+  std::vector<std::pair<int, int>> within_;                       // the first lies in the second
 };
 
 Nesting::Nesting(const TriangleMesh& mesh, Shells& shells)
@@ -187,7 +182,7 @@ Nesting::Nesting(const TriangleMesh& mesh, Shells& shells)
       shells_(shells),
       triangles_(size_t(shells.count())),
       bounds_(size_t(shells.count())),
-      shares_(size_t(shells.count())) {
+      fractions_(size_t(shells.count())) {
   for (uint32_t t = 0; t < mesh.triangle.size(); ++t) {
     const auto s = size_t(shells.shell[t]);
     triangles_[s].push_back(t);
@@ -242,16 +237,16 @@ void Nesting::measure_own_rays(int shell, int axis) {
     whole += length;
     for (size_t k = 1; k < of.size(); ++k) in[k] += count.in_shell(of[k]) ? length : 0;
   });
-  auto& shares = shares_[size_t(shell)];
+  auto& fractions = fractions_[size_t(shell)];
   for (size_t k = 1; k < of.size(); ++k) {
-    if (axis == 0) shares.emplace_back(of[k], Share{});
-    if (whole > 0) shares[k - 1].second.add(in[k] / whole);
+    if (axis == 0) fractions.emplace_back(of[k], Fraction{});
+    if (whole > 0) fractions[k - 1].second.add(in[k] / whole);
   }
 }
 
-Share Nesting::share(int of, int in) const {
-  for (const auto& [other, share] : shares_[size_t(of)])
-    if (other == in) return share;
+Fraction Nesting::fraction(int of, int in) const {
+  for (const auto& [other, fraction] : fractions_[size_t(of)])
+    if (other == in) return fraction;
   return {0, 0};
 }
 
@@ -311,13 +306,14 @@ void Nesting::find_bodies() {
   for (int s = 0; s < shells_.count(); ++s)
     for (int axis = 0; axis < 3; ++axis) measure_own_rays(s, axis);
   for (int a = 0; a < shells_.count(); ++a) {
-    for (const auto& [b, share_of_a] : shares_[size_t(a)]) {
+    for (const auto& [b, fraction_of_a] : fractions_[size_t(a)]) {
       if (b < a) continue;
-      const Share share_of_b = share(b, a);
-      const bool a_in_b = share_of_a.is_all(), b_in_a = share_of_b.is_all();
+      const Fraction fraction_of_b = fraction(b, a);
+      const bool a_in_b = fraction_of_a.is_all(), b_in_a = fraction_of_b.is_all();
       if (a_in_b != b_in_a) {
         within_.emplace_back(a_in_b ? a : b, a_in_b ? b : a);
-      } else if (a_in_b || std::max(share_of_a.most, share_of_b.most) > all_but || overlap(a, b)) {
+      } else if (a_in_b || std::max(fraction_of_a.most, fraction_of_b.most) > all_but ||
+                 overlap(a, b)) {
         bodies.unite(uint32_t(a), uint32_t(b));
       }
     }
@@ -489,7 +485,7 @@ void orient_shells(TriangleMesh& mesh) {
   const std::vector<double> volume = volumes_of(mesh, shells);
   for (size_t t = 0; t < mesh.triangle.size(); ++t) {
     const int s = shells.shell[t];
-    if (volume[size_t(s)] == 0) continue;  // a sheet folded onto itself: neither way is outward
+    if (volume[size_t(s)] == 0) continue;  // a sheet folded onto itself: neither side is outward
     if ((volume[size_t(s)] < 0) == shells.is_cavity(s)) continue;
     std::swap(mesh.triangle[t].y, mesh.triangle[t].z);
   }

@@ -4,7 +4,7 @@
 // A shell is what hangs together across edges. Shells that cross each other, or coincide, are one
 // body: its inside is the union of theirs. Bodies do not cross, so that of two one lies wholly in
 // the other or neither does; a point is inside if an odd number of bodies hold it: what lies in an
-// odd number of others is a cavity, whichever way its triangles are turned, and what floats in a
+// odd number of others is a cavity, whichever side its triangles are turned, and what floats in a
 // cavity is solid again. A shell holds the points that it winds around; shells may touch.
 
 #include <cstdint>
@@ -24,10 +24,10 @@ struct Shells {
   bool is_cavity(int of_shell) const { return depth[size_t(body[size_t(of_shell)])] % 2 == 1; }
 };
 
-/// @param mesh  closed: every edge has as many triangles one way as the other, where vertices at
-/// one place are one; any orientation, m or any unit. Shells lie in another body if all but a
-/// thousandth of their volume does by rays along each axis, and cross if neither lies in the other
-/// so.
+/// @param mesh  closed: every edge has as many triangles in one direction as in the other, where
+/// vertices at one point are one; any orientation, m or any unit. Shells lie in another body if all
+/// but a thousandth of their volume does by rays along each axis, and cross if neither lies in the
+/// other so.
 Shells find_shells(const TriangleMesh& mesh);
 
 /// Whether a part of space is held more than once: by shells that cross, or by one that winds twice
@@ -41,7 +41,7 @@ bool shells_meet(const TriangleMesh& mesh);
 /// inward. Normals stay as they are.
 void orient_shells(TriangleMesh& mesh);
 
-/// Where rays along an axis meet the shells of a mesh. Rays go through the places (j, k) of a grid
+/// Where rays along an axis meet the shells of a mesh. Rays go through the points (j, k) of a grid
 /// in the next two axes; corners and edges that lie on a ray count for one side of it throughout,
 /// so that sums of turns are exact.
 class ShellRays {

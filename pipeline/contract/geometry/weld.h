@@ -15,9 +15,9 @@ struct Welded {
   double widest = 0;            // m, between two that were joined
 };
 
-/// Vertices closer than this share of the diagonal of a mesh are one where its surface is open:
+/// Vertices closer than this fraction of the diagonal of a mesh are one where its surface is open:
 /// more than the rounding of six digits, less than anything that is modelled.
-inline constexpr double weld_share = 1e-5;
+inline constexpr double weld_fraction = 1e-5;
 
 /// Of the box of all vertices that triangles use, m; 0 without triangles.
 double diagonal_of(const TriangleMesh& mesh);
@@ -25,14 +25,14 @@ double diagonal_of(const TriangleMesh& mesh);
 /// By vertex: the vertex that `point` names, where vertices were split, else itself.
 std::vector<uint32_t> points_of(const TriangleMesh& mesh);
 
-/// Edges that are passed more often one way than the other, vertices joined as `first` says: the
-/// rim of a surface. The smaller index comes first.
+/// Edges that are passed more often in one direction than in the other, vertices joined as `first`
+/// says: the rim of a surface. The smaller index comes first.
 std::vector<std::pair<uint32_t, uint32_t>> free_edges(const TriangleMesh& mesh,
                                                       const std::vector<uint32_t>& first);
 
 /// Joins vertices on free edges within a distance of one another, each to the first of them. What
 /// `point` joins stays joined whatever the distance.
-/// @param distance  m; 0 joins nothing else, not even vertices at one place
+/// @param distance  m; 0 joins nothing else, not even vertices at one point
 Welded weld(const TriangleMesh& mesh, double distance);
 
 }  // namespace drench

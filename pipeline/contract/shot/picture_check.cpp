@@ -119,16 +119,16 @@ class PictureChecker : CheckBase {
   void check_names() const {
     std::map<std::string, std::string> seen{
         {"fluid", "the fluid"}, {"foam", "the foam"}, {"ground", "the ground"}};
-    const auto check = [&](const auto& things, const std::string& section) {
-      for (size_t i = 0; i < things.size(); ++i) {
-        const std::string key = fmt::format("{}[{}].name", section, i), &name = things[i].name;
+    const auto check = [&](const auto& objects, const std::string& section) {
+      for (size_t i = 0; i < objects.size(); ++i) {
+        const std::string key = fmt::format("{}[{}].name", section, i), &name = objects[i].name;
         const auto [other, is_new] = seen.emplace(name, "a thing of [[" + section + "]]");
         if (!is_new && shot_.layers.cryptomatte) {
           fail(key, fmt::format("\"{}\" is the name of {} already, and both would have one "
                                 "Cryptomatte. Give each its own name",
                                 name, other->second));
         }
-        if (shines(things[i].material)) check_group(key, name);
+        if (shines(objects[i].material)) check_group(key, name);
       }
     };
     check(shot_.cloth, "cloth");
@@ -164,7 +164,7 @@ class PictureChecker : CheckBase {
     const Material& material = shot_.material[i];
     for (int c = 0; c < 3; ++c) {
       const double sum = double(material.reflectance[c]) + material.transmittance[c];
-      if (sum > 1 + 1e-5) {  // float rounding of two shares
+      if (sum > 1 + 1e-5) {  // float rounding of the two
         fail(fmt::format("material[{}].reflectance", i),
              fmt::format("material \"{}\" reflects {:.4g} and transmits {:.4g} of the {}; together "
                          "more light than arrives. Keep the sum at most 1",

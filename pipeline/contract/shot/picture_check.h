@@ -6,7 +6,7 @@
 
 namespace drench {
 
-/// @throws Error with place, keys, values, reason and remedy for the first thing of the picture
+/// @throws Error with location, keys, values, reason and remedy for the first part of the picture
 /// that cannot be right.
 void check_picture(const Shot& shot, const ShotSources& sources);
 

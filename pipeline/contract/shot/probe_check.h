@@ -26,7 +26,7 @@ std::optional<int> obstacle_named(const Shot& shot, std::string_view name);
 /// The wall that a pressure probe lies on: parallel to it and within half a spacing.
 std::optional<DomainWall> wall_under(const Probe& probe, const Shot& shot);
 
-/// @throws Error with place, keys, values, reason and remedy for the first probe that cannot be
+/// @throws Error with location, keys, values, reason and remedy for the first probe that cannot be
 /// right.
 void check_probes(const Shot& shot, const ShotSources& sources);
 

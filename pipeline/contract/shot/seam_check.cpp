@@ -32,7 +32,7 @@ struct Seam {
     return -1;
   }
 
-  /// Whether a box overlaps its image at `shift`: a box of twice its size holds that place. Edges
+  /// Whether a box overlaps its image at `shift`: a box of twice its size holds that point. Edges
   /// that go around an axis which they lie along have no end: images along them are the box itself.
   bool overlaps(const Pose& pose, const V3d& size, V3d shift) const {
     const double length = shift.length();

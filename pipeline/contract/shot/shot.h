@@ -1,6 +1,7 @@
 #pragma once
 // A shot as the stages see it: every value checked, every default filled in. SI units; colours are
-// linear ACEScg. Read from TOML by shot_file.h; the parameter table there is the one list of keys.
+// linear ACEScg. Read from TOML by shot_file.h; the parameter table there is the one list of keys,
+// and the enumerators here are the words that a file may say.
 
 #include <Imath/ImathVec.h>
 
@@ -124,14 +125,14 @@ enum class FluidSolver { automatic, incompressible, weakly_compressible };
 struct Fluid {
   double spacing = 0.01;  // m, a
   FluidSolver solver = FluidSolver::automatic;
-  double support_ratio = 0;           // support radius / spacing; 0: what suits the solver
-  double tolerance = 1e-4;            // incompressible: mean density error over rest, a step
-  double xsph = 0.01;                 // incompressible: share of the neighbours' velocity, a step
-  double rest_density = 1000;         // kg/m^3
-  double kinematic_viscosity = 1e-6;  // m^2/s
-  double surface_tension = 0;         // N/m, incompressible
-  double artificial_viscosity = 0.1;  // alpha of Monaghan 1992, dimensionless; 0 is none
-  double sound_speed = 0;             // m/s; 0: ten times the largest speed expected
+  double support_ratio = 0;    // support radius / spacing; 0: what suits the solver
+  double tolerance = 1e-4;     // incompressible: mean density error over rest, a step
+  double xsph = 0.01;          // incompressible: fraction of the neighbours' velocity, a step
+  double rest_density = 1000;  // kg/m^3
+  double kinematic_viscosity = 1e-6;             // m^2/s
+  double surface_tension = 0;                    // N/m, incompressible
+  double artificial_viscosity = 0.1;             // alpha of Monaghan 1992, dimensionless; 0 is none
+  double sound_speed = 0;                        // m/s; 0: ten times the largest speed expected
   bool write_source = false, write_age = false;  // columns of the particle files
   std::string material = "water";
   std::vector<FluidBox> box;
@@ -156,7 +157,8 @@ struct Cloth {
   V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
   V2i cells{64, 64};
   std::filesystem::path mesh_file;  // PLY or OBJ triangles, absolute after reading
-  double weld = -1;  // m: vertices on free edges closer than this are one; < 0: a share
+  double weld =
+      -1;  // m: vertices on free edges closer than this are one; < 0: 1e-5 of its diagonal
   std::vector<ClothPin> pin;
   V3d velocity{0, 0, 0};            // m/s at the start
   double areal_density = 0.2;       // kg/m^2
@@ -228,7 +230,7 @@ enum class ProbeType { height, pressure, force, tip, energy, volume, velocity, f
 struct Probe {
   ProbeType type = ProbeType::height;
   std::string name = "probe";  // part of its file's name
-  // m; height: the line's x and z, pressure, velocity: centre, tip: rest place
+  // m; height: the line's x and z, pressure, velocity: centre, tip: rest position
   V3d position{0, 0, 0};
   V3d normal{0, 1, 0};           // pressure: of the disc
   double radius = 0.01;          // pressure: of the disc, velocity: of the ball, m
@@ -258,7 +260,7 @@ struct SurfaceSettings {
 /// Spray, foam and bubbles (surfacing/foam.h). Without [foam] there are none.
 struct FoamSettings {
   bool present = false;
-  // Particles that each fluid particle makes on a way of one spacing: of the fluid closing in on
+  // Particles that each fluid particle makes while a spacing is passed: of the fluid closing in on
   // it, and of its own out of the fluid at a crest.
   double trapped_air = 20, wave_crest = 5;
   double threshold = 0.1;    // speed from which air is caught / sqrt(g a + sigma / (rho a))
@@ -278,7 +280,7 @@ struct Camera {
   double squeeze = 1;             // of an anamorphic lens: its aperture is narrower by this factor
   V3d up{0, 1, 0};
   double shutter_open = -0.25, shutter_close = 0.25;  // frames, around the frame
-  double shutter_opening = 0, shutter_closing = 0;    // shares of that time; sum at most 1
+  double shutter_opening = 0, shutter_closing = 0;    // fractions of that time; sum at most 1
   double rolling_shutter = 0;  // how much later the last row is than the first, in shutter times
 };
 
@@ -292,7 +294,7 @@ struct Light {
   V3d center{0, 3, 0};             // rectangle, sphere, disk, m
   V3d u{0.5, 0, 0}, v{0, 0, 0.5};  // rectangle: half edges, m; emits along u x v
   double radius = 0.1;             // sphere, disk, m
-  V3d direction{0, -1, 0};         // sun, disk: the way its light travels
+  V3d direction{0, -1, 0};         // sun, disk: in which its light travels
   double angle_deg = 0.53;         // sun: apparent diameter
   std::filesystem::path map;       // environment: latitude-longitude picture; empty: constant
   double rotation_deg = 0;         // environment, about Y
@@ -315,10 +317,10 @@ struct Material {
   double sheen_roughness = 0.3;       // cloth: 1 over the power of the fuzz's sine
   V3f yarn_specular{0, 0, 0};         // cloth: of its yarns, along u and v; sheen + it <= 1
   double yarn_roughness = 0.4;        // cloth: its square is the slope of fibres along yarns
-  double gap = 0;                     // cloth: share that is open between yarns
+  double gap = 0;                     // cloth: fraction that is open between yarns
   double film_roughness = 0.4;        // cloth: of the water's surface where it is wet
   double ior = 1.333;                 // dielectric, coat, what wets cloth
-  int priority = 0;                   // dielectric: of bodies in one place the highest is there
+  int priority = 0;                   // dielectric: of bodies at one point the highest is there
   V3f absorption{0, 0, 0};            // dielectric, 1/m
   std::filesystem::path texture;      // a picture, multiplies reflectance
   std::filesystem::path normal_map;   // a picture, tangent space, x along u, y along v

@@ -275,7 +275,7 @@ class Checker : CheckBase {
     }
   }
 
-  /// What pulls fluid to another angle is a share of the surface's tension.
+  /// What pulls fluid to another angle is a part of the surface's tension.
   void check_right_angles() const {
     const auto check = [&](const std::string& path, double degrees) {
       if (wetting_of(degrees) == 0) return;
@@ -446,14 +446,14 @@ class Checker : CheckBase {
   }
 
   template <class T>
-  void check_distinct(const std::vector<T>& things, const std::string& section) const {
-    for (size_t i = 0; i < things.size(); ++i) {
+  void check_distinct(const std::vector<T>& objects, const std::string& section) const {
+    for (size_t i = 0; i < objects.size(); ++i) {
       for (size_t j = 0; j < i; ++j) {
-        if (things[i].name != things[j].name) continue;
+        if (objects[i].name != objects[j].name) continue;
         const std::string key = fmt::format("{}[{}].name", section, i);
         fail(key, fmt::format("two things of [[{}]] are named \"{}\"; the other one stands at {}. "
                               "Give each its own name",
-                              section, things[i].name,
+                              section, objects[i].name,
                               sources_.at(fmt::format("{}[{}].name", section, j))));
       }
     }

@@ -18,7 +18,7 @@ struct ShotSources {
   std::string at(const std::string& key) const;
 };
 
-/// @throws Error with place, keys, values, reason and remedy for the first thing that cannot be
+/// @throws Error with location, keys, values, reason and remedy for the first part that cannot be
 /// right.
 void check_shot(const Shot& shot, const ShotSources& sources);
 

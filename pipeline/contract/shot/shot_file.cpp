@@ -12,6 +12,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot/shot_check.h"
 #include "pipeline/contract/shot/shot_table.h"
+#include "pipeline/contract/shot/shot_text.h"
 #include "pipeline/contract/shot/shot_value.h"
 #include "pipeline/contract/shot/toml.h"
 #include "pipeline/contract/shot/toml_text.h"
@@ -19,6 +20,7 @@
 namespace drench {
 
 namespace fs = std::filesystem;
+using shot_table::GridPins;
 using shot_table::Kind;
 using shot_table::Parameter;
 using shot_table::Section;
@@ -29,8 +31,8 @@ namespace {
 struct Draft {
   Shot shot;
   ShotSources sources;
-  std::map<std::string, std::vector<std::string>> grid_pins;  // by path of the cloth
-  std::set<std::string> overridden;                           // keys that an override changed
+  std::map<std::string, std::vector<GridPins>> grid_pins;  // by path of the cloth
+  std::set<std::string> overridden;                        // keys that an override changed
 };
 
 enum class Mode { write, override_values };
@@ -47,7 +49,7 @@ class Reader {
       if (name == "quality" && mode_ == Mode::write) continue;  // read when the rest is known
       const Section* const section = shot_table::find_section(name);
       if (section == nullptr || !section->parent.empty())
-        unknown_section(name, place(key.source()));
+        unknown_section(name, location(key.source()));
       read_child(*section, &draft_.shot, name, node);
     }
   }
@@ -57,7 +59,7 @@ class Reader {
   }
 
   /// "shots/dam.toml:14"; an override is one line and named whole.
-  std::string place(const toml::source_region& source) const {
+  std::string location(const toml::source_region& source) const {
     return source.begin && !label_is_whole_ ? fmt::format("{}:{}", label_, source.begin.line)
                                             : label_;
   }
@@ -105,7 +107,7 @@ class Reader {
 
   void read_child(const Section& section, void* owner, const std::string& path,
                   const toml::node& node) {
-    const std::string where = place(node.source());
+    const std::string where = location(node.source());
     if (!section.repeated) {
       const auto* table = node.as_table();
       if (table == nullptr) {
@@ -128,19 +130,20 @@ class Reader {
                   const toml::node& node) {
     const auto* array = node.as_array();
     if (array == nullptr || (!array->empty() && !array->is_array_of_tables())) {
-      fail(place(node.source()), fmt::format("{} may stand more than once; write [[{}]] with two "
-                                             "brackets a side",
-                                             path, section.name));
+      fail(location(node.source()),
+           fmt::format("{} may stand more than once; write [[{}]] with two "
+                       "brackets a side",
+                       path, section.name));
     }
     constexpr size_t most = 4096;
     if (array->size() > most) {
-      fail(place(node.source()),
+      fail(location(node.source()),
            fmt::format("{} stands {} times; at most {} are allowed", path, array->size(), most));
     }
     for (const toml::node& item : *array) {
       const size_t index = index_for(section, owner, *item.as_table());
       const std::string own = fmt::format("{}[{}]", path, index);
-      const std::string where = place(item.source());
+      const std::string where = location(item.source());
       if (!draft_.sources.where.emplace(own, where).second) {
         fail(where,
              fmt::format("material \"{}\" is defined twice; the first time at {}. Remove one",
@@ -154,7 +157,7 @@ class Reader {
     }
   }
 
-  /// Where the next object goes: at the end, or for a material that exists already in its place.
+  /// Where the next object goes: at the end, or for a material that exists already where it is.
   size_t index_for(const Section& section, void* owner, const toml::table& table) {
     if (section.name == "material") {
       const auto* name = table.get_as<std::string>("name");
@@ -197,18 +200,18 @@ class Reader {
                      const toml::node& node) {
     const auto* table = node.as_table();
     if (table == nullptr) {
-      fail(place(node.source()),
+      fail(location(node.source()),
            fmt::format("an override of {} says which one, by name or by number from 0: {}.0.key",
                        path, path));
     }
     for (auto&& [key, item] : *table) {
       const std::string which(key.str());
-      const size_t index = find_object(section, owner, path, which, place(key.source()));
+      const size_t index = find_object(section, owner, path, which, location(key.source()));
       const auto* values = item.as_table();
       if (values == nullptr) {
-        fail(place(item.source()), fmt::format("{}.{} is not a value; override one of its keys: "
-                                               "{}.{}.key",
-                                               path, which, path, which));
+        fail(location(item.source()), fmt::format("{}.{} is not a value; override one of its keys: "
+                                                  "{}.{}.key",
+                                                  path, which, path, which));
       }
       read_table(section, section.at(owner, index), fmt::format("{}[{}]", path, index), *values);
     }
@@ -229,7 +232,7 @@ class Reader {
 
   void read_table(const Section& section, void* object, const std::string& path,
                   const toml::table& table) {
-    // The type first: it says which other keys belong to the thing.
+    // The type first: it says which other keys belong to the object.
     for (const bool types : {true, false}) {
       for (auto&& [key, node] : table) {
         const std::string name(key.str());
@@ -241,7 +244,7 @@ class Reader {
         } else if (child != nullptr) {
           read_child(*child, object, path + "." + name, node);
         } else {
-          unknown_key(section, path, name, place(key.source()));
+          unknown_key(section, path, name, location(key.source()));
         }
       }
     }
@@ -268,7 +271,8 @@ class Reader {
 
   void read_key(const Section& section, const Parameter& p, void* object, const std::string& path,
                 const toml::node& node) {
-    const shot_table::Site site{place(node.source()), fmt::format("{}.{}", path, p.key), folder_};
+    const shot_table::Site site{location(node.source()), fmt::format("{}.{}", path, p.key),
+                                folder_};
     if (mode_ == Mode::override_values && p.fixed) {
       fail(site.where,
            fmt::format("{} says which thing this is and cannot be overridden; change it "
@@ -404,22 +408,34 @@ void apply_override(Draft& draft, const std::string& text, const fs::path& folde
   reader.read_top(table);
 }
 
+/// Whether vertex (i, j) of (0, 0) to (u, v) is one of them.
+bool is_held(GridPins pins, uint32_t i, uint32_t j, uint32_t u, uint32_t v) {
+  const bool end_u = i == 0 || i == u, end_v = j == 0 || j == v;
+  switch (pins) {
+    case GridPins::corners:
+      return end_u && end_v;
+    case GridPins::edge_u0:
+      return i == 0;
+    case GridPins::edge_u1:
+      return i == u;
+    case GridPins::edge_v0:
+      return j == 0;
+    case GridPins::edge_v1:
+      return j == v;
+    case GridPins::rim:
+      return end_u || end_v;
+  }
+  return false;
+}
+
 /// Vertex j (nu + 1) + i stands at i along u and j along v.
-std::vector<uint32_t> pinned_vertices(const std::vector<std::string>& names, const V2i& cells) {
+std::vector<uint32_t> pinned_vertices(const std::vector<GridPins>& all, const V2i& cells) {
   const auto u = uint32_t(cells.x), v = uint32_t(cells.y);
   std::set<uint32_t> held;
-  for (const std::string& name : names) {
-    for (uint32_t j = 0; j <= v; ++j) {
-      for (uint32_t i = 0; i <= u; ++i) {
-        const bool end_u = i == 0 || i == u, end_v = j == 0 || j == v;
-        if ((name == "corners" && end_u && end_v) || (name == "rim" && (end_u || end_v)) ||
-            (name == "edge_u0" && i == 0) || (name == "edge_u1" && i == u) ||
-            (name == "edge_v0" && j == 0) || (name == "edge_v1" && j == v)) {
-          held.insert(j * (u + 1) + i);
-        }
-      }
-    }
-  }
+  for (const GridPins pins : all)
+    for (uint32_t j = 0; j <= v; ++j)
+      for (uint32_t i = 0; i <= u; ++i)
+        if (is_held(pins, i, j, u, v)) held.insert(j * (u + 1) + i);
   return {held.begin(), held.end()};
 }
 
@@ -437,8 +453,8 @@ void resolve_pins(Draft& draft) {
                         draft.sources.at(cells), cells, path, k));
       }
     }
-    const auto names = draft.grid_pins.find(path);
-    if (names == draft.grid_pins.end() || names->second.empty()) continue;
+    const auto pins = draft.grid_pins.find(path);
+    if (pins == draft.grid_pins.end() || pins->second.empty()) continue;
     if (!cloth.mesh_file.empty()) {
       throw Error(
           fmt::format("{}: {}.pins names edges of a grid, but this cloth is a mesh. Use "
@@ -446,7 +462,7 @@ void resolve_pins(Draft& draft) {
                       draft.sources.at(path + ".pins"), path));
     }
     ClothPin pin;
-    pin.vertices = pinned_vertices(names->second, cloth.cells);
+    pin.vertices = pinned_vertices(pins->second, cloth.cells);
     cloth.pin.push_back(pin);
     draft.sources.where[fmt::format("{}.pin[{}]", path, cloth.pin.size() - 1)] =
         draft.sources.at(path + ".pins");

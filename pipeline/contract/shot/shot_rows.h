@@ -1,8 +1,10 @@
 #pragma once
 // How rows of the parameter table are written down. Only for the files that hold rows.
 
+#include <initializer_list>
 #include <type_traits>
 
+#include "pipeline/contract/shot/enum_names.h"
 #include "pipeline/contract/shot/shot_table.h"
 
 namespace drench::shot_table {
@@ -46,7 +48,6 @@ constexpr Kind kind_of() {
   if constexpr (std::is_same_v<T, Animated<V3d>>) return Kind::vector_track;
   if constexpr (std::is_same_v<T, std::vector<uint32_t>>) return Kind::vertices;
   if constexpr (std::is_same_v<T, std::optional<std::pair<V3d, V3d>>>) return Kind::box;
-  static_assert(!std::is_enum_v<T> || sizeof(T) == sizeof(int));
   return Kind::choice;
 }
 
@@ -56,9 +57,32 @@ struct Row : Parameter {
     row.required = true;
     return row;
   }
-  Row one_of(std::vector<std::string_view> names) const {
+  /// The names of an enum; the field holds it.
+  template <class Enum>
+  Row choice() const {
     Row row = *this;
-    row.choices = std::move(names);
+    row.choices.assign(enum_names<Enum>.begin(), enum_names<Enum>.end());
+    row.choose = [](void* field, std::string_view name) {
+      *static_cast<Enum*>(field) = enum_of<Enum>(name);
+    };
+    row.chosen = [](const void* field) {
+      return enum_names<Enum>[size_t(*static_cast<const Enum*>(field))];
+    };
+    return row;
+  }
+  /// The field is a track, whose interpolation is one of these.
+  Row interpolation(std::initializer_list<Interpolation> modes) const {
+    Row row = *this;
+    row.kind = Kind::track_mode;
+    for (const Interpolation mode : modes)
+      row.choices.push_back(enum_names<Interpolation>[size_t(mode)]);
+    row.choose = [](void* field, std::string_view name) {
+      static_cast<Animated<V3d>*>(field)->interpolation = enum_of<Interpolation>(name);
+    };
+    row.chosen = [](const void* field) {
+      return enum_names<Interpolation>[size_t(
+          static_cast<const Animated<V3d>*>(field)->interpolation)];
+    };
     return row;
   }
   Row identity() const {
@@ -66,9 +90,11 @@ struct Row : Parameter {
     row.fixed = true;
     return row;
   }
-  Row only(unsigned bits) const {
+  /// @param types  of objects that have it.
+  template <class... Types>
+  Row only(Types... types) const {
     Row row = *this;
-    row.types = bits;
+    row.types = ((1u << unsigned(types)) | ...);
     return row;
   }
   Row as(Kind other) const {
@@ -81,10 +107,12 @@ struct Row : Parameter {
 template <auto... Members>
 Row row(std::string_view section, std::string_view key, std::string_view unit, Limits limits,
         unsigned stages, std::string_view description) {
+  using Value = typename LastMember<Members...>::Value;
   Row row;
+  if constexpr (std::is_enum_v<Value>) row = row.template choice<Value>();
   row.section = section;
   row.key = key;
-  row.kind = kind_of<typename LastMember<Members...>::Value>();
+  row.kind = kind_of<Value>();
   row.unit = unit;
   row.limits = limits;
   row.stages = stages;
@@ -94,12 +122,12 @@ Row row(std::string_view section, std::string_view key, std::string_view unit, L
 }
 
 inline constexpr Limits none{};
-inline constexpr Limits share{0, 1};
-inline constexpr Limits place{-1e5, 1e5};    // m: beyond, float steps are wider than a millimetre
+inline constexpr Limits fraction{0, 1};
+inline constexpr Limits coordinate{-1e5,
+                                   1e5};     // m: beyond, float steps are wider than a millimetre
 inline constexpr Limits speed{-1000, 1000};  // m/s
-inline constexpr Limits turns{-360000, 360000};                         // deg
-inline constexpr Limits seeds{0, 4294967295};                           // uint32_t
-inline constexpr unsigned plane = 1, box = 2, ball = 4, mesh_type = 8;  // bits of ObstacleType
+inline constexpr Limits turns{-360000, 360000};  // deg
+inline constexpr Limits seeds{0, 4294967295};    // uint32_t
 
 inline constexpr std::string_view matte_text =
     "how the camera sees it directly, for a render that goes over a plate it is in: as a holdout, "

@@ -5,14 +5,11 @@ namespace drench::shot_table {
 
 namespace {
 
-// Bits of LightType and of MaterialType.
-constexpr unsigned rectangle = 1, sphere = 2, sun = 4, environment = 8, disk = 16;
-constexpr unsigned dielectric = 1, cloth_type = 2, diffuse = 4, metal = 8, coated = 16;
-
 std::vector<Parameter> camera_rows() {
   return {
-      row<&Camera::position>("camera", "position", "m", place, render, "may be animated"),
-      row<&Camera::target>("camera", "target", "m", place, render, "looked at; may be animated"),
+      row<&Camera::position>("camera", "position", "m", coordinate, render, "may be animated"),
+      row<&Camera::target>("camera", "target", "m", coordinate, render,
+                           "looked at; may be animated"),
       row<&Camera::fov_deg>("camera", "fov_deg", "deg", {0.1, 170}, render,
                             "horizontal field of view; may be animated"),
       row<&Camera::focus_distance>("camera", "focus_distance", "m", {0, 1e6}, render,
@@ -27,31 +24,28 @@ std::vector<Parameter> camera_rows() {
       row<&Camera::squeeze>("camera", "squeeze", "", {0.25, 4}, render,
                             "of an anamorphic lens: blur is narrower than high by this factor; "
                             "the field of view is not changed"),
-      row<&Camera::up>("camera", "up", "", place, render, "up in the picture; any length but 0"),
+      row<&Camera::up>("camera", "up", "", coordinate, render,
+                       "up in the picture; any length but 0"),
       row<&Camera::shutter_open>("camera", "shutter_open", "frame", {-10, 10}, render,
                                  "relative to the frame"),
       row<&Camera::shutter_close>("camera", "shutter_close", "frame", {-10, 10}, render,
                                   "relative to the frame"),
-      row<&Camera::shutter_opening>("camera", "shutter_opening", "", share, render,
+      row<&Camera::shutter_opening>("camera", "shutter_opening", "", fraction, render,
                                     "share of the shutter in which it opens evenly; 0: at once"),
-      row<&Camera::shutter_closing>("camera", "shutter_closing", "", share, render,
+      row<&Camera::shutter_closing>("camera", "shutter_closing", "", fraction, render,
                                     "share in which it closes; 0.5 and 0.5 give a triangle"),
       row<&Camera::rolling_shutter>("camera", "rolling_shutter", "", {0, 100}, render,
                                     "how much later the bottom row is exposed than the top one, "
                                     "in times from shutter_open to shutter_close; 0: all at once"),
       row<&Camera::position>("camera", "interp", "", none, render,
                              "between the keys of every animated value of the camera")
-          .as(Kind::track_mode)
-          .one_of({"linear", "smooth", "step"}),
+          .interpolation({Interpolation::linear, Interpolation::smooth, Interpolation::step}),
   };
 }
 
 std::vector<Parameter> light_rows() {
   return {
-      row<&Light::type>("light", "type", "", none, render, "kind of light")
-          .one_of({"rectangle", "sphere", "sun", "environment", "disk"})
-          .needed()
-          .identity(),
+      row<&Light::type>("light", "type", "", none, render, "kind of light").needed().identity(),
       row<&Light::name>("light", "name", "", none, render, "light, light2, ... unless given")
           .identity(),
       row<&Light::group>("light", "group", "", none, render,
@@ -59,32 +53,34 @@ std::vector<Parameter> light_rows() {
       row<&Light::radiance>("light", "radiance", "W/(sr m^2)", {0, 1e9}, render,
                             "colour and strength; of a sun the irradiance facing it, W/m^2; of an "
                             "environment with a map, its factor"),
-      row<&Light::center>("light", "center", "m", place, render, "centre")
-          .only(rectangle | sphere | disk),
-      row<&Light::u>("light", "u", "m", place, render, "half edge; light leaves along u x v")
-          .only(rectangle),
-      row<&Light::v>("light", "v", "m", place, render, "half edge").only(rectangle),
-      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius").only(sphere | disk),
-      row<&Light::direction>("light", "direction", "", place, render, "the way its light travels")
-          .only(sun | disk),
+      row<&Light::center>("light", "center", "m", coordinate, render, "centre")
+          .only(LightType::rectangle, LightType::sphere, LightType::disk),
+      row<&Light::u>("light", "u", "m", coordinate, render, "half edge; light leaves along u x v")
+          .only(LightType::rectangle),
+      row<&Light::v>("light", "v", "m", coordinate, render, "half edge").only(LightType::rectangle),
+      row<&Light::radius>("light", "radius", "m", {0, 1e4}, render, "radius")
+          .only(LightType::sphere, LightType::disk),
+      row<&Light::direction>("light", "direction", "", coordinate, render,
+                             "the way its light travels")
+          .only(LightType::sun, LightType::disk),
       row<&Light::angle_deg>("light", "angle_deg", "deg", {0, 180}, render, "apparent diameter")
-          .only(sun),
+          .only(LightType::sun),
       row<&Light::map>("light", "map", "", none, render,
                        "latitude-longitude picture, best EXR or HDR; none: constant")
-          .only(environment),
+          .only(LightType::environment),
       row<&Light::rotation_deg>("light", "rotation_deg", "deg", {-36000, 36000}, render, "about Y")
-          .only(environment),
+          .only(LightType::environment),
       row<&Light::split_suns>("light", "split_suns", "", none, render,
                               "small bright regions of the map become suns: less noise")
-          .only(environment),
+          .only(LightType::environment),
       row<&Light::horizon>("light", "horizon", "", {0, 1000}, render,
                            "sky without a map: radiance at the horizon over that at the zenith")
           .as(Kind::spectrum)
-          .only(environment),
+          .only(LightType::environment),
       row<&Light::below>("light", "below", "", {0, 1000}, render,
                          "sky without a map: radiance below the horizon over that at the zenith")
           .as(Kind::spectrum)
-          .only(environment),
+          .only(LightType::environment),
   };
 }
 
@@ -93,61 +89,61 @@ std::vector<Parameter> material_rows() {
       row<&Material::name>("material", "name", "", none, render, "built-in ones may be redefined")
           .needed()
           .identity(),
-      row<&Material::type>("material", "type", "", none, render, "how light meets it")
-          .one_of({"dielectric", "cloth", "diffuse", "metal", "coated"})
-          .identity(),
-      row<&Material::reflectance>("material", "reflectance", "", share, render,
+      row<&Material::type>("material", "type", "", none, render, "how light meets it").identity(),
+      row<&Material::reflectance>("material", "reflectance", "", fraction, render,
                                   "diffuse reflection, of a coated one under its coat; of metal, "
                                   "of light that faces it")
-          .only(cloth_type | diffuse | metal | coated),
-      row<&Material::edge>("material", "edge", "", share, render,
+          .only(MaterialType::cloth, MaterialType::diffuse, MaterialType::metal,
+                MaterialType::coated),
+      row<&Material::edge>("material", "edge", "", fraction, render,
                            "its colour at 82 degrees over that of Schlick's formula there")
-          .only(metal),
-      row<&Material::roughness>("material", "roughness", "", share, render,
+          .only(MaterialType::metal),
+      row<&Material::roughness>("material", "roughness", "", fraction, render,
                                 "its square is the alpha of GGX facets; below 0.01 smooth")
-          .only(dielectric | metal | coated),
+          .only(MaterialType::dielectric, MaterialType::metal, MaterialType::coated),
       row<&Material::emission>("material", "emission", "W/(sr m^2)", {0, 1e9}, render,
                                "light of its own, of obstacles only, from their outer side")
-          .only(diffuse),
-      row<&Material::transmittance>("material", "transmittance", "", share, render,
+          .only(MaterialType::diffuse),
+      row<&Material::transmittance>("material", "transmittance", "", fraction, render,
                                     "diffuse transmission; with reflectance at most 1")
-          .only(cloth_type),
-      row<&Material::sheen>("material", "sheen", "", share, render,
+          .only(MaterialType::cloth),
+      row<&Material::sheen>("material", "sheen", "", fraction, render,
                             "of light that fuzz on both faces returns, most along the surface; "
                             "the rest falls on the cloth")
-          .only(cloth_type),
+          .only(MaterialType::cloth),
       row<&Material::sheen_roughness>("material", "sheen_roughness", "", {0.1, 1}, render,
                                       "0.1 shines at the very rim, 1 is dusty all over")
-          .only(cloth_type),
-      row<&Material::yarn_specular>("material", "yarn_specular", "", share, render,
+          .only(MaterialType::cloth),
+      row<&Material::yarn_specular>("material", "yarn_specular", "", fraction, render,
                                     "of light that yarns along u and v mirror, on meshes with "
                                     "uv and the ground; with sheen at most 1")
-          .only(cloth_type),
+          .only(MaterialType::cloth),
       row<&Material::yarn_roughness>("material", "yarn_roughness", "", {0.1, 1}, render,
                                      "its square is the slope of the fibres along a yarn: 0.3 "
                                      "is satin, 0.6 wool")
-          .only(cloth_type),
+          .only(MaterialType::cloth),
       row<&Material::gap>("material", "gap", "", {0, 0.99}, render,
                           "share of its area that is open between yarns: light goes straight on. "
                           "The other values are those of the rest. Not of the ground")
-          .only(cloth_type),
+          .only(MaterialType::cloth),
       row<&Material::film_roughness>("material", "film_roughness", "", {0.05, 1}, render,
                                      "of the water on it where its vertices have wetness; as "
                                      "roughness, 1 follows every thread")
-          .only(cloth_type),
+          .only(MaterialType::cloth),
       row<&Material::ior>("material", "ior", "", {1, 4}, render,
                           "index of refraction, of the body, the coat, or what wets the cloth; "
                           "glass and varnish 1.5")
-          .only(dielectric | coated | cloth_type),
+          .only(MaterialType::dielectric, MaterialType::coated, MaterialType::cloth),
       row<&Material::priority>("material", "priority", "", {-100, 100}, render,
                                "where bodies overlap the highest is; of equals, an obstacle")
-          .only(dielectric),
+          .only(MaterialType::dielectric),
       row<&Material::absorption>("material", "absorption", "1/m", {0, 1e6}, render, "in the volume")
           .as(Kind::spectrum)
-          .only(dielectric),
+          .only(MaterialType::dielectric),
       row<&Material::texture>("material", "texture", "", none, render,
                               "EXR, HDR, PNG, JPEG or TIFF that multiplies reflectance")
-          .only(cloth_type | diffuse | metal | coated),
+          .only(MaterialType::cloth, MaterialType::diffuse, MaterialType::metal,
+                MaterialType::coated),
       row<&Material::normal_map>("material", "normal_map", "", none, render,
                                  "the same of normals, never converted: x along u, y along v, on "
                                  "meshes with uv and the ground"),
@@ -155,10 +151,10 @@ std::vector<Parameter> material_rows() {
                                    "edge that texture and normal_map cover, in uv; on the ground "
                                    "in m"),
       row<&Material::checker>("material", "checker", "", none, render, "built-in checker")
-          .only(diffuse | coated),
+          .only(MaterialType::diffuse, MaterialType::coated),
       row<&Material::checker_size>("material", "checker_size", "m", {1e-6, 1e4}, render,
                                    "edge of one of its squares")
-          .only(diffuse | coated),
+          .only(MaterialType::diffuse, MaterialType::coated),
   };
 }
 
@@ -166,12 +162,11 @@ std::vector<Parameter> film_rows() {
   return {
       row<&Ground::present>("ground", "present", "", none, mesh | render,
                             "a horizontal plane that is drawn; true when [ground] is written"),
-      row<&Ground::height>("ground", "height", "m", place, mesh | render, "its y"),
+      row<&Ground::height>("ground", "height", "m", coordinate, mesh | render, "its y"),
       row<&Ground::half_size>("ground", "half_size", "m", {1e-3, 1e6}, render, "half its edge"),
-      row<&Ground::center>("ground", "center", "m", place, render, "centre; y is unused"),
+      row<&Ground::center>("ground", "center", "m", coordinate, render, "centre; y is unused"),
       row<&Ground::material>("ground", "material", "", none, render, "name of a [[material]]"),
-      row<&Ground::matte>("ground", "matte", "", none, render, matte_text)
-          .one_of({"none", "holdout", "shadow_catcher"}),
+      row<&Ground::matte>("ground", "matte", "", none, render, matte_text),
 
       row<&RenderSettings::width>("render", "width", "pixel", {1, 16384}, render, "of a frame"),
       row<&RenderSettings::height>("render", "height", "pixel", {1, 16384}, render, "of a frame"),
@@ -195,21 +190,18 @@ std::vector<Parameter> film_rows() {
       row<&RenderSettings::denoiser>("render", "denoiser", "", none, denoise,
                                      "regression, or oidn: Open Image Denoise, loaded from where "
                                      "LD_LIBRARY_PATH says; it sees "
-                                     "each frame alone, and alpha is still denoised by regression")
-          .one_of({"regression", "oidn"}),
+                                     "each frame alone, and alpha is still denoised by regression"),
       row<&RenderSettings::depth>("render", "depth", "", {1, 256}, render,
                                   "diffuse bounces; specular ones end by chance"),
       row<&RenderSettings::motion_blur>("render", "motion_blur", "", none, render,
                                         "from the stored velocities, over the shutter"),
       row<&RenderSettings::background>(
           "render", "background", "", none, render,
-          "what the camera sees where there is nothing: the sky, or clear, alpha 0, for a plate")
-          .one_of({"sky", "clear"}),
+          "what the camera sees where there is nothing: the sky, or clear, alpha 0, for a plate"),
       row<&RenderSettings::refraction_alpha>(
           "render", "refraction_alpha", "", none, render,
           "of smooth water and glass before a clear background or what is matte: opaque, or "
-          "transparent, so that a plate shows through, undistorted")
-          .one_of({"opaque", "transparent"}),
+          "transparent, so that a plate shows through, undistorted"),
       row<&RenderSettings::photons>(
           "render", "photons", "", {0, 1000}, render,
           "started for each camera sample, for light of lamps through water; 0: by paths alone"),

@@ -4,54 +4,50 @@ namespace drench::shot_table {
 
 namespace {
 
-constexpr unsigned disc = 1, rectangle = 2, body = 4;  // bits of EmitterType
-
 std::vector<Parameter> emitter_rows() {
   return {
       row<&FluidEmitter::type>("fluid.emitter", "type", "", none, simulate,
                                "an inlet, or a closed mesh that is kept full")
-          .one_of({"disc", "rectangle", "mesh"})
           .identity(),
-      row<&FluidEmitter::center>("fluid.emitter", "center", "m", place, simulate,
+      row<&FluidEmitter::center>("fluid.emitter", "center", "m", coordinate, simulate,
                                  "centre of the inlet, or where the origin of the mesh stands; may "
                                  "be animated: the fluid takes on its velocity")
           .needed(),
-      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", place, simulate,
+      row<&FluidEmitter::direction>("fluid.emitter", "direction", "", coordinate, simulate,
                                     "the way the fluid leaves; any length but 0; may be animated")
-          .only(disc),
+          .only(EmitterType::disc),
       row<&FluidEmitter::center>("fluid.emitter", "interp", "", none, simulate,
                                  "between the keys of center, direction and rotation_deg")
-          .as(Kind::track_mode)
-          .one_of({"linear", "smooth"}),
+          .interpolation({Interpolation::linear, Interpolation::smooth}),
       row<&FluidEmitter::radius>("fluid.emitter", "radius", "m", {0, 1e4}, simulate, "of the inlet")
-          .only(disc),
-      row<&FluidEmitter::u>("fluid.emitter", "u", "m", place, simulate,
+          .only(EmitterType::disc),
+      row<&FluidEmitter::u>("fluid.emitter", "u", "m", coordinate, simulate,
                             "half of one edge; the fluid leaves along u x v")
-          .only(rectangle),
-      row<&FluidEmitter::v>("fluid.emitter", "v", "m", place, simulate,
+          .only(EmitterType::rectangle),
+      row<&FluidEmitter::v>("fluid.emitter", "v", "m", coordinate, simulate,
                             "half of the other edge, at right angles to u")
-          .only(rectangle),
+          .only(EmitterType::rectangle),
       row<&FluidEmitter::speed>("fluid.emitter", "speed", "m/s", {0, 1000}, simulate,
                                 "relative to the inlet")
-          .only(disc | rectangle)
+          .only(EmitterType::disc, EmitterType::rectangle)
           .needed(),
       row<&FluidEmitter::mesh_file>("fluid.emitter", "mesh", "", none, simulate,
                                     "closed PLY or OBJ: every place in it of the lattice that "
                                     "begins at domain.min is filled whenever it is free")
-          .only(body)
+          .only(EmitterType::mesh)
           .needed(),
       row<&FluidEmitter::rotation_deg>("fluid.emitter", "rotation_deg", "deg", turns, simulate,
                                        "about x, then y, then z through center; may be animated")
-          .only(body),
+          .only(EmitterType::mesh),
       row<&FluidEmitter::scale>("fluid.emitter", "scale", "", {1e-6, 1e6}, simulate,
                                 "metres for a unit of the file")
-          .only(body),
+          .only(EmitterType::mesh),
       row<&FluidEmitter::inset>("fluid.emitter", "inset", "", {0, 1}, simulate,
                                 "how deep inside the surface particles appear at least / spacing")
-          .only(body),
+          .only(EmitterType::mesh),
       row<&FluidEmitter::velocity>("fluid.emitter", "velocity", "m/s", speed, simulate,
                                    "of new fluid, added to that of the mesh where it appears")
-          .only(body),
+          .only(EmitterType::mesh),
       row<&FluidEmitter::start>("fluid.emitter", "start", "s", {0, 1e9}, simulate,
                                 "after the simulation's start"),
       row<&FluidEmitter::stop>("fluid.emitter", "stop", "s", {0, 1e9}, simulate,
@@ -65,7 +61,7 @@ std::vector<Parameter> volume_rows() {
                                    "closed PLY or OBJ; particles stand on the lattice that begins "
                                    "at domain.min")
           .needed(),
-      row<&FluidVolume::position>("fluid.volume", "position", "m", place, simulate,
+      row<&FluidVolume::position>("fluid.volume", "position", "m", coordinate, simulate,
                                   "where the origin of the mesh stands"),
       row<&FluidVolume::rotation_deg>("fluid.volume", "rotation_deg", "deg", turns, simulate,
                                       "about x, then y, then z through position"),
@@ -82,13 +78,12 @@ std::vector<Parameter> volume_rows() {
 std::vector<Parameter> sink_rows() {
   return {
       row<&Sink::shape, &Obstacle::type>("sink", "type", "", none, simulate, "its shape")
-          .one_of({"plane", "box", "sphere", "mesh"})
           .needed()
           .identity(),
       row<&Sink::shape, &Obstacle::name>("sink", "name", "", none, simulate,
                                          "in the log; sink, sink2, ... unless given")
           .identity(),
-      row<&Sink::shape, &Obstacle::position>("sink", "position", "m", place, simulate,
+      row<&Sink::shape, &Obstacle::position>("sink", "position", "m", coordinate, simulate,
                                              "a point of the plane, the centre of the box or "
                                              "sphere, the origin of the mesh; may be animated"),
       row<&Sink::shape, &Obstacle::rotation_deg>(
@@ -96,22 +91,21 @@ std::vector<Parameter> sink_rows() {
           "about x, then y, then z through position; may be animated"),
       row<&Sink::shape, &Obstacle::position>("sink", "interp", "", none, simulate,
                                              "between the keys of position and rotation_deg")
-          .as(Kind::track_mode)
-          .one_of({"linear", "smooth"}),
-      row<&Sink::shape, &Obstacle::normal>("sink", "normal", "", place, simulate,
+          .interpolation({Interpolation::linear, Interpolation::smooth}),
+      row<&Sink::shape, &Obstacle::normal>("sink", "normal", "", coordinate, simulate,
                                            "points away from the side that takes fluid; any length "
                                            "but 0")
-          .only(plane),
+          .only(ObstacleType::plane),
       row<&Sink::shape, &Obstacle::size>("sink", "size", "m", {0, 1e5}, simulate, "edges")
-          .only(box),
+          .only(ObstacleType::box),
       row<&Sink::shape, &Obstacle::radius>("sink", "radius", "m", {0, 1e5}, simulate, "radius")
-          .only(ball),
+          .only(ObstacleType::sphere),
       row<&Sink::shape, &Obstacle::mesh_file>("sink", "mesh", "", none, simulate,
                                               "closed PLY or OBJ")
-          .only(mesh_type),
+          .only(ObstacleType::mesh),
       row<&Sink::shape, &Obstacle::scale>("sink", "scale", "", {1e-6, 1e6}, simulate,
                                           "metres for a unit of the file")
-          .only(mesh_type),
+          .only(ObstacleType::mesh),
       row<&Sink::start>("sink", "start", "s", {0, 1e9}, simulate, "after the simulation's start"),
       row<&Sink::stop>("sink", "stop", "s", {0, 1e9}, simulate, "after the simulation's start"),
   };

@@ -14,8 +14,7 @@ std::vector<Parameter> surface_rows() {
       row<&SurfaceSettings::kernel>(
           "surface", "kernel", "", none, mesh,
           "anisotropic: kernels are squeezed across thin sheets and threads, which so have their "
-          "volume and fewer holes; isotropic: all are round")
-          .one_of({"isotropic", "anisotropic"}),
+          "volume and fewer holes; isotropic: all are round"),
       row<&SurfaceSettings::smoothing>("surface", "smoothing", "", {0, 1000}, mesh,
                                        "passes over the mesh; they keep its volume"),
       row<&SurfaceSettings::obj>("surface", "obj", "", none, mesh,

@@ -20,7 +20,7 @@ Row axis_row(std::string_view key, std::string_view description) {
   row.stages = simulate;
   row.description = description;
   row.field = axis_field<I>;
-  return row.one_of({"open", "walls", "periodic"});
+  return row.choice<Axis>();
 }
 
 Row grid_pins_row() {
@@ -34,14 +34,13 @@ Row grid_pins_row() {
       "Turned into [[cloth.pin]] vertices. A sheet that spans a periodic axis has no rim there, "
       "but "
       "rim and corners hold that line, too: name the two other edges";
-  return row.one_of({"corners", "edge_u0", "edge_u1", "edge_v0", "edge_v1", "rim"});
+  row.choices.assign(enum_names<GridPins>.begin(), enum_names<GridPins>.end());
+  return row;
 }
 
 constexpr const char* contact_angle =
     "at which the fluid's surface meets it, measured within the fluid, where there is "
     "fluid.surface_tension: below 90 it wets, above it beads";
-// bits of ProbeType
-constexpr unsigned height = 1, pressure = 2, force = 4, tip = 8, velocity = 64, front = 128;
 
 std::vector<Parameter> shot_rows() {
   return {
@@ -69,16 +68,16 @@ std::vector<Parameter> shot_rows() {
           "turns in it. Positions, velocities and wind are relative to the domain. It turns evenly "
           "between keys, not at all before and after them; at the start all moves with it; may be "
           "animated"),
-      row<&Shot::frame_axis>("shot", "frame_axis", "", place, simulate,
+      row<&Shot::frame_axis>("shot", "frame_axis", "", coordinate, simulate,
                              "about which the domain turns, right-handed; any length but 0"),
-      row<&Shot::frame_center>("shot", "frame_center", "m", place, simulate,
+      row<&Shot::frame_center>("shot", "frame_center", "m", coordinate, simulate,
                                "a point of that axis"),
       row<&Shot::time_step>("shot", "time_step", "s", {0, 1}, simulate,
                             "fixed step; 0 chooses the largest stable one, step by step"),
 
-      row<&Domain::min>("domain", "min", "m", place, simulate,
+      row<&Domain::min>("domain", "min", "m", coordinate, simulate,
                         "lower corner; walls stand here, and periodic axes begin"),
-      row<&Domain::max>("domain", "max", "m", place, simulate,
+      row<&Domain::max>("domain", "max", "m", coordinate, simulate,
                         "upper corner; walls stand here, and periodic axes begin anew"),
       axis_row<0>("x",
                   "both ends of the x axis; periodic ones are one and the same place, "
@@ -93,8 +92,7 @@ std::vector<Parameter> shot_rows() {
                          "how the incompressible solver's fluid meets these walls: free, or none "
                          "(it moves with them). automatic is none if a layer that a wall brakes "
                          "grows a spacing thick within 1 s, sqrt(kinematic_viscosity 1 s) >= "
-                         "spacing, or if a wall moves; thinner layers cannot be resolved: free")
-          .one_of({"automatic", "free", "none"}),
+                         "spacing, or if a wall moves; thinner layers cannot be resolved: free"),
 
       row<&Domain::contact_angle_deg>("domain", "contact_angle_deg", "deg", {30, 150}, simulate,
                                       contact_angle),
@@ -124,8 +122,7 @@ std::vector<Parameter> fluid_rows() {
       row<&Fluid::solver>("fluid", "solver", "", none, simulate,
                           "incompressible solves for the pressure that keeps the density, in large "
                           "steps; weakly_compressible follows sound, in small ones. automatic is "
-                          "incompressible but for coupling.scheme \"paper\"")
-          .one_of({"automatic", "incompressible", "weakly_compressible"}),
+                          "incompressible but for coupling.scheme \"paper\""),
       row<&Fluid::tolerance>("fluid", "tolerance", "", {1e-7, 0.1}, simulate,
                              "of the incompressible solver: mean error of the density over rest "
                              "density that a step may leave. The one knob of quality against time"),
@@ -154,20 +151,21 @@ std::vector<Parameter> fluid_rows() {
                              "particles and the mesh's vertices get their time in the shot, s"),
       row<&Fluid::material>("fluid", "material", "", none, render, "name of a [[material]]"),
 
-      row<&FluidBox::min>("fluid.box", "min", "m", place, simulate, "lower corner").needed(),
-      row<&FluidBox::max>("fluid.box", "max", "m", place, simulate, "upper corner").needed(),
+      row<&FluidBox::min>("fluid.box", "min", "m", coordinate, simulate, "lower corner").needed(),
+      row<&FluidBox::max>("fluid.box", "max", "m", coordinate, simulate, "upper corner").needed(),
       row<&FluidBox::velocity>("fluid.box", "velocity", "m/s", speed, simulate, "at the start"),
 
-      row<&FluidSphere::center>("fluid.sphere", "center", "m", place, simulate, "centre").needed(),
+      row<&FluidSphere::center>("fluid.sphere", "center", "m", coordinate, simulate, "centre")
+          .needed(),
       row<&FluidSphere::radius>("fluid.sphere", "radius", "m", {0, 1e4}, simulate, "radius")
           .needed(),
       row<&FluidSphere::velocity>("fluid.sphere", "velocity", "m/s", speed, simulate,
                                   "at the start"),
 
-      row<&FluidDrops::min>("fluid.drops", "min", "m", place, simulate,
+      row<&FluidDrops::min>("fluid.drops", "min", "m", coordinate, simulate,
                             "lower corner of the centres")
           .needed(),
-      row<&FluidDrops::max>("fluid.drops", "max", "m", place, simulate,
+      row<&FluidDrops::max>("fluid.drops", "max", "m", coordinate, simulate,
                             "upper corner of the centres")
           .needed(),
       row<&FluidDrops::velocity>("fluid.drops", "velocity", "m/s", speed, simulate, "at the start"),
@@ -187,9 +185,10 @@ std::vector<Parameter> cloth_rows() {
           "cloth", "name", "", none, simulate | render,
           "name of the sheet, part of its file names; cloth, cloth2, ... unless given")
           .identity(),
-      row<&Cloth::corner>("cloth", "corner", "m", place, simulate, "grid: where u and v start"),
-      row<&Cloth::u>("cloth", "u", "m", place, simulate, "grid: one edge"),
-      row<&Cloth::v>("cloth", "v", "m", place, simulate, "grid: the other edge"),
+      row<&Cloth::corner>("cloth", "corner", "m", coordinate, simulate,
+                          "grid: where u and v start"),
+      row<&Cloth::u>("cloth", "u", "m", coordinate, simulate, "grid: one edge"),
+      row<&Cloth::v>("cloth", "v", "m", coordinate, simulate, "grid: the other edge"),
       row<&Cloth::cells>(
           "cloth", "cells", "", {1, 4096}, simulate,
           "grid: [along u, along v]; vertex j (cells_u + 1) + i stands at i along u"),
@@ -221,118 +220,110 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "
                         "with the sheet, which it drags along). automatic is as that of "
-                        "domain.slip")
-          .one_of({"automatic", "free", "none"}),
+                        "domain.slip"),
       row<&Cloth::contact_angle_deg>("cloth", "contact_angle_deg", "deg", {30, 150}, simulate,
                                      contact_angle),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
-      row<&Cloth::matte>("cloth", "matte", "", none, render, matte_text)
-          .one_of({"none", "holdout", "shadow_catcher"}),
+      row<&Cloth::matte>("cloth", "matte", "", none, render, matte_text),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
                                "indices of vertices held where they start"),
       row<&ClothPin::box>(
-          "cloth.pin", "box", "m", place, simulate,
+          "cloth.pin", "box", "m", coordinate, simulate,
           "{min = [x, y, z], max = [x, y, z]}: every vertex inside it at the start"),
 
       row<&Coupling::scheme>("coupling", "scheme", "", none, simulate,
-                             "exact, or paper: Harada, Koshizuka, Kawaguchi 2007 as published")
-          .one_of({"exact", "paper"}),
+                             "exact, or paper: Harada, Koshizuka, Kawaguchi 2007 as published"),
   };
 }
 
 std::vector<Parameter> obstacle_rows() {
   constexpr unsigned all = simulate | mesh | render;
   return {
-      row<&Obstacle::type>("obstacle", "type", "", none, all, "its shape")
-          .one_of({"plane", "box", "sphere", "mesh"})
-          .needed()
-          .identity(),
+      row<&Obstacle::type>("obstacle", "type", "", none, all, "its shape").needed().identity(),
       row<&Obstacle::name>("obstacle", "name", "", none, all,
                            "obstacle, obstacle2, ... unless given")
           .identity(),
-      row<&Obstacle::position>("obstacle", "position", "m", place, all,
+      row<&Obstacle::position>("obstacle", "position", "m", coordinate, all,
                                "a point of the plane, the centre of the box or sphere, the origin "
                                "of the mesh; may be animated"),
       row<&Obstacle::rotation_deg>("obstacle", "rotation_deg", "deg", {-360000, 360000}, all,
                                    "about x, then y, then z through position; may be animated"),
       row<&Obstacle::position>("obstacle", "interp", "", none, all,
                                "between the keys of position and rotation_deg")
-          .as(Kind::track_mode)
-          .one_of({"linear", "smooth"}),
-      row<&Obstacle::normal>("obstacle", "normal", "", place, all,
+          .interpolation({Interpolation::linear, Interpolation::smooth}),
+      row<&Obstacle::normal>("obstacle", "normal", "", coordinate, all,
                              "points from the solid to the fluid; any length but 0")
-          .only(plane),
-      row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, all, "edges").only(box),
-      row<&Obstacle::radius>("obstacle", "radius", "m", {0, 1e5}, all, "radius").only(ball),
+          .only(ObstacleType::plane),
+      row<&Obstacle::size>("obstacle", "size", "m", {0, 1e5}, all, "edges").only(ObstacleType::box),
+      row<&Obstacle::radius>("obstacle", "radius", "m", {0, 1e5}, all, "radius")
+          .only(ObstacleType::sphere),
       row<&Obstacle::mesh_file>("obstacle", "mesh", "", none, all,
                                 "closed PLY or OBJ; with %04d in the name one file for every frame "
                                 "of the shot, of the same triangles")
           .as(Kind::mesh_files)
-          .only(mesh_type),
+          .only(ObstacleType::mesh),
       row<&Obstacle::scale>("obstacle", "scale", "", {1e-6, 1e6}, all,
                             "metres for a unit of the file")
-          .only(mesh_type),
+          .only(ObstacleType::mesh),
       row<&Obstacle::friction>("obstacle", "friction", "", {0, 100}, simulate,
                                "Coulomb's coefficient of cloth on it"),
       row<&Obstacle::slip>("obstacle", "slip", "", none, simulate,
                            "how the incompressible solver's fluid meets it: free, or none (it "
                            "moves with the surface). automatic is as that of domain.slip, but that "
-                           "motion does not matter")
-          .one_of({"automatic", "free", "none"}),
+                           "motion does not matter"),
       row<&Obstacle::contact_angle_deg>("obstacle", "contact_angle_deg", "deg", {30, 150}, simulate,
                                         contact_angle),
       row<&Obstacle::material>("obstacle", "material", "", none, render, "name of a [[material]]"),
       row<&Obstacle::visible>("obstacle", "visible", "", none, render, "drawn"),
-      row<&Obstacle::matte>("obstacle", "matte", "", none, render, matte_text)
-          .one_of({"none", "holdout", "shadow_catcher"}),
+      row<&Obstacle::matte>("obstacle", "matte", "", none, render, matte_text),
   };
 }
 
 std::vector<Parameter> probe_rows() {
   return {
       row<&Probe::type>("probe", "type", "", none, simulate, "what is measured on every step")
-          .one_of({"height", "pressure", "force", "tip", "energy", "volume", "velocity", "front"})
           .needed()
           .identity(),
       row<&Probe::name>("probe", "name", "", none, simulate,
                         "part of its file's name, sim/probe.NAME.csv; probe, probe2, ... unless "
                         "given")
           .identity(),
-      row<&Probe::position>("probe", "position", "m", place, simulate,
+      row<&Probe::position>("probe", "position", "m", coordinate, simulate,
                             "height: the vertical line through it; pressure: centre of the disc; "
                             "velocity: centre of the ball; tip: the vertex nearest to it at rest")
-          .only(height | pressure | tip | velocity),
-      row<&Probe::normal>("probe", "normal", "", place, simulate,
+          .only(ProbeType::height, ProbeType::pressure, ProbeType::tip, ProbeType::velocity),
+      row<&Probe::normal>("probe", "normal", "", coordinate, simulate,
                           "of the disc; any length but 0. A disc within half a spacing of a wall "
                           "of the domain, an obstacle or a sheet, and along it, measures what is "
                           "pushed there; of a sheet the side that it points to")
-          .only(pressure),
+          .only(ProbeType::pressure),
       row<&Probe::radius>("probe", "radius", "m", {1e-6, 1e4}, simulate,
                           "of the disc or ball; below a spacing it counts as one")
-          .only(pressure | velocity),
-      row<&Probe::direction>("probe", "direction", "", place, simulate,
+          .only(ProbeType::pressure, ProbeType::velocity),
+      row<&Probe::direction>("probe", "direction", "", coordinate, simulate,
                              "along which the farthest fluid is looked for; any length but 0")
-          .only(front),
+          .only(ProbeType::front),
       row<&Probe::on>("probe", "on", "", none, simulate,
                       "an obstacle by name: position and normal are its own coordinates, in m from "
                       "its position along its turned axes, and move with it; a plane's y axis is "
                       "its normal")
           .as(Kind::label)
-          .only(height | pressure | velocity),
+          .only(ProbeType::height, ProbeType::pressure, ProbeType::velocity),
       row<&Probe::interval>("probe", "interval", "s", {0, 1e6}, simulate,
                             "between rows, at ends of steps; 0: a row for every step"),
       row<&Probe::window>("probe", "window", "s", {0, 1}, simulate,
                           "the mean columns are means over so much time before each row")
-          .only(pressure | force),
+          .only(ProbeType::pressure, ProbeType::force),
       row<&Probe::target>("probe", "target", "", none, simulate,
                           "what the fluid pushes: a domain wall, x_low to z_high, an obstacle or "
                           "a sheet, by name")
-          .only(force),
-      row<&Probe::cloth>("probe", "cloth", "", none, simulate, "name of the sheet").only(tip),
+          .only(ProbeType::force),
+      row<&Probe::cloth>("probe", "cloth", "", none, simulate, "name of the sheet")
+          .only(ProbeType::tip),
       row<&Probe::vertex>("probe", "vertex", "", {-1, 2e9}, simulate,
                           "of the sheet; -1: the one nearest to position at rest")
-          .only(tip),
+          .only(ProbeType::tip),
   };
 }
 

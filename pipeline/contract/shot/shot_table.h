@@ -1,6 +1,6 @@
 #pragma once
 // The one list of sections and keys of a shot file. Reading, checking, the lock file, the digests
-// and the reference all walk it.
+// and the reference are made of it.
 
 #include <string>
 #include <string_view>
@@ -21,7 +21,7 @@ enum class Kind {
   name,          // std::string of letters, digits, '_' and '-'
   path,          // std::filesystem::path, empty: none
   mesh_files,    // the same, or with one %04d in its name: a file for every frame
-  choice,        // enum whose values count from 0, as `choices`
+  choice,        // enum whose enumerators are `choices`
   vector,        // V3d
   colour,        // V3f, linear ACEScg, or a string srgb(r, g, b) or #rrggbb
   spectrum,      // V3f, linear ACEScg
@@ -34,6 +34,9 @@ enum class Kind {
   box,           // std::optional<std::pair<V3d, V3d>>
   grid_pins,     // no field: becomes ClothPin::vertices once the grid is known
 };
+
+/// Vertices of a grid that grid_pins holds; u0 is the edge where u starts.
+enum class GridPins { corners, edge_u0, edge_u1, edge_v0, edge_v1, rim };
 
 /// Stages that read a value; a stage's digest covers exactly the rows that name it.
 enum : unsigned { no_stage = 0, simulate = 1, mesh = 2, render = 4, foam = 8, denoise = 16 };
@@ -51,9 +54,11 @@ struct Parameter {
   std::string_view description;
   void* (*field)(void* owner) = nullptr;
   std::vector<std::string_view> choices = {};
+  void (*choose)(void* field, std::string_view name) = nullptr;  // choices of an enum
+  std::string_view (*chosen)(const void* field) = nullptr;
   bool required = false;  // when the section stands in the file
-  bool fixed = false;     // cannot be overridden: it says which thing this is
-  unsigned types = ~0u;   // bit i: the key belongs to things whose type is choice i
+  bool fixed = false;     // cannot be overridden: it says which object this is
+  unsigned types = ~0u;   // bit i: the key belongs to objects whose type is choice i
 };
 
 /// A table or an array of tables. `owner` is the parent section's object, the Shot at the top.
@@ -65,8 +70,8 @@ struct Section {
   size_t (*count)(void* owner) = nullptr;
   void* (*at)(void* owner, size_t index) = nullptr;
   void (*append)(void* owner) = nullptr;                  // repeated only
-  const std::string* (*name_of)(void* object) = nullptr;  // things with names
-  int (*type_of)(void* object) = nullptr;                 // things with a type
+  const std::string* (*name_of)(void* object) = nullptr;  // objects with names
+  int (*type_of)(void* object) = nullptr;                 // objects with a type
 };
 
 const std::vector<Section>& sections();  // a parent stands before its children
@@ -100,9 +105,10 @@ void visit_children(std::string_view parent, void* owner, const std::string& pat
     const size_t n = section.repeated ? section.count(owner) : 1;
     for (size_t i = 0; i < n; ++i) {
       void* const object = section.at(owner, i);
-      const std::string place = section.repeated ? prefix + "[" + std::to_string(i) + "]" : prefix;
-      f(section, object, place);
-      visit_children(section.name, object, place, f);
+      const std::string own_path =
+          section.repeated ? prefix + "[" + std::to_string(i) + "]" : prefix;
+      f(section, object, own_path);
+      visit_children(section.name, object, own_path, f);
     }
   }
 }

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/files/named_file.h"
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/colour.h"
+#include "pipeline/contract/shot/enum_names.h"
 #include "pipeline/contract/shot/printable.h"
+#include "pipeline/contract/shot/shot_text.h"
 
 namespace drench::shot_table {
 
@@ -20,13 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* not_utf8 = "its folder's name is not UTF-8; rename the folder";
-
-std::string number_text(double value) {
-  std::string text = fmt::format("{}", value);
-  // TOML tells 1.0 from 1; a reader of the lock file should too.
-  if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
 
 std::string shown(const toml::node& value) {
   constexpr size_t longest = 60;
@@ -78,6 +72,9 @@ const char* example_of(Kind kind) {
       return "\"...\"";
   }
 }
+
+/// A track is written as its one value, or as pairs of a frame and a value.
+enum class TrackForm { constant, keys };
 
 /// Reads the parts of one value; every failure names the whole of it.
 class ValueReader {
@@ -151,11 +148,10 @@ class ValueReader {
     return value->get();
   }
 
-  int choice(const toml::node& node) const {
+  std::string_view choice(const toml::node& node) const {
     const std::string word = text(node);
-    for (size_t i = 0; i < parameter_.choices.size(); ++i) {
-      if (word == parameter_.choices[i]) return int(i);
-    }
+    for (const std::string_view known : parameter_.choices)
+      if (word == known) return known;
     const std::string_view near = nearest_word(word, parameter_.choices);
     fail(fmt::format("it must be one of \"{}\"{}", fmt::join(parameter_.choices, "\", \""),
                      near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
@@ -227,8 +223,8 @@ class ValueReader {
   }
 
   template <class T, class ReadOne>
-  void track(Animated<T>& field, bool keyed, ReadOne read_one) const {
-    if (!keyed) {
+  void track(Animated<T>& field, TrackForm form, ReadOne read_one) const {
+    if (form == TrackForm::constant) {
       field.keys = {{0.0, read_one(value_)}};
       return;
     }
@@ -246,9 +242,13 @@ class ValueReader {
     field.keys = std::move(keys);
   }
 
-  bool is_keyed() const {
+  TrackForm number_track() const {
+    return value_.is_array() ? TrackForm::keys : TrackForm::constant;
+  }
+  TrackForm vector_track() const {  // a constant is an array, too
     const auto* array = value_.as_array();
-    return array != nullptr && !array->empty() && array->front().is_array();
+    const bool keys = array != nullptr && !array->empty() && array->front().is_array();
+    return keys ? TrackForm::keys : TrackForm::constant;
   }
 
   std::vector<uint32_t> vertices(const toml::node& node) const {
@@ -312,60 +312,8 @@ T& as(void* field) {
   return *static_cast<T*>(field);
 }
 template <class T>
-const T& as(const void* field) {
-  return *static_cast<const T*>(field);
-}
-template <class T>
 void put(void* field, T value) {
   as<T>(field) = std::move(value);
-}
-void put_choice(void* field, int index) {  // an enum of int's size whose values count from 0
-  std::memcpy(field, &index, sizeof index);
-}
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const unsigned char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += char(c);
-    } else if (c < 0x20 || c == 0x7f) {
-      out += fmt::format("\\u{:04x}", c);
-    } else {
-      out += char(c);
-    }
-  }
-  return out + "\"";
-}
-
-template <class V>
-std::string vector_text(const V& v) {
-  return fmt::format("[{}, {}, {}]", number_text(v.x), number_text(v.y), number_text(v.z));
-}
-
-// A float needs only its own digits, not those of the double it becomes.
-std::string colour_text(const V3f& v) {
-  const auto one = [](float value) {
-    std::string text = fmt::format("{}", value);
-    return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;
-  };
-  return fmt::format("[{}, {}, {}]", one(v.x), one(v.y), one(v.z));
-}
-
-template <class T, class OneText>
-std::string track_text(const Animated<T>& track, OneText one) {
-  if (track.keys.size() == 1 && track.keys[0].first == 0) return one(track.keys[0].second);
-  std::string text;
-  for (const auto& [frame, value] : track.keys) {
-    text += fmt::format("{}[{}, {}]", text.empty() ? "[" : ", ", number_text(frame), one(value));
-  }
-  return text + "]";
-}
-
-std::string choice_text(const Parameter& parameter, const void* field) {
-  int index = 0;
-  std::memcpy(&index, field, sizeof index);
-  return fmt::format("\"{}\"", parameter.choices.at(size_t(index)));
 }
 
 }  // namespace
@@ -395,7 +343,8 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::mesh_files:
       return put<fs::path>(field, reader.mesh_files(value));
     case Kind::choice:
-      return put_choice(field, reader.choice(value));
+    case Kind::track_mode:
+      return parameter.choose(field, reader.choice(value));
     case Kind::vector:
       return put<V3d>(field, reader.vector(value));
     case Kind::colour:
@@ -407,14 +356,11 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
     case Kind::frames:
       return put<Timeline>(field, reader.frames(value, as<Timeline>(field)));
     case Kind::number_track:
-      reader.track(as<Animated<double>>(field), value.is_array(), one_number);
+      reader.track(as<Animated<double>>(field), reader.number_track(), one_number);
       if (as<Animated<double>>(field).keys.empty()) reader.wrong_type();
       break;
     case Kind::vector_track:
-      reader.track(as<Animated<V3d>>(field), reader.is_keyed(), one_vector);
-      break;
-    case Kind::track_mode:  // the row's field is the position of the camera or obstacle
-      as<Animated<V3d>>(field).interpolation = Interpolation(reader.choice(value));
+      reader.track(as<Animated<V3d>>(field), reader.vector_track(), one_vector);
       break;
     case Kind::vertices:
       return put<std::vector<uint32_t>>(field, reader.vertices(value));
@@ -425,175 +371,15 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
   }
 }
 
-std::vector<std::string> read_grid_pins(const Parameter& parameter, const toml::node& value,
-                                        const Site& site) {
+std::vector<GridPins> read_grid_pins(const Parameter& parameter, const toml::node& value,
+                                     const Site& site) {
   const ValueReader reader(parameter, value, site);
-  std::vector<std::string> names;
-  if (const auto* array = value.as_array()) {
-    for (const toml::node& item : *array) {
-      names.emplace_back(parameter.choices[size_t(reader.choice(item))]);
-    }
-  } else {
-    names.emplace_back(parameter.choices[size_t(reader.choice(value))]);
-  }
-  return names;
-}
-
-std::string printable(std::string text) {
-  for (char& c : text) {
-    if ((c >= 0 && c < 0x20) || c == 0x7f) c = '?';
-  }
-  return text;
-}
-
-const char* file_name_problem(std::string_view name) {
-  const auto control = [](char c) { return (c >= 0 && c < 0x20) || c == 0x7f; };
-  if (name.empty()) return "it names output files, so it must not be empty";
-  if (name.size() > 200) return "it names output files; use at most 200 bytes";
-  if (!is_utf8(name)) return "it names output files; use UTF-8";
-  if (name.find('/') != name.npos || std::any_of(name.begin(), name.end(), control)) {
-    return "it names output files; use neither '/' nor control characters";
-  }
-  if (name[0] == '.' || name[0] == '-')
-    return "it names output files; start with a letter or digit";
-  return nullptr;
-}
-
-std::string value_text(const Parameter& parameter, const void* field) {
-  switch (parameter.kind) {
-    case Kind::boolean:
-      return as<bool>(field) ? "true" : "false";
-    case Kind::integer:
-      return fmt::format("{}", as<int>(field));
-    case Kind::natural:
-      return fmt::format("{}", as<uint32_t>(field));
-    case Kind::number:
-      return number_text(as<double>(field));
-    case Kind::text:
-    case Kind::label:
-    case Kind::name:
-      return as<std::string>(field).empty() ? "" : quoted(as<std::string>(field));
-    case Kind::path:
-    case Kind::mesh_files:
-      return as<fs::path>(field).empty() ? "" : quoted(as<fs::path>(field).string());
-    case Kind::choice:
-      return choice_text(parameter, field);
-    case Kind::vector:
-      return vector_text(as<V3d>(field));
-    case Kind::colour:
-    case Kind::spectrum:
-      return colour_text(as<V3f>(field));
-    case Kind::cells:
-      return fmt::format("[{}, {}]", as<V2i>(field).x, as<V2i>(field).y);
-    case Kind::frames:
-      return fmt::format("[{}, {}]", as<Timeline>(field).first, as<Timeline>(field).last);
-    case Kind::number_track:
-      return track_text(as<Animated<double>>(field), number_text);
-    case Kind::vector_track:
-      return track_text(as<Animated<V3d>>(field), vector_text<V3d>);
-    case Kind::track_mode:
-      return choice_text(parameter, &as<Animated<V3d>>(field).interpolation);
-    case Kind::vertices: {
-      const auto& list = as<std::vector<uint32_t>>(field);
-      return list.empty() ? "" : fmt::format("[{}]", fmt::join(list, ", "));
-    }
-    case Kind::box: {
-      const auto& box = as<std::optional<std::pair<V3d, V3d>>>(field);
-      return box ? fmt::format("{{min = {}, max = {}}}", vector_text(box->first),
-                               vector_text(box->second))
-                 : "";
-    }
-    case Kind::grid_pins:
-      return "";
-  }
-  return "";
-}
-
-std::string kind_text(const Parameter& parameter) {
-  const std::string in = parameter.unit.empty() ? "" : fmt::format(" in {}", parameter.unit);
-  switch (parameter.kind) {
-    case Kind::boolean:
-      return "true or false";
-    case Kind::integer:
-    case Kind::natural:
-      return "a whole number" + in;
-    case Kind::number:
-      return "a number" + in;
-    case Kind::text:
-    case Kind::label:
-    case Kind::name:
-      return "a name in quotes";
-    case Kind::path:
-      return "the path of a file in quotes";
-    case Kind::mesh_files:
-      return "the path of a file or of a sequence in quotes";
-    case Kind::track_mode:
-    case Kind::choice:
-      return fmt::format("one of \"{}\"", fmt::join(parameter.choices, "\", \""));
-    case Kind::vector:
-      return "an array of 3 numbers" + in;
-    case Kind::colour:
-      return "a colour" + in;
-    case Kind::spectrum:
-      return "an array of 3 numbers (linear ACEScg)" + in;
-    case Kind::cells:
-      return "an array of 2 whole numbers";
-    case Kind::frames:
-      return "an array of 2 whole numbers, first and last frame,";
-    case Kind::number_track:
-      return fmt::format("a number{} or [[frame, number], ...]", in);
-    case Kind::vector_track:
-      return fmt::format("3 numbers{} or [[frame, [x, y, z]], ...]", in);
-    case Kind::vertices:
-      return "an array of whole numbers";
-    case Kind::box:
-      return "a table of min and max" + in;
-    case Kind::grid_pins:
-      return fmt::format("one or an array of \"{}\"", fmt::join(parameter.choices, "\", \""));
-  }
-  return "";
-}
-
-std::string limits_text(const Parameter& parameter) {
-  const std::string unit = parameter.unit.empty() ? "" : fmt::format(" {}", parameter.unit);
-  const auto plain = [](double value) {
-    return value == std::floor(value) && std::abs(value) < 1e15 ? fmt::format("{:.0f}", value)
-                                                                : fmt::format("{}", value);
-  };
-  return fmt::format("it must lie between {} and {}{}", plain(parameter.limits.lowest),
-                     plain(parameter.limits.highest), unit);
-}
-
-std::string_view nearest_word(std::string_view word, const std::vector<std::string_view>& words) {
-  // Edit distance (Levenshtein); one row of the table is kept.
-  const auto distance = [&](std::string_view other) {
-    std::vector<size_t> row(other.size() + 1);
-    for (size_t j = 0; j <= other.size(); ++j) row[j] = j;
-    for (size_t i = 1; i <= word.size(); ++i) {
-      size_t diagonal = row[0]++;
-      for (size_t j = 1; j <= other.size(); ++j) {
-        const size_t replaced = diagonal + (word[i - 1] == other[j - 1] ? 0 : 1);
-        diagonal = row[j];
-        row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-      }
-    }
-    return row.back();
-  };
-  const auto is_part_of = [&](std::string_view other) {
-    return !word.empty() &&
-           fmt::format("_{}_", other).find(fmt::format("_{}_", word)) != std::string::npos;
-  };
-  if (word.size() > 64) return {};
-  std::string_view best;
-  size_t least = std::max<size_t>(2, word.size() / 2) + 1;
-  for (const std::string_view other : words) {
-    const size_t d = is_part_of(other) ? 1 : distance(other);
-    if (d < least && d < other.size()) {
-      least = d;
-      best = other;
-    }
-  }
-  return best;
+  const auto one = [&](const toml::node& node) { return enum_of<GridPins>(reader.choice(node)); };
+  const auto* const array = value.as_array();
+  if (array == nullptr) return {one(value)};
+  std::vector<GridPins> pins;
+  for (const toml::node& item : *array) pins.push_back(one(item));
+  return pins;
 }
 
 }  // namespace drench::shot_table

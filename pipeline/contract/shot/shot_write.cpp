@@ -7,7 +7,7 @@
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/contract/shot/shot_table.h"
-#include "pipeline/contract/shot/shot_value.h"
+#include "pipeline/contract/shot/shot_text.h"
 
 namespace drench {
 

@@ -127,9 +127,9 @@ double inlet_area(const FluidEmitter& emitter) {
 }
 
 void check_sources(const Shot& shot, const ShotSources& sources) {
-  const auto check_all = [&](const auto& things, const char* section) {
-    for (size_t i = 0; i < things.size(); ++i)
-      SourceChecker(shot, sources, fmt::format("{}[{}]", section, i)).check(things[i]);
+  const auto check_all = [&](const auto& objects, const char* section) {
+    for (size_t i = 0; i < objects.size(); ++i)
+      SourceChecker(shot, sources, fmt::format("{}[{}]", section, i)).check(objects[i]);
   };
   check_all(shot.fluid.emitter, "fluid.emitter");
   check_all(shot.fluid.volume, "fluid.volume");

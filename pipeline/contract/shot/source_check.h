@@ -9,8 +9,8 @@ namespace drench {
 /// m^2; of a disc or rectangle, else 0.
 double inlet_area(const FluidEmitter& emitter);
 
-/// @throws Error with place, keys, values, reason and remedy for the first emitter, volume, sink or
-/// wind that cannot be right.
+/// @throws Error with location, keys, values, reason and remedy for the first emitter, volume, sink
+/// or wind that cannot be right.
 void check_sources(const Shot& shot, const ShotSources& sources);
 
 }  // namespace drench

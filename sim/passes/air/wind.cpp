@@ -9,7 +9,7 @@ void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecVie
   const VecView diagonal = c.air_diagonal.view(), cross_terms = c.air_cross.view(),
                 push = c.air_push.view();
   const int *fan_start = c.fan_start.data(), *fan = c.fan_entry.data(), *corner = c.corner.data();
-  const Corners place = corners_of(c);
+  const Corners corners = corners_of(c);
   const float* share = c.air_share.data();
   const float half = 0.5f * p.air_density, normal_drag = half * p.cloth_drag,
               tangential_drag = half * p.cloth_friction;
@@ -22,9 +22,9 @@ void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecVie
         for (int k = fan_start[i]; k < fan_start[i + 1]; ++k) {
           const int* v = corner + 3 * (fan[k] / 3);
           const int first = 3 * (fan[k] / 3);
-          const Vec3<float> a = place.at(position, first);
+          const Vec3<float> a = corners.at(position, first);
           const Vec3<float> twice =
-              cross(place.at(position, first + 1) - a, place.at(position, first + 2) - a);
+              cross(corners.at(position, first + 1) - a, corners.at(position, first + 2) - a);
           const float size = length(twice);  // twice the area
           const Vec3<float> n = twice * (1.f / maximum(size, 1e-20f));
           const Vec3<float> u =
@@ -63,7 +63,7 @@ void wind_on_fluid(State& state) {
         const Vec3<float> u = wind_at(wind, x[i]) - v[i];
         const float speed = length(u);
         if (!(speed > 1e-6f)) return;
-        const Vec3<float> way = u * (1.f / speed);
+        const Vec3<float> direction = u * (1.f / speed);
         float shelter = 0.f;
         const size_t end = list.end(i);
         for (size_t k = list.first(i); k < end && shelter < 1.f; ++k) {
@@ -71,11 +71,11 @@ void wind_on_fluid(State& state) {
           if (j == i || !(list.closeness(k) > 0.f)) continue;
           const Vec3<float> d = nearest(x[i] - x[j], period);
           const float size = length(d);
-          if (size > 0.f) shelter = maximum(shelter, dot(way, d) / size);
+          if (size > 0.f) shelter = maximum(shelter, dot(direction, d) / size);
         }
         const Vec3<float> in{wall[i].x, wall[i].y, wall[i].z};  // towards walls
         const float steep = length(in);
-        if (steep > 0.f) shelter = maximum(shelter, -dot(way, in) / steep);
+        if (steep > 0.f) shelter = maximum(shelter, -dot(direction, in) / steep);
         shelter = minimum(shelter, 1.f);
         const float rate = step * speed * law.area(speed, density[i] * rest, shelter);
         v.set(i, v[i] + u * (rate / (1.f + rate)));

@@ -13,14 +13,14 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// The wind at a place, m/s.
+/// The wind at a position, m/s.
 DRENCH_HD Vec3<float> wind_at(const WindNow& wind, Vec3<float> x) {
   Vec3<float> u{wind.velocity[0], wind.velocity[1], wind.velocity[2]};
   for (int k = 0; k < wind.modes; ++k) {
     const float* wave = wind.wave[k];
-    const float* push = wind.push[k];
+    const float* amplitude = wind.amplitude[k];
     const float s = sinf(wave[0] * x.x + wave[1] * x.y + wave[2] * x.z + wind.phase[k]);
-    u = u + Vec3<float>{push[0], push[1], push[2]} * s;
+    u = u + Vec3<float>{amplitude[0], amplitude[1], amplitude[2]} * s;
   }
   return u;
 }
@@ -58,6 +58,7 @@ inline AirDrag air_drag_of(const State& state) {
 /// B of every vertex and what the air pushes it with at its velocity, N.
 void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecView& velocity);
 
+/// blow_at_cloth at the start of the step, into ClothState::air_diagonal, air_cross and air_push.
 void wind_on_cloth(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

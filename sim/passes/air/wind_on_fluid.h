@@ -2,9 +2,10 @@
 // Air drag on the fluid's surface and spray, after Gissler et al. (2017): a particle on its own is
 // a drop, a rigid sphere of its volume, with the drag of Schiller and Naumann (eqs 9, 12 there
 // without the deformation); one among neighbours shows a square of its spacing with a coefficient
-// of 1 (eqs 10, 13). Neighbours and walls upwind shelter it: the share of the area that is left is
-// one less the largest cosine between the wind and the way from one of them (eqs 14, 15). What is
-// full around feels nothing. Implicit in the magnitude held, so that no drop overshoots the wind.
+// of 1 (eqs 10, 13). Neighbours and walls upwind shelter it: the fraction of the area that is left
+// is one less the largest cosine between the wind and the direction from one of them (eqs 14, 15).
+// What is full around feels nothing. Implicit in the magnitude held, so that no drop overshoots the
+// wind.
 
 #include "sim/neighbours/periodic.h"
 #include "sim/passes/air/wind_on_cloth.h"
@@ -15,7 +16,7 @@ namespace drench::sim::DRENCH_BACKEND {
 struct DropDrag {
   float air_density, viscosity;  // kg/m^3, Pa s
   float radius, spacing;         // m, of a drop
-  float alone;                   // share of rest density that a lone particle has of itself
+  float alone;                   // fraction of rest density that a lone particle has of itself
 
   /// Of a rigid sphere.
   DRENCH_HD float sphere(float speed) const {
@@ -39,6 +40,7 @@ inline DropDrag drop_drag_of(const Parameters& p) {
   return {p.air_density, 1.8e-5f, 0.62035f * p.spacing, p.spacing, own};  // (3 / 4 pi)^(1/3)
 }
 
+/// Adds the drag of a step to the particles' velocities, by their density and neighbours.
 void wind_on_fluid(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,8 +8,12 @@ namespace drench::sim::DRENCH_BACKEND {
 void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   const ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  const ClothSprings springs{b.position,           b.velocity,         spring_ends_of(c),
-                             c.rest_length.data(), c.stiffness.data(), c.spring_damping.data()};
+  const ClothSprings springs{.position = b.position,
+                             .velocity = b.velocity,
+                             .ends = spring_ends_of(c),
+                             .rest_length = c.rest_length.data(),
+                             .stiffness = c.stiffness.data(),
+                             .damping = c.spring_damping.data()};
   const ConstVecView fluid_force = c.force.view();
   const float *inverse_mass = c.inverse_mass.data(), *damping_rate = c.damping_rate.data();
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
@@ -25,10 +29,10 @@ void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
         const Vec3<T> gravity{T(g.x), T(g.y), T(g.z)};
         const Vec3<T> a = (springs.force(i) + fluid_force.at(i)) * w + gravity;
         Vec3<T> v = b.velocity.at(i) * decay(load(damping_rate, i) * T(dt)) + a * T(dt);
-        if (air.on) {  // implicit: v' = v + dt w (push - B (v' - v_start))
+        if (air.on) {  // implicit: v' = v + dt w (force - B (v' - v_start))
           const T s = w * T(dt);
-          const Vec3<T> push = air_push.at(i) - air.times(i, v - b.velocity.at(i));
-          v = v + air.settle(i, s, push * s);
+          const Vec3<T> force = air_push.at(i) - air.times(i, v - b.velocity.at(i));
+          v = v + air.settle(i, s, force * s);
         }
         Vec3<T> x = b.position.at(i) + v * T(dt);
         walls.stop(x, v);
@@ -84,19 +88,19 @@ void linearise_cloth(State& state) {
         using T = decltype(load(mass, i));
         const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
         const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
-        Vec3<T> push =
+        Vec3<T> force =
             Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
         T b[6] = {heavy, T(0.f), T(0.f), heavy, T(0.f), heavy};
         Vec3<T> held = none;
         for (int k = 0; k < ends.slots; ++k) {
           const auto at = i + k * ends.stride;
-          const Vec3<T> d = ends.way(x, here, i, k);
+          const Vec3<T> d = ends.to_end(x, here, i, k);
           const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
           const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
           const T t = stiff * max0(excess * inverse);
           const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
           const Vec3<T> away = speed - ends.at_end(v, i, k);
-          push = push + n * (load(stiffness, at) * excess);
+          force = force + n * (load(stiffness, at) * excess);
           held = held + away * t + e * dot(e, away);
           store(tension, at, t), axis.put(at, e);
           b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
@@ -104,7 +108,7 @@ void linearise_cloth(State& state) {
         }
         if (air.on) {
           const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);
-          push = push + air_push.at(i);
+          force = force + air_push.at(i);
           b[0] = b[0] + d.x, b[1] = b[1] + m.x, b[2] = b[2] + m.z;
           b[3] = b[3] + d.y, b[4] = b[4] + m.y, b[5] = b[5] + d.z;
         }
@@ -112,7 +116,7 @@ void linearise_cloth(State& state) {
         block.put(i, b, maximum(heavy, T(1e-20f)));
         const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
         free.put(i, Vec3<T>{moves, moves, moves});
-        base.put(i, push * T(dt * dt) - held * T(dt));
+        base.put(i, force * T(dt * dt) - held * T(dt));
         change.put(i, none);
       });
 }
@@ -132,55 +136,46 @@ void hold_at_walls(State& state) {
       "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
         const Vec3<float> straight = x[i] + v[i] * dt,
                           to = straight + block.times(i, base[i] + right[i]);
-        Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, may = free[i], w = change[i];
+        Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, axes = free[i], w = change[i];
         walls.stop(stop, unused);
-        const auto hold = [reach](float stop, float to, float from, float straight, float& may,
+        const auto hold = [reach](float stop, float to, float from, float straight, float& axis,
                                   float& w) {
-          if (stop == to || may == 0.f || fabsf(stop - from) > reach) return;
-          may = 0.f, w = stop - straight;
+          if (stop == to || axis == 0.f || fabsf(stop - from) > reach) return;
+          axis = 0.f, w = stop - straight;
         };
-        hold(stop.x, to.x, x.x[i], straight.x, may.x, w.x);
-        hold(stop.y, to.y, x.y[i], straight.y, may.y, w.y);
-        hold(stop.z, to.z, x.z[i], straight.z, may.z, w.z);
+        hold(stop.x, to.x, x.x[i], straight.x, axes.x, w.x);
+        hold(stop.y, to.y, x.y[i], straight.y, axes.y, w.y);
+        hold(stop.z, to.z, x.z[i], straight.z, axes.z, w.z);
         const Vec3<float> before = free[i];
-        if (may.x == before.x && may.y == before.y && may.z == before.z) return;
-        free.set(i, may), change.set(i, w);
-        block.put_free(i, block, may, {0.f, 0.f, 0.f}, inertia[i]);
+        if (axes.x == before.x && axes.y == before.y && axes.z == before.z) return;
+        free.set(i, axes), change.set(i, w);
+        block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
       });
 }
 
-bool cloth_ended(const State& state, int sweep) {
-#if defined(__CUDACC__)
-  constexpr int patience = 16;
-  return sweep % patience == patience - 1 && value_at(state.cloth_system.control, 0).done;
-#else
-  (void)sweep;
-  return state.cloth_system.control.data()->done;
-#endif
-}
-
-void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int sweeps,
+void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,
                  float tolerance) {
-  sweep_matrix(state, scaled_cloth_matrix(state), w, right, sweeps, tolerance);
+  solve_cloth_matrix(state, scaled_cloth_matrix(state), w, right, most_iterations, tolerance);
 }
 
-void balance_loose_sheets(State& state, const VecView& w, const ConstVecView& right) {
-  const FreeWays free = free_ways(state);
+void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& right) {
+  const ConstraintProjection constraints = constraint_projection(state);
   const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
   for (const VertexRange& sheet : state.cloth.loose) {
     const int first = sheet.first;
     reduce_then(
-        "cloth: lack", sheet.count, SheetLack{},
+        "cloth: lack", sheet.count, ClothImbalance{},
         DRENCH_LAMBDA(int k) {
           const int i = first + k;
-          const Vec3<float> left = right[i] - matrix.times(w, i), may = free.axis[i];
-          const double gripped = free.obstacles && length2(free.normal[i]) > 0.f ? 1. : 0.;
-          return SheetLack{left.x, left.y, left.z, matrix.inertia[i],
-                           3. - may.x - may.y - may.z + gripped};
+          const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
+          const double gripped =
+              constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
+          return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
+                                3. - free.x - free.y - free.z + gripped};
         },
-        SheetLack{},
-        DRENCH_LAMBDA(const SheetLack& lack) {
+        Plus{},
+        DRENCH_LAMBDA(const ClothImbalance& lack) {
           const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
           control->shift = {float(lack.x * inverse), float(lack.y * inverse),
                             float(lack.z * inverse)};
@@ -226,23 +221,23 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
   const ClothMatrix matrix = cloth_matrix(state);
   const VecView change = s.change.view();
   const VecView reaction = s.residual.view();
-  // The springs of a vertex reach others, whose ways must not change meanwhile.
+  // The springs of a vertex reach others, whose constraints must not change meanwhile.
   parallel_for(
       "cloth: reactions", c.vertices,
       DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
-  const HoldRevision revise{cloth_hold_of(state),
-                            c.position.view(),
-                            c.velocity.view(),
-                            change,
-                            given,
-                            s.answer.view(),
-                            reaction,
-                            s.rub.view(),
-                            s.slides.data(),
-                            c.mass.data(),
-                            c.inverse_mass.data(),
-                            float(state.dt),
-                            round};
+  const HoldRevision revise{.hold = cloth_hold_of(state),
+                            .position = c.position.view(),
+                            .velocity = c.velocity.view(),
+                            .change = change,
+                            .given = given,
+                            .right = s.answer.view(),
+                            .reaction = reaction,
+                            .rub = s.rub.view(),
+                            .slides = s.slides.data(),
+                            .mass = c.mass.data(),
+                            .inverse_mass = c.inverse_mass.data(),
+                            .dt = float(state.dt),
+                            .round = round};
   return parallel_reduce(
              "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
              Larger{}) > 0;
@@ -250,7 +245,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 }  // namespace
 
-void settle_at_obstacles(State& state, const ConstVecView& given, int sweeps, float tolerance) {
+void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
+                         float tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();
@@ -258,7 +254,7 @@ void settle_at_obstacles(State& state, const ConstVecView& given, int sweeps, fl
   parallel_for(
       "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
   for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
-    sweep_cloth(state, change, right, sweeps, 0.1f * tolerance);
+    solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

@@ -1,15 +1,16 @@
 #pragma once
 // Implicit Euler of the sheets, linearised once a step about where they are (Baraff and Witkin
-// 1998): with w = x_end - x - dt v, the way that a vertex comes off the straight one,
+// 1998): with w = x_end - x - dt v, the displacement of a vertex off its straight path,
 //   A w = dt^2 (f(x) + m g + f_owed - m c v) - (dt C + dt^2 K) dt v + loads,   A = m (1 + dt c) +
 //   dt C + dt^2 K + dt B,
 // K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
 // pressures give (cloth_pressure.h). Solved by conjugate gradients scaled by the 3 x 3 blocks of
-// the vertices. B is the drag of the air (wind_on_cloth.h), whose push joins f. Pinned vertices
+// the vertices. B is the drag of the air (wind_on_cloth.h), whose force joins f. Pinned vertices
 // stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h) holds up
 // have the w that takes them there.
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_springs.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -20,39 +21,39 @@ DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
   return {free.x * v.x, free.y * v.y, free.z * v.z};
 }
 
-/// The ways that a vertex may go: its free axes, and of these not along the normal of an obstacle,
-/// nor across it where friction holds it.
-struct FreeWays {
+/// Projection on the free directions of a vertex (the filter of Baraff and Witkin 1998): its free
+/// axes, and of these not along the normal of an obstacle, nor across it where friction holds it.
+struct ConstraintProjection {
   ConstVecView axis, normal;
   const float* slides;
   bool obstacles;
 
   template <class Index, class T>
-  DRENCH_HD Vec3<T> of(Index i, Vec3<T> v) const {
-    const Vec3<T> may = along(axis.at(i), v);
-    if (!obstacles) return may;
+  DRENCH_HD Vec3<T> project(Index i, Vec3<T> v) const {
+    const Vec3<T> free = along(axis.at(i), v);
+    if (!obstacles) return free;
     const Vec3<T> n = normal.at(i);
-    return (may - n * dot(n, may)) * load(slides, i);
+    return (free - n * dot(n, free)) * load(slides, i);
   }
 };
 
-inline FreeWays free_ways(const State& state) {
+inline ConstraintProjection constraint_projection(const State& state) {
   const ClothSystem& s = state.cloth_system;
   return {s.free.view(), s.normal.view(), s.slides.data(), state.parameters.obstacles > 0};
 }
 
-/// The matrix A, by slots of springs, on free ways alone.
+/// The matrix A, by slots of springs, on free directions alone.
 struct ClothMatrix {
   SpringEnds ends;
   const float *tension, *inertia;
   ConstVecView axis;
-  FreeWays free;
+  ConstraintProjection constraints;
   AirDrag air;
   float dt;  // s
 
   template <class Index>
   DRENCH_HD auto times(const ConstVecView& view, Index i) const {
-    return free.of(i, whole(view, i));
+    return constraints.project(i, whole(view, i));
   }
   /// On all axes: less the right side it is what holds a vertex.
   template <class Index>
@@ -72,13 +73,13 @@ struct ClothMatrix {
 
 inline ClothMatrix cloth_matrix(const State& state) {
   const ClothSystem& s = state.cloth_system;
-  return {spring_ends_of(state.cloth),
-          s.tension.data(),
-          s.inertia.data(),
-          s.axis.view(),
-          free_ways(state),
-          air_drag_of(state),
-          float(state.dt)};
+  return {.ends = spring_ends_of(state.cloth),
+          .tension = s.tension.data(),
+          .inertia = s.inertia.data(),
+          .axis = s.axis.view(),
+          .constraints = constraint_projection(state),
+          .air = air_drag_of(state),
+          .dt = float(state.dt)};
 }
 
 /// Inverses of the blocks on A's diagonal, as L D L^T.
@@ -99,9 +100,9 @@ struct BlockInverse {
     const T value[6] = {d0, d1, d2, l10, l20, l21};
     for (int k = 0; k < 6; ++k) store(field(k), i, value[k]);
   }
-  /// The block of `from` on the ways that are perpendicular to `held` and along `may`; the rest of
-  /// it is any.
-  DRENCH_HD void put_free(int i, const BlockInverse& from, Vec3<float> may, Vec3<float> held,
+  /// The block of `from` on the directions that are perpendicular to `held` and along the axes
+  /// `free`; the rest of it is any.
+  DRENCH_HD void put_free(int i, const BlockInverse& from, Vec3<float> free, Vec3<float> held,
                           float least) const {
     const float d0 = 1.f / from.field(0)[i], d1 = 1.f / from.field(1)[i],
                 d2 = 1.f / from.field(2)[i], l10 = from.field(3)[i], l20 = from.field(4)[i],
@@ -111,7 +112,7 @@ struct BlockInverse {
       return Vec3<float>{a, l10 * a + b, l20 * a + l21 * b + c};
     };
     const auto project = [=](Vec3<float> v) {
-      const Vec3<float> m{may.x * v.x, may.y * v.y, may.z * v.z};
+      const Vec3<float> m{free.x * v.x, free.y * v.y, free.z * v.z};
       return m - held * dot(held, m);
     };
     const float fill = d0 + d1 + d2;
@@ -139,8 +140,8 @@ struct BlockInverse {
 inline BlockInverse block_inverse(State& state) {
   return {state.cloth_system.factor.data(), state.cloth.padded};
 }
-/// Of the blocks on free ways. With the whole blocks, soft across a sheet and stiff along it, a
-/// surface askew to the sheet makes conjugate gradients diverge.
+/// Of the blocks on free directions. With the whole blocks, soft across a sheet and stiff along it,
+/// a surface askew to the sheet makes conjugate gradients diverge.
 inline BlockInverse free_block_inverse(State& state) {
   if (state.parameters.obstacles == 0) return block_inverse(state);
   return {state.cloth_system.free_factor.data(), state.cloth.padded};
@@ -149,23 +150,23 @@ inline BlockInverse free_block_inverse(State& state) {
 /// The matrix at the positions and the right side without loads; w = 0.
 void linearise_cloth(State& state);
 
-/// Vertices that forces would take through a wall end at it, and what pushes them stands on it: a
+/// Vertices that forces would take through a wall end at it, and the forces on them act on it: a
 /// sheet on the floor bears its water. Their blocks are those of what is left free: see
-/// free_block_inverse (a wrinkled sheet on a floor was thrown along it at 26 m/s).
+/// free_block_inverse (with whole ones a wrinkled sheet on a floor is thrown along it at 26 m/s).
 void hold_at_walls(State& state);
 
 DRENCH_HD double dot_double(Vec3<float> a, Vec3<float> b) {
   return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
 }
 
-/// A matrix, what scales its residual, and the ways that it acts on.
+/// A matrix, its preconditioner, and the directions that it acts on.
 struct ScaledClothMatrix {
   ClothMatrix matrix;
   BlockInverse block;
 
   template <class Index, class T>
   DRENCH_HD Vec3<T> moving(Index i, Vec3<T> v) const {
-    return matrix.free.of(i, v);
+    return matrix.constraints.project(i, v);
   }
   template <class Index>
   DRENCH_HD auto times(const ConstVecView& view, Index i) const {
@@ -180,10 +181,10 @@ inline ScaledClothMatrix scaled_cloth_matrix(State& state) {
   return {cloth_matrix(state), free_block_inverse(state)};
 }
 
-/// What a sweep of conjugate gradients reads and writes: z is the scaled residual, p the direction,
-/// s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
+/// What an iteration of conjugate gradients reads and writes: z is the scaled residual, p the
+/// direction, s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
 template <class Matrix>
-struct ClothSweep {
+struct ClothIteration {
   Matrix matrix;
   VecView w, residual, scaled;
   ConstVecView image;
@@ -218,28 +219,24 @@ struct ClothSweep {
   }
 };
 
-/// Has the solve of the sheets ended? On the GPU the host asks now and then only; launches after
-/// the end do nothing.
-bool cloth_ended(const State& state, int sweep);
-
-/// At most `sweeps` sweeps on A w = right from the w there is, until r . A_block^-1 r is below
-/// tolerance^2 of ClothControl::reference.
+/// At most `most_iterations` iterations on A w = right from the w there is, until r . A_block^-1 r
+/// is below tolerance^2 of ClothControl::reference.
 template <class Matrix>
-void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const ConstVecView& right,
-                  int sweeps, float tolerance) {
+void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
+                        const ConstVecView& right, int most_iterations, float tolerance) {
   const int n = state.cloth.vertices;
   ClothSystem& s = state.cloth_system;
   ClothControl* control = s.control.data();
   const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view();
-  const ClothSweep<Matrix> sweep{matrix,
-                                 w,
-                                 residual,
-                                 scaled,
-                                 image,
-                                 s.direction.view(),
-                                 s.direction_image.view(),
-                                 control,
-                                 tolerance * tolerance};
+  const ClothIteration<Matrix> iteration{.matrix = matrix,
+                                         .w = w,
+                                         .residual = residual,
+                                         .scaled = scaled,
+                                         .image = image,
+                                         .direction = s.direction.view(),
+                                         .direction_image = s.direction_image.view(),
+                                         .control = control,
+                                         .tolerance = tolerance * tolerance};
   s.direction.clear(), s.direction_image.clear();
   parallel_for(
       "cloth: start", 1, DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
@@ -257,27 +254,27 @@ void sweep_matrix(State& state, const Matrix& matrix, const VecView& w, const Co
           image.put(i, image_of_z);
           return Two<decltype(z.x)>{dot(residual.at(i), z), dot(z, image_of_z)};
         },
-        DRENCH_LAMBDA(double energy, double curvature) { sweep.decide(energy, curvature); });
-    if (k == sweeps || cloth_ended(state, k)) break;
+        DRENCH_LAMBDA(double energy, double curvature) { iteration.decide(energy, curvature); });
+    if (ended(s.control, k, most_iterations)) break;
     for_each_lane(
-        "cloth: move", n, DRENCH_LAMBDA(auto i) { sweep.move(i); });
+        "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
   }
 }
-void sweep_cloth(State& state, const VecView& w, const ConstVecView& right, int sweeps,
+void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,
                  float tolerance);
 
-/// What a sheet's way leaves of what it is given, kg m, its mass, and how many of its axes
-/// something holds.
-struct SheetLack {
+/// What the displacement of a sheet leaves of its right side, kg m, its mass, and how many of its
+/// axes are constrained.
+struct ClothImbalance {
   double x = 0, y = 0, z = 0, inertia = 0, held = 0;
-  DRENCH_HD SheetLack operator()(const SheetLack& a, const SheetLack& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z, a.inertia + b.inertia, a.held + b.held};
+  DRENCH_HD ClothImbalance operator+(const ClothImbalance& other) const {
+    return {x + other.x, y + other.y, z + other.z, inertia + other.inertia, held + other.held};
   }
 };
 
-/// What sweeps that end early leave of A w = right the fluid has given and the sheet not received.
-/// Springs push no sheet as a whole: where nothing holds it a shift by the sum over its mass, on
-/// which they do not act, closes its momentum.
-void balance_loose_sheets(State& state, const VecView& w, const ConstVecView& right);
+/// What a solve that ends early leaves of A w = right the fluid has given and the sheet not
+/// received. Springs give no sheet momentum as a whole: where nothing holds it a shift by the sum
+/// over its mass, on which they do not act, closes its momentum.
+void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& right);
 
 }  // namespace drench::sim::DRENCH_BACKEND

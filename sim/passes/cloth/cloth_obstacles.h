@@ -2,8 +2,8 @@
 // Sheets on obstacles. A vertex keeps a distance to every surface; one that forces would take
 // nearer is held in the solve of the sheets (cloth_implicit.h): it may go along the surface, and
 // along its normal goes where the surface does. Who is held is found twice: before the pressures by
-// what pushes the vertex alone, and again from the whole solve, where what pulls off is let go and
-// what still comes too near is held. Vertices are held, not triangles: between two of them, e
+// the forces on the vertex alone, and again from the whole solve, where what pulls off is let go
+// and what still comes too near is held. Vertices are held, not triangles: between two of them, e
 // apart, a surface of radius R comes e^2 / 8R nearer. The force that holds a vertex is in the
 // solve, and so is Coulomb's friction, in the same rounds: a vertex that it can hold sticks, one
 // that it cannot feels it as a force. Last comes the guard that particles have: no path passes
@@ -45,7 +45,7 @@ struct ClothHold {
 
   /// Where the first obstacle stops a vertex that would go from x0 to x1, both at home; -1 if none
   /// does.
-  /// @param slack  share of the distance that may be missing
+  /// @param slack  fraction of the distance that may be missing
   DRENCH_HD int stop(int vertex, Vec3<float> x0, Vec3<float> x1, float slack,
                      Vec3<float>& own) const {
     for (int k = 0; k < obstacles.count; ++k) {
@@ -56,7 +56,8 @@ struct ClothHold {
     return -1;
   }
 
-  /// Holds a vertex, straight way `straight`, where an obstacle stops it from going to `to`.
+  /// Holds a vertex, which `straight` is the straight path of, where an obstacle stops it from
+  /// going to `to`.
   DRENCH_HD bool hold(int vertex, Vec3<float> from, Vec3<float> straight, Vec3<float> to,
                       Vec3<float>& w) const {
     Vec3<float> own;
@@ -64,13 +65,13 @@ struct ClothHold {
     const int k = stop(vertex, from + in, to + in, 0.f, own);
     if (k < 0) return false;
     const ObstacleView& o = obstacles.obstacle[k];
-    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), may = along(free[vertex], n);
-    const float size2 = length2(may);
-    if (size2 < 0.01f) return false;  // a wall holds it that way
-    const Vec3<float> way = may * (1.f / sqrtf(size2));
-    w = w + way * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, way));
-    normal.set(vertex, way);
-    free_block.put_free(vertex, block, free[vertex], way, inertia[vertex]);
+    const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1])), open = along(free[vertex], n);
+    const float size2 = length2(open);
+    if (size2 < 0.01f) return false;  // a wall holds it along n
+    const Vec3<float> normal_free = open * (1.f / sqrtf(size2));
+    w = w + normal_free * (dot(n, o.to_frame(1, own) - in - straight - w) / dot(n, normal_free));
+    normal.set(vertex, normal_free);
+    free_block.put_free(vertex, block, free[vertex], normal_free, inertia[vertex]);
     grip[vertex] = k;
     return true;
   }
@@ -116,23 +117,23 @@ inline ClothHold cloth_hold_of(State& state) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
-  return {state.obstacles.views(),
-          cloth_walls_of(p),
-          c.half_thickness.data(),
-          c.fan_start.data(),
-          c.fan_entry.data(),
-          s.free.view(),
-          s.normal.view(),
-          block_inverse(state),
-          free_block_inverse(state),
-          s.inertia.data(),
-          s.grip.data(),
-          {state.obstacles.stopped.data()},
-          0.15f * p.spacing,
-          float(1 / state.dt),
-          1.f / p.particle_mass,
-          {p.low[0], p.low[1], p.low[2]},
-          periods_of(p)};
+  return {.obstacles = state.obstacles.views(),
+          .walls = cloth_walls_of(p),
+          .half_thickness = c.half_thickness.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .free = s.free.view(),
+          .normal = s.normal.view(),
+          .block = block_inverse(state),
+          .free_block = free_block_inverse(state),
+          .inertia = s.inertia.data(),
+          .grip = s.grip.data(),
+          .stopped = {state.obstacles.stopped.data()},
+          .room = 0.15f * p.spacing,
+          .inverse_dt = float(1 / state.dt),
+          .inverse_mass = 1.f / p.particle_mass,
+          .low = {p.low[0], p.low[1], p.low[2]},
+          .period = periods_of(p)};
 }
 
 /// As hold_at_walls, whose axes it takes into account.
@@ -213,7 +214,8 @@ struct HoldRevision {
 /// The solve of the sheets was made: on with friction and with other vertices held, until these are
 /// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
 /// momentum of a sheet that is held.
-void settle_at_obstacles(State& state, const ConstVecView& given, int sweeps, float tolerance);
+void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
+                         float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

@@ -14,7 +14,7 @@ struct SpringEnds {
 
   /// From vertex i, which is at x, to the place of the other end of slot s.
   template <class Index, class T>
-  DRENCH_HD Vec3<T> way(const ConstVecView& position, Vec3<T> x, Index i, int s) const {
+  DRENCH_HD Vec3<T> to_end(const ConstVecView& position, Vec3<T> x, Index i, int s) const {
     Vec3<T> d = at_end(position, i, s) - x;
     if (joined) d = d + shift.at(i + s * stride);
     return d;
@@ -36,9 +36,12 @@ struct SpringEnds {
 };
 
 inline SpringEnds spring_ends_of(const ClothState& c) {
-  return {c.spring_end.data(),   c.slot_offset.data(),
-          c.spring_slots,        c.padded,
-          c.spring_shift.view(), c.joined};
+  return {.end = c.spring_end.data(),
+          .slot_offset = c.slot_offset.data(),
+          .slots = c.spring_slots,
+          .stride = c.padded,
+          .shift = c.spring_shift.view(),
+          .joined = c.joined};
 }
 
 struct ClothSprings {
@@ -54,7 +57,7 @@ struct ClothSprings {
     Vec3<T> f{T(0.f), T(0.f), T(0.f)};
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
-      const Vec3<T> d = ends.way(position, x, i, s);
+      const Vec3<T> d = ends.to_end(position, x, i, s);
       const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
       const T rate = dot(ends.at_end(velocity, i, s) - v, d) * inverse;
       const T pull = load(stiffness, at) * (l - load(rest_length, at)) + load(damping, at) * rate;

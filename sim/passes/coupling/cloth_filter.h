@@ -4,7 +4,7 @@
 // planes both put it behind, with opposed normals, does not; the rest (curved sheets, free edges)
 // is decided by testing the segment against the triangles themselves. The density pass tests all
 // near particles and notes those from which anything is hidden; the pressure pass tests only these.
-// Both ends of a hidden way are near a sheet: nearer to where it is crossed than to each other.
+// Both ends of a hidden segment are near a sheet: nearer to where it is crossed than to each other.
 
 #include "sim/neighbours/pairs.h"
 #include "sim/passes/coupling/geometry.h"
@@ -12,7 +12,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct SheetFilter {
+/// The Filter of for_each_pair and of neighbour lists (sim/neighbours/pairs.h).
+struct ClothFilter {
   static constexpr int columns = 4;
   int* shaded;  // by particle: 1 where neighbours may be hidden
   ConstVecView position;
@@ -67,7 +68,7 @@ struct SheetFilter {
     const Vec3<float> x = position[i], n = normal[i];
     const Vec3<Pack> from{x.x, x.y, x.z}, normal_i{n.x, n.y, n.z};
     const Pack plane_i(plane[i]), reach2(support_radius * support_radius);
-    for (const Tile::Places& of : tile.packs()) {
+    for (const Tile::Run& of : tile.packs()) {
       const Lanes j{of.particle};
       const Vec3<Pack> to = position.at(j);
       const Mask back = (dot(normal_i, to) + plane_i <= Pack(0.f)) |
@@ -83,16 +84,16 @@ struct SheetFilter {
   struct Self {
     Vec3<Pack> position, normal;
     Pack plane;
-    int place;
+    int index;
     bool any;  // hidden neighbours so far
   };
   template <int N>
-  DRENCH_HD Self self(const float* const* column, int place) const {
-    const auto all = [&](int c) { return Pack(column[c][place]); };
-    return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), place, false};
+  DRENCH_HD Self self(const float* const* column, int index) const {
+    const auto all = [&](int c) { return Pack(column[c][index]); };
+    return {{all(0), all(1), all(2)}, {all(N), all(N + 1), all(N + 2)}, all(N + 3), index, false};
   }
 
-  /// Which of the neighbours in places k..k+7 does the sheet hide?
+  /// Which of the neighbours k..k+7 does the sheet hide?
   template <int N>
   DRENCH_HD Mask hidden(Self& i, const float* const* column, int k, Vec3<Pack> position) const {
     const Vec3<Pack> normal_j{Pack::load(column[N] + k), Pack::load(column[N + 1] + k),
@@ -104,22 +105,22 @@ struct SheetFilter {
     const Mask within = length2(position - i.position) < Pack(support_radius * support_radius);
     const Mask surely = back_i & back_j & (dot(i.normal, normal_j) < Pack(0.f));
     const int doubtful = ((back_i | back_j) & within & !surely).bits();
-    const Mask hidden{hidden_lanes(column, i.place, k, surely.bits(), doubtful)};
+    const Mask hidden{hidden_lanes(column, i.index, k, surely.bits(), doubtful)};
     i.any |= hidden.bits() != 0;
     return hidden;
   }
 
   /// Lanes that are hidden for sure and those of the doubtful ones whose segment meets a triangle.
-  __attribute__((noinline)) Mask::Native hidden_lanes(const float* const* column, int place, int k,
+  __attribute__((noinline)) Mask::Native hidden_lanes(const float* const* column, int index, int k,
                                                       int surely, int doubtful) const {
-    const Vec3<float> p{column[0][place], column[1][place], column[2][place]};
+    const Vec3<float> p{column[0][index], column[1][index], column[2][index]};
     int hidden = surely;
     for (int bits = doubtful; bits; bits &= bits - 1) {
       const int lane = __builtin_ctz(bits), j = k + lane;
       if (segment_hidden(p, {column[0][j], column[1][j], column[2][j]})) hidden |= 1 << lane;
     }
     // A particle that has been pushed behind its own plane still sees itself.
-    if (place >= k && place < k + 8) hidden &= ~(1 << (place - k));
+    if (index >= k && index < k + 8) hidden &= ~(1 << (index - k));
     Mask::Native mask;
     for (int lane = 0; lane < 8; ++lane) mask[lane] = hidden >> lane & 1 ? -1 : 0;
     return mask;
@@ -131,11 +132,15 @@ struct SheetFilter {
 enum class Shaded { near, hidden };
 
 /// @param position  m, those that the planes of the sheets were taken from
-inline SheetFilter sheet_filter(State& state, const ConstVecView& position, Shaded known) {
+inline ClothFilter cloth_filter(State& state, const ConstVecView& position, Shaded known) {
   FluidState& f = state.fluid;
-  return {f.shaded.data(),      position,           f.normal.view(),
-          f.plane.data(),       polygons_of(state), state.parameters.support_radius,
-          known == Shaded::near};
+  return {.shaded = f.shaded.data(),
+          .position = position,
+          .normal = f.normal.view(),
+          .plane = f.plane.data(),
+          .polygons = polygons_of(state),
+          .support_radius = state.parameters.support_radius,
+          .nothing_known = known == Shaded::near};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -2,7 +2,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-void add_sheets_to_walls(State& state) {
+void add_cloth_to_walls(State& state) {
   const FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   const ContactRows c = contact_rows(state);
@@ -20,7 +20,7 @@ void add_sheets_to_walls(State& state) {
   const ObstacleShare law = obstacle_share_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const float recovery = dt * 0.1f * p.sound_speed;
-  const SheetShare blank{p.wall_scale, 1.f / p.support_radius, p.spacing, 0.f, 0.f};
+  const ClothDensity blank{p.wall_scale, 1.f / p.support_radius, p.spacing, 0.f, 0.f};
   parallel_for(
       "sheets: rows", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
@@ -31,18 +31,19 @@ void add_sheets_to_walls(State& state) {
         const Vec3<float> n = normal[i], foot = c.at_foot(row, cloth_velocity) * dt;
         const float nearer = -dot(n, x[i] - start[i] - foot),
                     gap = distance[i] - half_thickness[triangle[i]] - nearer;
-        SheetShare share = blank;
-        share.at(gap, edge[i]);
+        ClothDensity density = blank;
+        density.at(gap, edge[i]);
         WallShare w = walls.share(x[i], n, gap);
-        gaps[row] = gap, left_open[row] = max0(1.f - share.value);
+        gaps[row] = gap, left_open[row] = max0(1.f - density.value);
         for (int k = 0; k < obstacles.count; ++k)
           w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));
-        const float open = 1.f - w.value, left = max0(1.f - share.value);
-        const Vec3<float> g = n * (rest * open * share.slope), all = w.gradient * (rest * left) + g;
+        const float open = 1.f - w.value, left = max0(1.f - density.value);
+        const Vec3<float> g = n * (rest * open * density.slope),
+                          all = w.gradient * (rest * left) + g;
         gradient.set(row, g);
         allowed[row] = maximum(nearer + recovery, 0.1f * recovery);
         compliance[row] = squeeze * max0(-rest * left * dot(g, w.gradient));
-        wall[i] = {all.x, all.y, all.z, rest * (1.f - open * (1.f - share.value))};
+        wall[i] = {all.x, all.y, all.z, rest * (1.f - open * (1.f - density.value))};
       });
 }
 
@@ -66,12 +67,12 @@ void sum_loads(State& state, Base base) {
   const ConstVecView impulse = state.contact.impulse.view();
   const VecView right = state.cloth_system.right.view();
   const ConstVecView own = state.cloth_system.base.view();
-  const float* share = state.cloth.share.data();
+  const float* contact_weight = state.cloth.share.data();
   const bool add = base == Base::own;
   parallel_for(
       "sheets: loads", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         Vec3<float> sum = add ? own[v] : Vec3<float>{0.f, 0.f, 0.f};
-        if (share[v] > 0.f) sum = sum + near.sum_on_vertex(impulse, v);
+        if (contact_weight[v] > 0.f) sum = sum + near.sum_on_vertex(impulse, v);
         right.set(v, sum);
       });
 }
@@ -86,7 +87,7 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
         const Vec3<float> r = matrix.moving(i, of[i]);
         return dot_double(r, matrix.scaled(i, r));
       },
-      AddDoubles{},
+      Plus{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
 }
 
@@ -109,7 +110,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
   const ContactRows c = contact_rows(state);
   const VecView impulse = state.contact.impulse.view();
   const int triangles = state.cloth.triangles, *start = near.start, gap = c.soft_begin - c.close;
-  const float mass = state.parameters.particle_mass, *share = state.cloth.share.data();
+  const float mass = state.parameters.particle_mass, *contact_weight = state.cloth.share.data();
   parallel_for(
       "sheets: sizes by triangle", triangles, DRENCH_LAMBDA(int t) {
         float sum[3] = {0.f, 0.f, 0.f};
@@ -123,21 +124,21 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
   parallel_for(
       "sheets: sizes", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         const Vec3<float> none{0.f, 0.f, 0.f};
-        to.set(v, share[v] > 0.f ? near.sum_on_vertex(impulse, v) : none);
+        to.set(v, contact_weight[v] > 0.f ? near.sum_on_vertex(impulse, v) : none);
       });
 }
 
 /// Adds to the solve's diagonal a bound of C A^-1 C^T: with T <= A the matrix of inertia and
 /// tension it is at most C T^-1 C^T, of which no row's magnitudes sum to more than
-///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: the ways that vertex k may go,
+///   sum_k w_ik |P_k G_i| (T^-1 m sum_j w_j |P G_j|)_k,   P_k: the directions that vertex k may go,
 /// since T^-1 has no negative entry. Flat sheets lose nothing by it: springs along a sheet do not
-/// act across it, and this is its answer to the same pressure all along. The answer with its signs,
-/// to the same pressure along one side, is no bound where a sheet is folded: the pushes of two
-/// flanks cancel, and pressures there rose without end (4e11 Pa in the folds over a small ball).
-void add_sheets_to_diagonal(State& state) {
+/// act across it, and this is its answer to the same pressure all along. The answer with its signs
+/// is no bound where a sheet is folded: the pushes of two flanks cancel
+/// (docs/decisions/0023-bound-of-cloth-in-the-diagonal.md).
+void add_cloth_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const ClothRows c = cloth_rows(state);
-  const RowSize size{c, free_ways(state)};
+  const RowSize size{c, constraint_projection(state)};
   const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
                              state.cloth.inverse_mass.data()};
   const VecView answer = s.answer.view();
@@ -145,7 +146,7 @@ void add_sheets_to_diagonal(State& state) {
   sum_row_sizes(state, size, right);
   s.answer.clear();
   add_to_reference(state, matrix, right, 0.f);
-  sweep_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
+  solve_cloth_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
   float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
       "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
@@ -159,44 +160,44 @@ void add_sheets_to_diagonal(State& state) {
 
 }  // namespace
 
-void start_sheets(State& state) {
+void start_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::none);
   hold_at_walls(state);
   if (state.parameters.obstacles > 0) hold_at_obstacles(state);
-  add_sheets_to_diagonal(state);
+  add_cloth_to_diagonal(state);
   sum_loads(state, Base::none);
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   add_to_reference(state, matrix, s.right.view(), 0.f);
   add_to_reference(state, matrix, s.base.view(), 1.f);
 }
 
-void respond_sheets(State& state, int sweeps, float tolerance) {
+void respond_cloth(State& state, int sweeps, float tolerance) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::own);
-  sweep_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
+  solve_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
 }
 
-void settle_sheets(State& state) {
+void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
   if (state.contact.near > 0) {
-    respond_sheets(state, last_sweeps, last_tolerance);
+    respond_cloth(state, last_sweeps, last_tolerance);
   } else {
     s.right.clear();
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
-    sweep_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
+    solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
   if (state.parameters.obstacles > 0)
     settle_at_obstacles(state, given, last_sweeps, last_tolerance);
-  balance_loose_sheets(state, s.change.view(), given);
+  balance_loose_cloth(state, s.change.view(), given);
 }
 
-void subtract_sheet_rate(State& state) {
+void subtract_cloth_rate(State& state) {
   const ClothRows c = cloth_rows(state);
   const ConstVecView change = state.cloth_system.change.view();
   const Float4* place = state.pressure.place.data();
@@ -210,7 +211,7 @@ void subtract_sheet_rate(State& state) {
       });
 }
 
-void take_sheets_off_walls(State& state) {
+void take_cloth_off_walls(State& state) {
   const ClothRows c = cloth_rows(state);
   Float4* wall = state.pressure.wall.data();
   parallel_for(
@@ -222,7 +223,7 @@ void take_sheets_off_walls(State& state) {
       });
 }
 
-void finish_sheets(State& state) {
+void finish_cloth(State& state) {
   ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), v = c.velocity.view();
   const VecView next = c.next.view(), next_velocity = c.next_velocity.view(),
@@ -242,7 +243,7 @@ void finish_sheets(State& state) {
         walls.stop(to, velocity);
         const auto free = load(inverse_mass, i) > T(0.f);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-        // What walls hold does not slide freely: half a step's way, as where they stop it.
+        // What walls hold does not slide freely: half a step's displacement, as where they stop it.
         const Vec3<T> may = free_axes.at(i), held{T(1.f) - may.x, T(1.f) - may.y, T(1.f) - may.z};
         velocity = select(length2(held) > T(0.f), along(may, velocity) * T(0.5f), velocity);
         if (near)

@@ -1,6 +1,6 @@
 #pragma once
 // Sheets in the pressure solve. To the fluid at its side a sheet is a mirror wall (image_walls.h)
-// that gives way: at predicted places a particle's gap to the sheet's surface is
+// that gives way: at predicted positions a particle's gap to the sheet's surface is
 //   gap = d - t/2 + n . (dx - sum_k w_k dt v_k),
 // its row of the density rate gains G . (d_i - sum_k w_k u_k), G = rho_0 grad S, and what pressure
 // q_i takes from the particle, m q_i G, its three vertices get by the weights w_k of its foot. The
@@ -15,34 +15,38 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Sweeps at most before the first, between further iterations of the pressures, and at the end; a
-/// pool on a taut sheet takes as many iterations as with an exact answer, with 4 in place of 16 one
-/// in ten more, with 2 twice as many. What is left at the end is of how sheets bend; the momentum
-/// of those that nothing holds is whole (balance_loose_sheets).
+/// Sweeps at most before the first, between further iterations of the pressures, and at the end: as
+/// few as leave the pressures the iterations that an exact answer takes
+/// (docs/decisions/0022-cloth-sweeps.md). What is left at the end is of how sheets bend; the
+/// momentum of those that nothing holds is whole (balance_loose_cloth).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
-constexpr float sheet_tolerance = 1e-3f, last_tolerance = 1e-4f;
+constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
 /// Rows of the near list as the pressure solve has them.
 struct ClothRows : ContactRows {
-  ConstVecView gradient;    // kg/m^4, G
-  const float* recovery;    // m, that the row may ask for in this step
-  const float* compliance;  // kg^2/m^8
-  const float *gap, *open;  // m; fraction of the density that the cloth leaves
+  ConstVecView gradient{};                      // kg/m^4, G
+  const float* recovery = nullptr;              // m, that the row may ask for in this step
+  const float* compliance = nullptr;            // kg^2/m^8
+  const float *gap = nullptr, *open = nullptr;  // m; fraction of the density that the cloth leaves
 };
 
 inline ClothRows cloth_rows(const State& state) {
   const ContactState& c = state.contact;
-  return {contact_rows(state), c.gradient.view(), c.recovery.data(),
-          c.compliance.data(), c.gap.data(),      c.open.data()};
+  ClothRows rows{contact_rows(state)};
+  rows.gradient = c.gradient.view();
+  rows.recovery = c.recovery.data(), rows.compliance = c.compliance.data();
+  rows.gap = c.gap.data(), rows.open = c.open.data();
+  return rows;
 }
 
 /// Between a sheet that a wall holds and that wall there may be no room for a particle, and no
-/// pressure makes any: there the row is a little compliant, by this share of |G|^2.
+/// pressure makes any: there the row is a little compliant, by this fraction of |G|^2.
 constexpr float squeeze = 0.1f;
 
-/// The sheet's share of density at a gap, and its slope, 1/m. Nearer than a tenth of a spacing the
-/// share goes on along its tangent: the solve must push a particle out of a sheet, too.
-struct SheetShare {
+/// The fraction of density that a sheet replaces at a gap, and its slope, 1/m. Nearer than a tenth
+/// of a spacing the fraction goes on along its tangent: the solve must push a particle out of a
+/// sheet, too.
+struct ClothDensity {
   float scale, inverse_h, spacing;
   float value, slope;
 
@@ -55,7 +59,7 @@ struct SheetShare {
 };
 
 /// Adds the sheets to what walls replace, and sets up the rows of the near list.
-void add_sheets_to_walls(State& state);
+void add_cloth_to_walls(State& state);
 
 /// What is pressed between sheets, or a sheet and a wall, comes apart no faster than the scene
 /// moves, and not within the step: what gives way are its neighbours and light sheets, which would
@@ -63,8 +67,8 @@ void add_sheets_to_walls(State& state);
 /// for displacements of at least source / |D_i|; they stop what comes nearer and add `recovery`.
 void limit_recovery(State& state);
 
-/// Sums what the rows give to their vertices into ClothSystem::right, with or without the sheets'
-/// own forces.
+/// Whether ClothSystem::right, the sum of what the rows give to their vertices, has the sheets' own
+/// forces in it.
 enum class Base { none, own };
 
 /// What bounds A from below: inertia, and tension without its direction; what is left out, the
@@ -95,34 +99,38 @@ struct TensionMatrix {
   }
 };
 
-/// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex on the ways that it may go.
+/// w_k |P G|, kg/m^4: what one row's unit pressure gives to a vertex along the directions that it
+/// may go.
 struct RowSize {
   ClothRows rows;
-  FreeWays free;
+  ConstraintProjection constraints;
   DRENCH_HD float at(int row, int k) const {
-    return rows.weight[k][row] * length(free.of(rows.vertex[k][row], rows.gradient[row]));
+    return rows.weight[k][row] *
+           length(constraints.project(rows.vertex[k][row], rows.gradient[row]));
   }
 };
 
 /// Before the first iteration, with the pressures of the warm start in place: what walls hold, the
-/// rows' share of the diagonal, and from what the sweeps' tolerance counts: loads and the sheets'
+/// rows' part of the diagonal, and from what the sweeps' tolerance counts: loads and the sheets'
 /// own forces, which may well balance.
-void start_sheets(State& state);
+void start_cloth(State& state);
 
-/// The sheets' answer to the pressures beside the positions.
-void respond_sheets(State& state, int sweeps, float tolerance);
+/// The sheets' answer to the pressures beside the positions, into ClothSystem::change, m.
+/// @param tolerance  of the preconditioned residual, over that of start_cloth
+void respond_cloth(State& state, int sweeps, float tolerance);
 
 /// The sheets' answer to the pressures that the solve ended with, to the tolerance.
-void settle_sheets(State& state);
+void settle_cloth(State& state);
 
-/// Takes the sheets' motion off the density rates.
-void subtract_sheet_rate(State& state);
+/// Takes the sheets' motion off the density rates, PressureState::product.
+void subtract_cloth_rate(State& state);
 
-/// Leaves the domain's walls alone in the column, for whoever asks for their force.
-void take_sheets_off_walls(State& state);
+/// Leaves the domain's walls and obstacles alone in PressureState::wall, for whoever asks for their
+/// force.
+void take_cloth_off_walls(State& state);
 
 /// Where the sheets end the step if nothing stops them, and the fluid's force on them for whoever
-/// asks: the loads over dt^2, beside what the path test owed.
-void finish_sheets(State& state);
+/// asks: the loads over dt^2, beside what collisions owed.
+void finish_cloth(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -7,7 +7,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct SheetTopology {
+/// Triangles with their neighbours across edges and around vertices.
+struct ClothTopology {
   PolygonView polygons;
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
   ConstVecView rest_centroid;
@@ -41,7 +42,7 @@ struct SheetTopology {
   DRENCH_HD bool on_one_patch(int s, int t, float reach) const {
     if (sheet[s] != sheet[t]) return false;
     Vec3<float> d = rest_centroid[s] - rest_centroid[t];
-    if (polygons.place.joined) d = nearest(d, rest_period[sheet[s]]);
+    if (polygons.corner_positions.joined) d = nearest(d, rest_period[sheet[s]]);
     return length(d) < reach;
   }
   DRENCH_HD static bool beyond(float p, float q, float low, float high) {
@@ -73,78 +74,78 @@ struct SheetTopology {
   }
 };
 
-inline SheetTopology topology_of(const State& state) {
+inline ClothTopology topology_of(const State& state) {
   const ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
-  SheetTopology sheet{polygons_of(state),
-                      c.neighbour.data(),
-                      c.sheet.data(),
-                      c.fan_start.data(),
-                      c.fan_entry.data(),
-                      c.rim.data(),
-                      c.rest_centroid.view(),
-                      c.half_thickness.data(),
-                      {},
-                      {},
-                      c.rest_period.data()};
   float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
     low[k] = p.wall[k] ? p.low[k] + 0.5f * p.spacing : -1e30f;
     high[k] = p.wall[k] ? p.high[k] - 0.5f * p.spacing : 1e30f;
   }
-  sheet.low = {low[0], low[1], low[2]}, sheet.high = {high[0], high[1], high[2]};
-  return sheet;
+  return {.polygons = polygons_of(state),
+          .neighbour = c.neighbour.data(),
+          .sheet = c.sheet.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .rim = c.rim.data(),
+          .rest_centroid = c.rest_centroid.view(),
+          .half_thickness = c.half_thickness.data(),
+          .low = {low[0], low[1], low[2]},
+          .high = {high[0], high[1], high[2]},
+          .rest_period = c.rest_period.data()};
 }
 
 /// The pseudo-normal of a foot point and whether it lies on a free edge, past which there is no
-/// sheet.
+/// cloth.
 struct FootNormal {
   Vec3<float> normal;
   bool free_edge;
 };
 
-DRENCH_HD FootNormal foot_normal(const SheetTopology& sheet, int t, float wa, float wb, float wc) {
+DRENCH_HD FootNormal foot_normal(const ClothTopology& cloth, int t, float wa, float wb, float wc) {
   constexpr float on_edge = 1e-6f;
   const bool za = wa < on_edge, zb = wb < on_edge, zc = wc < on_edge;
-  const int* corner = sheet.polygons.corner + 3 * t;
-  if (!(za || zb || zc)) return {sheet.unit_normal(t), false};
+  const int* corner = cloth.polygons.corner + 3 * t;
+  if (!(za || zb || zc)) return {cloth.unit_normal(t), false};
   if ((za && zb) || (zb && zc) || (za && zc)) {
     const int vertex = corner[!za ? 0 : !zb ? 1 : 2];
-    return {sheet.vertex_normal(vertex), sheet.rim[vertex] != 0 && !sheet.closed_at(vertex)};
+    return {cloth.vertex_normal(vertex), cloth.rim[vertex] != 0 && !cloth.closed_at(vertex)};
   }
   const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
-  const int other = sheet.neighbour[3 * t + edge];
+  const int other = cloth.neighbour[3 * t + edge];
   if (other < 0) {
-    const Vec3<float> n = sheet.unit_normal(t);
-    return {n, !sheet.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
+    const Vec3<float> n = cloth.unit_normal(t);
+    return {n, !cloth.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
   }
-  return {sheet.unit_normal(t) + sheet.unit_normal(other), false};
+  return {cloth.unit_normal(t) + cloth.unit_normal(other), false};
 }
 
 /// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
-DRENCH_HD float edge_share(const SheetTopology& sheet, int t, float wa, float wb, float wc,
-                           float spacing) {
-  const int* neighbour = sheet.neighbour + 3 * t;
+DRENCH_HD float edge_weight(const ClothTopology& cloth, int t, float wa, float wb, float wc,
+                            float spacing) {
+  const int* neighbour = cloth.neighbour + 3 * t;
   if (neighbour[0] >= 0 && neighbour[1] >= 0 && neighbour[2] >= 0) return 1.f;
   float inside = 1.f;
   const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
   Vec3<float> v[3];
-  sheet.polygons.corners(t, v[0], v[1], v[2]);
-  const Vec3<float> area = sheet.area_normal(t);
+  cloth.polygons.corners(t, v[0], v[1], v[2]);
+  const Vec3<float> area = cloth.area_normal(t);
   const float twice_area = length(area);
   for (int e = 0; e < 3; ++e) {
-    const int a = sheet.polygons.corner[3 * t + e], b = sheet.polygons.corner[3 * t + (e + 1) % 3];
-    if (neighbour[e] >= 0 || sheet.closed_by_wall(area, a, b)) continue;
+    const int a = cloth.polygons.corner[3 * t + e], b = cloth.polygons.corner[3 * t + (e + 1) % 3];
+    if (neighbour[e] >= 0 || cloth.closed_by_wall(area, a, b)) continue;
     const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
     inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
   }
   return max0(inside);
 }
 
-// Side, normal, signed distance and wall density of every particle near a sheet. The side is taken
-// from the geometry when a particle comes within reach and remembered while its nearest triangle
-// stays on the same patch (rest centroids within two supports); memory ends beyond the support and
-// at free edges.
-void find_sheet_sides(State& state, const ConstVecView& position);
+/// Side, normal, signed distance, m, and fraction of density of every particle near cloth, from its
+/// nearest triangle (find_nearest_triangles). The side is taken from the geometry when a particle
+/// comes within reach; the weakly compressible fluid remembers it while its nearest triangle stays
+/// on the same patch (rest centroids within two supports); memory ends beyond the support and at
+/// free edges.
+/// @param position  m, of the particles
+void find_cloth_sides(State& state, const ConstVecView& position);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -38,38 +38,39 @@ ContactSetup contact_setup(State& state) {
   ClothState& c = state.cloth;
   const Parameters& p = state.parameters;
   const float beta = 0.5f * float(state.substeps + 1) / float(state.substeps);
-  return {near_list(state),
-          f.velocity.view(),
-          f.normal.view(),
-          f.sheet_distance.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          c.half_thickness.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          beta,
-          float(state.dt),
-          p.particle_mass,
-          p.rest_density,
-          p.sound_speed,
-          p.support_radius,
-          contact_distance_of(p),
-          p.dynamic_viscosity,
-          0.01f * p.sound_speed,
-          p.wall_scale};
+  return {.near = near_list(state),
+          .velocity = f.velocity.view(),
+          .normal = f.normal.view(),
+          .distance = f.sheet_distance.data(),
+          .pressure_term = f.pressure_term.data(),
+          .inverse_density = f.inverse_density.data(),
+          .half_thickness = c.half_thickness.data(),
+          .inverse_mass = c.inverse_mass.data(),
+          .contact_weight = c.share.data(),
+          .beta = beta,
+          .dt = float(state.dt),
+          .mass = p.particle_mass,
+          .rest_density = p.rest_density,
+          .sound_speed = p.sound_speed,
+          .support_radius = p.support_radius,
+          .contact_distance = contact_distance_of(p),
+          .viscosity = p.dynamic_viscosity,
+          .push_speed = 0.01f * p.sound_speed,
+          .wall_scale = p.wall_scale};
 }
 
 }  // namespace
 
-void sum_by_triangle(State& state, Rows which, bool again) {
+void sum_by_triangle(State& state, Rows which, IdleCorners idle) {
   const ContactRows c = contact_rows(state);
   const ConstVecView given = state.contact.change.view();
   const int triangles = state.cloth.triangles, *start = state.contact.start.data();
   const VecView impulse = state.contact.impulse.view();
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
+  const bool skip = which == Rows::close && idle == IdleCorners::zero;
   parallel_for(
       "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
-        if (again && start[t] == start[t + 1] && last == 0) return;
+        if (skip && start[t] == start[t + 1]) return;
         Vec3<float> sum[3] = {};
         for (int soft = 0; soft <= last; ++soft) {
           const int k = t + soft * triangles;
@@ -110,7 +111,7 @@ void start_contacts(State& state) {
     state.fluid.owed.clear();
     state.owes = false;
   }
-  float* share = cloth.share.data();
+  float* contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
   parallel_for(
@@ -124,7 +125,7 @@ void start_contacts(State& state) {
         });
         force.set(v,
                   owes ? near.sum_on_vertex(impulse, v) * -inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
-        share[v] = weights;
+        contact_weight[v] = weights;
       });
 }
 
@@ -137,33 +138,34 @@ void solve_contacts(State& state) {
   const VecView predicted = cloth.predicted.view(), force = cloth.force.view(),
                 velocity = state.fluid.velocity.view();
   const ConstVecView impulse = state.contact.impulse.view();
-  const float *inverse_mass = cloth.inverse_mass.data(), *share = cloth.share.data();
+  const float *inverse_mass = cloth.inverse_mass.data(), *contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
-      "contact: prepare", c.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
+      "contact: prepare", c.list.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
   for_each_lane(
-      "contact: soft", c.rows - c.soft_begin, DRENCH_LAMBDA(auto row) {
-        update_contact(c, row + c.soft_begin, predicted, inverse_particle_mass, 1.f);
+      "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
+        update_contact(c, row + c.list.soft_begin, predicted, inverse_particle_mass, 1.f);
       });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
     for_each_lane(
-        "contact: particles", c.close, DRENCH_LAMBDA(auto row) {
+        "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
-    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close, iteration > 1);
+    sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close,
+                    iteration > 1 ? IdleCorners::zero : IdleCorners::unset);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
         "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
-          if (share[v] == 0.f) return;
+          if (contact_weight[v] == 0.f) return;
           const Vec3<float> sum = near.sum_on_vertex(impulse, v);
           predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
           force.set(v, force[v] - sum * inverse_dt);
         });
   }
   parallel_for(
-      "contact: velocities", c.rows, DRENCH_LAMBDA(int row) {
-        if (c.particle[row] >= 0) velocity.set(c.particle[row], c.velocity[row]);
+      "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
+        if (c.list.particle[row] >= 0) velocity.set(c.list.particle[row], c.velocity[row]);
       });
 }
 
@@ -174,7 +176,8 @@ void find_nearest_centroids(State& state) {
   const VecView normal = f.normal.view();
   int* triangle = f.triangle.data();
   float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data(),
-        *distance = f.sheet_distance.data(), *edge = f.edge.data(), *share = f.cloth_share.data();
+        *distance = f.sheet_distance.data(), *edge = f.edge.data(),
+        *fraction = f.cloth_share.data();
   const WallTable table{state.wall_table};
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
@@ -182,7 +185,7 @@ void find_nearest_centroids(State& state) {
   parallel_for(
       "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> p = position[i];
-        triangle[i] = -1, edge[i] = 0.f, share[i] = 0.f, distance[i] = 1e30f;
+        triangle[i] = -1, edge[i] = 0.f, fraction[i] = 0.f, distance[i] = 1e30f;
         normal.set(i, {0.f, 0.f, 0.f});
         if (p.x < low.x - reach || p.x > high.x + reach || p.y < low.y - reach ||
             p.y > high.y + reach || p.z < low.z - reach || p.z > high.z + reach) {
@@ -214,7 +217,7 @@ void find_nearest_centroids(State& state) {
         triangle[i] = nearest, edge[i] = 1.f, distance[i] = unsigned_d;
         weight_b[i] = weight_c[i] = 1.f / 3.f;  // eq 11: equal thirds
         normal.set(i, n * ((d < 0.f ? -1.f : 1.f) / twice_area));
-        share[i] =
+        fraction[i] =
             spacing / h * table.density(unsigned_d / h);  // eq 9: one layer of particles a apart
       });
 }

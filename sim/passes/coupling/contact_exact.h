@@ -12,11 +12,10 @@
 // all contacts on vertex k), the reduced mass shared among simultaneous contacts, so that it cannot
 // overshoot. beta = (S + 1) / 2S is the mean velocity that a steady force gives a free vertex over
 // S substeps, in parts of its last one: exact where the sheet moves as a whole, a bound where
-// springs hold a vertex back. Starting from the impulses of the step before was tried and dropped:
-// light taut cloth answers them late and flutters (vertex speeds 10 m/s in place of 2 m/s under
-// 0.12 m of water on 0.4 kg/m^2). A contact too far off to be reached within the step (the second
-// layer of particles) has a soft pressure alone: it is solved once, implicitly, before the first
-// iteration.
+// springs hold a vertex back. Impulses start at zero
+// (docs/decisions/0020-impulses-start-at-zero.md). A contact too far off to be reached within the
+// step (the second layer of particles) has a soft pressure alone: it is solved once, implicitly,
+// before the first iteration.
 
 #include "sim/backend/parallel.h"
 #include "sim/neighbours/kernels.h"
@@ -52,9 +51,15 @@ struct NearView {
 inline NearView near_list(const State& state) {
   const FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
-  return {f.triangle.data(),          c.corner.data(),    f.weight_b.data(),
-          f.weight_c.data(),          f.edge.data(),      state.contact.order.data(),
-          state.contact.start.data(), c.fan_start.data(), c.fan_entry.data()};
+  return {.triangle = f.triangle.data(),
+          .corner = c.corner.data(),
+          .weight_b = f.weight_b.data(),
+          .weight_c = f.weight_c.data(),
+          .edge = f.edge.data(),
+          .order = state.contact.order.data(),
+          .start = state.contact.start.data(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data()};
 }
 
 /// m, the gap to the sheet's surface that contact keeps.
@@ -65,6 +70,7 @@ inline float contact_distance_of(const Parameters& p) { return 0.5f * p.spacing;
 /// triangle as well.
 void sort_contacts(State& state, float reach);
 
+/// sort_contacts with the reach of a weakly compressible step, a quarter of the speed of sound.
 void sort_exact_contacts(State& state);
 
 /// Contacts row by row: close ones, up to seven empty rows, the soft ones; both in the order of the
@@ -98,7 +104,8 @@ inline ContactRows contact_rows(const State& state) {
 }
 
 /// What the solve of the exact coupling keeps of every row.
-struct ExactContacts : ContactRows {
+struct ExactContacts {
+  ContactRows list;
   VecView normal, velocity, drag, change;
   float *inverse_row, *pressure_target, *pressure_rate, *pressure_scale, *least, *drag_rate,
       *drag_scale, *lambda;
@@ -106,13 +113,19 @@ struct ExactContacts : ContactRows {
 
 inline ExactContacts exact_contacts(State& state) {
   ContactState& c = state.contact;
-  return {contact_rows(state),      c.normal.view(),
-          c.velocity.view(),        c.drag.view(),
-          c.change.view(),          c.inverse_row.data(),
-          c.pressure_target.data(), c.pressure_rate.data(),
-          c.pressure_scale.data(),  c.least.data(),
-          c.drag_rate.data(),       c.drag_scale.data(),
-          c.lambda.data()};
+  return {.list = contact_rows(state),
+          .normal = c.normal.view(),
+          .velocity = c.velocity.view(),
+          .drag = c.drag.view(),
+          .change = c.change.view(),
+          .inverse_row = c.inverse_row.data(),
+          .pressure_target = c.pressure_target.data(),
+          .pressure_rate = c.pressure_rate.data(),
+          .pressure_scale = c.pressure_scale.data(),
+          .least = c.least.data(),
+          .drag_rate = c.drag_rate.data(),
+          .drag_scale = c.drag_scale.data(),
+          .lambda = c.lambda.data()};
 }
 
 /// What the solve reads of the particles and the sheet to set contacts up.
@@ -120,25 +133,25 @@ struct ContactSetup {
   NearView near;
   VecView velocity, normal;
   const float *distance, *pressure_term, *inverse_density, *half_thickness, *inverse_mass,
-      *vertex_share;
+      *contact_weight;
   float beta, dt, mass, rest_density, sound_speed, support_radius, contact_distance, viscosity,
       push_speed, wall_scale;
 
   template <class Index>
   DRENCH_HD void prepare(const ExactContacts& c, Index row) const {
-    const auto member = load(c.particle, row);
+    const auto member = load(c.list.particle, row);
     const auto valid = is_index(member);
     const auto i = select(valid, member, same_index(0, member));
     const auto t = load(near.triangle, i);
     using T = decltype(load(distance, i));
     T sum(1.f / mass);
     for (int k = 0; k < 3; ++k) {
-      const auto vertex = load(c.vertex[k], row);
-      sum = sum + load(c.weight[k], row) * load(vertex_share, vertex) * T(beta) *
+      const auto vertex = load(c.list.vertex[k], row);
+      sum = sum + load(c.list.weight[k], row) * load(contact_weight, vertex) * T(beta) *
                       load(inverse_mass, vertex);
     }
     const T none(0.f), edge = select(valid, load(near.edge, i), none);
-    // No force at and beyond a free edge, where the edge's share is 0.
+    // No force at and beyond a free edge, where the edge's weight is 0.
     store(c.inverse_row, row, select(edge > none, T(1.f) / sum, none));
     c.normal.put(row, normal.at(i));
     c.velocity.put(row, velocity.at(i));
@@ -153,17 +166,17 @@ struct ContactSetup {
     const T pressure = load(pressure_term, i), inverse_rho = load(inverse_density, i),
             plane = spiky_plane(q);
     const T layer = edge * T(rest_density), push_term = layer * pressure;
-    const T share = layer * inverse_rho * inverse_rho;
+    const T drag_term = layer * inverse_rho * inverse_rho;
     const T slope = select(pressure > none,
                            T(wall_scale * sound_speed * sound_speed * rest_density) * plane, none);
     const T kappa =
-        inverse_h * inverse_h * (share * slope * plane + push_term * spiky_plane_slope(q));
+        inverse_h * inverse_h * (drag_term * slope * plane + push_term * spiky_plane_slope(q));
     const T rate = T(dt * dt * mass) * kappa;
     store(c.pressure_target, row, T(dt * mass) * push_term * plane * inverse_h);
     store(c.pressure_rate, row, rate);
     store(c.pressure_scale, row, T(1.f) / (T(1.f) + rate * sum));
     const T drag_rate =
-        T(dt * mass * viscosity) * share * viscosity_halfspace(q) * inverse_h * inverse_h;
+        T(dt * mass * viscosity) * drag_term * viscosity_halfspace(q) * inverse_h * inverse_h;
     store(c.drag_rate, row, drag_rate);
     store(c.drag_scale, row, T(1.f) / (T(1.f) + drag_rate * sum));
   }
@@ -175,10 +188,10 @@ DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecV
                               float inverse_mass, float relaxation) {
   using T = decltype(load(c.lambda, row));
   const Vec3<T> normal = c.normal.at(row), velocity = c.velocity.at(row), drag = c.drag.at(row);
-  const Vec3<T> sheet = predicted.at(load(c.vertex[0], row)) * load(c.weight[0], row) +
-                        predicted.at(load(c.vertex[1], row)) * load(c.weight[1], row) +
-                        predicted.at(load(c.vertex[2], row)) * load(c.weight[2], row);
-  const Vec3<T> relative = velocity - sheet;
+  const Vec3<T> foot = predicted.at(load(c.list.vertex[0], row)) * load(c.list.weight[0], row) +
+                       predicted.at(load(c.list.vertex[1], row)) * load(c.list.weight[1], row) +
+                       predicted.at(load(c.list.vertex[2], row)) * load(c.list.weight[2], row);
+  const Vec3<T> relative = velocity - foot;
   const T approach = dot(normal, relative), old = load(c.lambda, row), none(0.f);
   const Vec3<T> slip = relative - normal * approach;
   const T by_pressure =
@@ -198,20 +211,25 @@ DRENCH_HD void update_contact(const ExactContacts& c, Index row, const ConstVecV
 }
 
 /// Iterations of the Jacobi solve. The row sum bounds every mode, so all but the last may go nearly
-/// twice as far. A pool of 0.3 m on 0.4 kg/m^2: 4 plain iterations left 18,413 particles to the
-/// path test in half a second, 12 plain ones 2, these 6 left 3.
+/// twice as far, which halves their number (docs/decisions/0021-over-relaxed-contacts.md).
 constexpr int contact_iterations = 6;
 constexpr float over_relaxation = 1.8f;
 
+/// Rows of contacts: those in reach within the step, or the soft ones, too.
 enum class Rows { close, all };
 
-/// Adds up what the contacts of each triangle give to its corners, in their order.
-/// @param again  the same rows were the last to be added: where there are none zeros stand already
-void sum_by_triangle(State& state, Rows which, bool again = false);
+/// What the corners of a triangle without contacts hold: anything, or the zeros of a sum before.
+enum class IdleCorners { unset, zero };
 
-/// Rows of the near list; the vertices receive what the path test took from particles.
+/// Adds up what the contacts of each triangle give to its corners, in their order.
+void sum_by_triangle(State& state, Rows which, IdleCorners idle = IdleCorners::unset);
+
+/// Fills the rows of the near list and the weights of contacts by vertex (ClothState::share). The
+/// vertices receive what particles owe them (FluidState::owed, kg m/s) as ClothState::force, N.
 void start_contacts(State& state);
 
+/// Solves for the impulses of the rows, N s: leaves the particles' velocities after contact, and in
+/// ClothState::predicted and ClothState::force what the vertices received.
 void solve_contacts(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -1,11 +1,12 @@
 #pragma once
-// The last guard of the exact coupling: the straight path of a particle over a cloth substep
-// against the triangles that move meanwhile. In double on the stored floats, so that whoever counts
-// crossings from the stored states finds none. Where they would cross, the lighter one yields: a
-// triangle lighter than the particle is held for the substep and shares its momentum with the
-// particles that stopped it; a lighter particle is put back on its side of the triangle, a small
-// clearance off the place where they met, by an impulse shared with the vertices. What finds no
-// free place is held; if all is held nothing moves, which is free of crossings whatever the tangle.
+// Continuous collision detection, the last guard of the coupling: the straight path of a particle
+// over a cloth substep against the triangles that move meanwhile (Bridson, Fedkiw, Anderson 2002).
+// In double on the stored floats, so that whoever counts crossings from the stored states finds
+// none. Where they would cross, the lighter one yields: a triangle lighter than the particle is
+// held for the substep and shares its momentum with the particles that stopped it; a lighter
+// particle is put back on its side of the triangle, a small clearance off the point where they met,
+// by an impulse shared with the vertices. What finds no free position is held; if all is held
+// nothing moves, which is free of crossings whatever the tangle.
 
 #include "sim/passes/cloth/cloth_implicit.h"
 #include "sim/passes/coupling/geometry.h"
@@ -72,30 +73,33 @@ DRENCH_HD double crossing_time(const MovingTriangle& m, Vec3<double> p0, Vec3<do
 
 /// What walls and obstacles hold of implicit sheets does not give way to what presses it on them.
 struct ClothGround {
-  FreeWays free;
+  ConstraintProjection free;
   Vec3<float> middle;  // m, between the walls
   bool holds;
 
-  /// Share of a vertex' inverse mass that a push meets. @param push  unit
+  /// Fraction of a vertex' inverse mass that a push meets. @param push  unit
   DRENCH_HD float gives(int vertex, Vec3<float> x, Vec3<float> push) const {
     if (!holds) return 1.f;
     const Vec3<float> may = free.axis[vertex];
     const auto open = [](float may, float push, float off) {
       return may == 0.f && push * off > 0.f ? 0.f : push;  // off the middle: into the wall
     };
-    Vec3<float> way{open(may.x, push.x, x.x - middle.x), open(may.y, push.y, x.y - middle.y),
-                    open(may.z, push.z, x.z - middle.z)};
-    if (!free.obstacles) return length2(way);
+    Vec3<float> direction{open(may.x, push.x, x.x - middle.x), open(may.y, push.y, x.y - middle.y),
+                          open(may.z, push.z, x.z - middle.z)};
+    if (!free.obstacles) return length2(direction);
     const Vec3<float> n = free.normal[vertex];
-    const float in = dot(n, way);
-    if (in >= 0.f) return length2(way);
-    return free.slides[vertex] == 0.f ? 0.f : length2(way - n * in);
+    const float in = dot(n, direction);
+    if (in >= 0.f) return length2(direction);
+    return free.slides[vertex] == 0.f ? 0.f : length2(direction - n * in);
   }
 };
 
-constexpr float path_clearance = 1e-3f;  // spacings off the triangle where a path that met it ends
+/// Spacings off the triangle where a path that met it ends.
+constexpr float collision_clearance = 1e-3f;
 
-struct PathTest {
+/// Paths of particles against moving triangles, and who yields where they would cross
+/// (docs/decisions/0025-who-yields-in-a-collision.md).
+struct ContinuousCollision {
   PolygonView polygons;            // cells from the start of the step
   ConstVecView cloth, cloth_next;  // this substep
   ConstVecView cloth_velocity;
@@ -107,24 +111,26 @@ struct PathTest {
                         // velocities in units of velocity_unit
   int* stopped;         // by particle: triangle it stopped in this round, -1 none
   const int* nearest;   // by particle: its triangle, and how far inside a free edge of it (0..1)
-  const float *edge, *distance, *cloth_mass, *inverse_mass, *vertex_share;
+  const float *edge, *distance, *cloth_mass, *inverse_mass, *contact_weight;
   float mass, clearance;
-  float cloth_moved;  // m, farthest that a vertex has been from its place at the step's start
+  float cloth_moved;  // m, farthest that a vertex has been from its position at the step's start
   int attempts;       // 0: the particle is held at once
   ClothGround ground;
 
   struct Hit {
     int triangle = -1;
     double time = 2;
-    int place = -1;  // in the grid's order: which image of the triangle
+    int image = -1;  // of the triangle: its index in the grid's order
   };
 
-  DRENCH_HD MovingTriangle moving(int place) const {
-    const auto from = [&](int e) { return to_double(polygons.corner_in(place, e, cloth)); };
-    const auto to = [&](int e) { return to_double(polygons.corner_in(place, e, cloth_next)); };
+  /// The triangle over this substep. @param image  as Hit::image
+  DRENCH_HD MovingTriangle moving(int image) const {
+    const auto from = [&](int e) { return to_double(polygons.corner_in(image, e, cloth)); };
+    const auto to = [&](int e) { return to_double(polygons.corner_in(image, e, cloth_next)); };
     return {from(0), from(1), from(2), to(0), to(1), to(2)};
   }
 
+  /// The earliest triangle that the path meets, -1 for none.
   DRENCH_HD Hit first_hit(Vec3<float> from, Vec3<float> to) const {
     Hit hit;
     const Vec3<float> low{minimum(from.x, to.x), minimum(from.y, to.y), minimum(from.z, to.z)};
@@ -142,6 +148,7 @@ struct PathTest {
     return (hold[k[0]] || inverse_mass[k[0]] == 0.f) && (hold[k[1]] || inverse_mass[k[1]] == 0.f) &&
            (hold[k[2]] || inverse_mass[k[2]] == 0.f);
   }
+  /// Is a triangle's mean vertex lighter than a particle?
   DRENCH_HD bool lighter(int t) const {
     const int* k = polygons.corner + 3 * t;
     return (cloth_mass[k[0]] + cloth_mass[k[1]] + cloth_mass[k[2]]) / 3.f < mass;
@@ -150,17 +157,18 @@ struct PathTest {
   /// Does a triangle stop for a particle? A light one that comes at it, if that frees the path: a
   /// particle that would also pass through the triangle where it stands has to be turned aside
   /// anyway, and a triangle stopped for it hangs on the particle, step by step, while its springs
-  /// stretch (to 60 J in a sheet of 16 g). So does one at a free edge of the particle's own
-  /// triangle, where no pressure tells it of the springs.
+  /// stretch. So does one at a free edge of the particle's own triangle, where no pressure tells it
+  /// of the springs.
   DRENCH_HD bool triangle_stops(int i, Vec3<float> from, Vec3<float> to, const Hit& hit) const {
     if (!lighter(hit.triangle) || (nearest[i] == hit.triangle && edge[i] < 1.f)) return false;
-    MovingTriangle m = moving(hit.place);
+    MovingTriangle m = moving(hit.image);
     m.a1 = m.a0, m.b1 = m.b0, m.c1 = m.c0;
     return crossing_time(m, to_double(from), to_double(to)) < 0;
   }
 
   static constexpr double velocity_unit = 1.0 / (1 << 24);  // m/s
 
+  /// Counts a particle of velocity v, m/s, that stops a vertex: in integers, in any order.
   DRENCH_HD void add_stop(int vertex, Vec3<float> v) const {
     long long* sum = stop_sum + 4 * vertex;
     add_atomic(sum, 1);
@@ -171,11 +179,11 @@ struct PathTest {
   DRENCH_HD int stop_count(int vertex) const { return int(stop_sum[4 * vertex]); }
   /// Of the vertex and the particles that stop it, after an impact without rebound; a particle
   /// gives a third of its mass to each corner. The mean of the particles alone would leave them a
-  /// heavy vertex's momentum to share: 0.08 kg in 0.008 kg, thrown thirty times as fast.
+  /// heavy vertex's momentum to carry off, and a vertex may have ten times their mass.
   DRENCH_HD Vec3<float> stop_velocity(int vertex, Vec3<float> own) const {
     const long long* sum = stop_sum + 4 * vertex;
-    const double share = mass / 3., of_cloth = cloth_mass[vertex];
-    const double unit = velocity_unit * share, inverse = 1 / (of_cloth + share * double(sum[0]));
+    const double third = mass / 3., of_cloth = cloth_mass[vertex];
+    const double unit = velocity_unit * third, inverse = 1 / (of_cloth + third * double(sum[0]));
     return {float((sum[1] * unit + own.x * of_cloth) * inverse),
             float((sum[2] * unit + own.y * of_cloth) * inverse),
             float((sum[3] * unit + own.z * of_cloth) * inverse)};
@@ -206,7 +214,7 @@ struct PathTest {
   /// contacts on the vertices (as in contact_exact.h, or many hits would throw light cloth back);
   /// the cloth's part is owed to it until the next step.
   DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
-    const MovingTriangle m = moving(hit.place);
+    const MovingTriangle m = moving(hit.image);
     const Vec3<double> p0 = to_double(from), p1 = to_double(to);
     const double side = side_at(m, p0, p1, 0) > 0 ? 1 : -1;
     const Vec3<double> p = lerp(p0, p1, hit.time), a = lerp(m.a0, m.a1, hit.time),
@@ -226,7 +234,7 @@ struct PathTest {
     float row = 1.f / mass;
     for (int c = 0; c < 3; ++c) {
       wall = wall + cloth_velocity[k[c]] * w[c];
-      row += w[c] * maximum(w[c], vertex_share[k[c]]) * inverse_mass[k[c]] *
+      row += w[c] * maximum(w[c], contact_weight[k[c]]) * inverse_mass[k[c]] *
              ground.gives(k[c], cloth_next[k[c]], direction * -1.f);
     }
     const float approach = dot(direction, velocity[i] - wall);
@@ -248,8 +256,8 @@ struct PathTest {
     return nearest <=
            length(to - start[i]) + length(to - position[i]) + cloth_moved + 2.f * clearance;
   }
-  DRENCH_HD bool normal_is_zero(
-      int i) const {  // beyond a free edge: near, but the distance is not kept
+  /// Beyond a free edge: near, but the distance is not kept.
+  DRENCH_HD bool normal_is_zero(int i) const {
     const Vec3<float> n = normal[i];
     return n.x == 0.f && n.y == 0.f && n.z == 0.f;
   }

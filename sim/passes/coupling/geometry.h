@@ -26,16 +26,16 @@ DRENCH_HD PreparedTriangle<T> prepare_triangle(Vec3<T> a, Vec3<T> b, Vec3<T> c) 
   const T tiny(1e-30f), one(1.f);  // an edge of no length has its closest point at its start
   const Vec3<T> ab = b - a, ac = c - a, bc = c - b;
   const T d11 = dot(ab, ab), d12 = dot(ab, ac), d22 = dot(ac, ac);
-  return {a,
-          ab,
-          ac,
-          d11,
-          d12,
-          d22,
-          one / maximum(d11, tiny),
-          one / maximum(d22, tiny),
-          one / maximum(dot(bc, bc), tiny),
-          one / maximum(d11 * d22 - d12 * d12, tiny)};
+  return {.a = a,
+          .ab = ab,
+          .ac = ac,
+          .d11 = d11,
+          .d12 = d12,
+          .d22 = d22,
+          .inverse_ab = one / maximum(d11, tiny),
+          .inverse_ac = one / maximum(d22, tiny),
+          .inverse_bc = one / maximum(dot(bc, bc), tiny),
+          .inverse = one / maximum(d11 * d22 - d12 * d12, tiny)};
 }
 
 /// The foot of p on the plane of the triangle: p = a + v ab + w ac + something normal.

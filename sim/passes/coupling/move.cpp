@@ -40,7 +40,7 @@ Drift drift_of(const State& state) {
   return {state.fluid.drift.view(), state.fluid.drift.x.size() > 0};
 }
 
-PathTest path_test_of(State& state, float moved) {
+ContinuousCollision continuous_collision_of(State& state, float moved) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
   const ConstVecView next = c.next.view(), start = c.start.view();
@@ -49,29 +49,30 @@ PathTest path_test_of(State& state, float moved) {
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
   const ClothWalls walls = cloth_walls_of(p);
-  return {polygons_of(state),
-          c.position.view(),
-          next,
-          c.next_velocity.view(),
-          f.velocity.view(),
-          f.normal.view(),
-          f.start.view(),
-          f.position.view(),
-          f.owed.view(),
-          c.held.data(),
-          c.stop_sum.data(),
-          f.stopped.data(),
-          f.triangle.data(),
-          f.edge.data(),
-          f.sheet_distance.data(),
-          c.mass.data(),
-          c.inverse_mass.data(),
-          c.share.data(),
-          p.particle_mass,
-          path_clearance * p.spacing,
-          std::max(std::sqrt(moved2), moved),
-          4,
-          {free_ways(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
+  return {
+      .polygons = polygons_of(state),
+      .cloth = c.position.view(),
+      .cloth_next = next,
+      .cloth_velocity = c.next_velocity.view(),
+      .velocity = f.velocity.view(),
+      .normal = f.normal.view(),
+      .start = f.start.view(),
+      .position = f.position.view(),
+      .owed = f.owed.view(),
+      .hold = c.held.data(),
+      .stop_sum = c.stop_sum.data(),
+      .stopped = f.stopped.data(),
+      .nearest = f.triangle.data(),
+      .edge = f.edge.data(),
+      .distance = f.sheet_distance.data(),
+      .cloth_mass = c.mass.data(),
+      .inverse_mass = c.inverse_mass.data(),
+      .contact_weight = c.share.data(),
+      .mass = p.particle_mass,
+      .clearance = collision_clearance * p.spacing,
+      .cloth_moved = std::max(std::sqrt(moved2), moved),
+      .attempts = 4,
+      .ground = {constraint_projection(state), (walls.low + walls.high) * 0.5f, p.incompressible}};
 }
 
 namespace {
@@ -84,8 +85,8 @@ Tested tested_of(const State& state, float cloth_moved) {
 
 /// One round: where each particle ends, into f.end. In the first of an incompressible step it
 /// is there, as the pressure solve found it.
-GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, float dt,
-                      int round) {
+GuardCount resolve_paths(State& state, const ContinuousCollision& test, const Tested& tested,
+                         float dt, int round) {
   FluidState& f = state.fluid;
   const ConstVecView x = f.position.view();
   const VecView v = f.velocity.view(), end = f.end.view();
@@ -126,13 +127,16 @@ GuardCount test_paths(State& state, const PathTest& test, const Tested& tested, 
         end.set(i, to);
         return result;
       },
-      AddGuardCounts{});
+      Plus{});
 }
+
+/// Which vertices are put back to the substep's start.
+enum class Held { stopped, all };
 
 /// Takes back the substep of the vertices that particles stopped in this round, or of all. A
 /// stopped vertex takes on its common velocity with those particles; what that changes of its
 /// momentum they share.
-void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool everywhere) {
+void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tested, Held which) {
   ClothState& c = state.cloth;
   FluidState& f = state.fluid;
   const VecView next = c.next.view(), next_v = c.next_velocity.view();
@@ -140,6 +144,7 @@ void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool e
   const VecView velocity = f.velocity.view();
   const int* corner = c.corner.data();
   int* hold = c.held.data();
+  const bool all = which == Held::all;
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
   parallel_for(
@@ -158,7 +163,7 @@ void hold_cloth(State& state, const PathTest& test, const Tested& tested, bool e
   parallel_for(
       "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
-        if (!everywhere && !stopped) return;
+        if (!all && !stopped) return;
         if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
           next_v.set(v, test.stop_velocity(v, next_v[v]));
         for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
@@ -195,7 +200,7 @@ void move_unguarded_particles(State& state) {
   int *moved = f.moved.data(), *key = state.contact.key.data();
   const Mover mover = path_mover_of(state.parameters, dt);
   const Drift drift = drift_of(state);
-  const float room = reach + 2.f * path_clearance * spacing,
+  const float room = reach + 2.f * collision_clearance * spacing,
               support = state.parameters.support_radius;
   const float every_path = state.parameters.every_path ? 1.f : 0.f;
   const bool far_ones = any_lane(
@@ -234,12 +239,12 @@ void accept_paths(State& state, const Tested& tested) {
 }
 
 /// Tests the paths of one substep, round by round, until all are free. Returns how far any vertex
-/// has come from its place at the start of the step so far, m, before it was held.
+/// has come from its position at the start of the step so far, m, before it was held.
 /// @param moved  the same of the substep before.
 float guard_substep(State& state, float dt, float moved) {
   FluidState& f = state.fluid;
   ClothState& c = state.cloth;
-  PathTest test = path_test_of(state, moved);
+  ContinuousCollision test = continuous_collision_of(state, moved);
   moved = test.cloth_moved;
   const Tested tested = tested_of(state, moved);
   if (tested.count == 0) return moved;
@@ -248,17 +253,17 @@ float guard_substep(State& state, float dt, float moved) {
   c.held.clear_bytes(0);
   c.stop_sum.clear_bytes(0);
   for (int round = 0;; ++round) {
-    const GuardCount count = test_paths(state, test, tested, dt, round);
+    const GuardCount count = resolve_paths(state, test, tested, dt, round);
     state.guard_hits += count.hits;
     state.owes |= count.hits > 0;
     if (count.unresolved == 0) break;
     ++state.guard_holds;
-    const bool everywhere = round >= 24;
-    hold_cloth(state, test, tested, everywhere);
-    test = path_test_of(state, moved);
-    if (!everywhere) continue;
+    const Held which = round < 24 ? Held::stopped : Held::all;
+    hold_cloth(state, test, tested, which);
+    test = continuous_collision_of(state, moved);
+    if (which == Held::stopped) continue;
     f.held.clear_bytes(1);
-    test_paths(state, test, tested, dt, round + 1);
+    resolve_paths(state, test, tested, dt, round + 1);
     break;
   }
   accept_paths(state, tested);

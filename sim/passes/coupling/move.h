@@ -1,20 +1,23 @@
 #pragma once
-// The end of a step: particles and cloth move to their new places.
+// The end of a step: particles and cloth move to their new positions.
 
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/coupling/continuous_collision.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// Fluid alone: a step of symplectic Euler within the domain's walls.
 void move_particles(State& state);
 
+/// Cloth takes on what a substep has left in ClothState::next and next_velocity.
 void finish_substep(ClothState& c);
 
+/// Cloth alone: explicit substeps over a step.
 void move_cloth(State& state);
 
 /// What a particle's path has beside dt times its velocity.
 struct Drift {
-  ConstVecView drift;
+  ConstVecView drift;  // m
   bool any;
   template <class Index>
   DRENCH_HD auto at(Index i) const {
@@ -24,28 +27,29 @@ struct Drift {
 };
 Drift drift_of(const State& state);
 
+/// Particles whose path was changed, and those that need another round.
 struct GuardCount {
   int hits = 0, unresolved = 0;
-};
-struct AddGuardCounts {
-  DRENCH_HD GuardCount operator()(GuardCount a, GuardCount b) const {
-    return {a.hits + b.hits, a.unresolved + b.unresolved};
+  DRENCH_HD GuardCount operator+(GuardCount other) const {
+    return {hits + other.hits, unresolved + other.unresolved};
   }
 };
 
+/// The collision test of a substep, from the start of it to ClothState::next.
 /// @param moved  how far cloth came in the substeps before, m: a triangle that springs back starts
 /// there.
-PathTest path_test_of(State& state, float moved);
+ContinuousCollision continuous_collision_of(State& state, float moved);
 
 /// The particles that are tested: the guarded ones, or all once cloth has come farther than they
 /// were chosen for.
 struct Tested {
-  const int *order, *guarded;  // the near list, places in it
+  const int *order, *guarded;  // the near list, indices in it
   int count;
   bool all;
   DRENCH_HD int operator[](int k) const { return all ? k : order[guarded[k]]; }
 };
 
+/// To the bit.
 DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 /// Particles and cloth together, substep by substep, each path tested against the moving triangles.

@@ -1,8 +1,8 @@
 #pragma once
-// Nearest triangle of every particle within reach (eq 5 of the seed with the exact distance in
-// place of the centroid's). The triangle that was nearest a step ago bounds the search, and a
-// particle that was found far off is left out until it or the cloth has moved as far. On a CPU core
-// eight neighbours walk the polygon grid together, on the GPU every thread its own.
+// Nearest triangle of every particle within reach (eq 5 of Harada et al. 2007 with the exact
+// distance in place of the centroid's). The triangle that was nearest a step ago bounds the search,
+// and a particle that was found far off is left out until it or the cloth has moved as far. On a
+// CPU core eight neighbours traverse the polygon grid together, on the GPU every thread its own.
 
 #include "sim/passes/coupling/geometry.h"
 #include "sim/passes/coupling/polygon_grid.h"
@@ -28,9 +28,16 @@ struct NearestOfPack {
   DRENCH_HD void test(const PolygonView& polygons, int k) {
     const PreparedTriangle<float> one = polygons.sorted[k];
     const auto all = [](Vec3<float> v) { return Vec3<Pack>{v.x, v.y, v.z}; };
-    const PreparedTriangle<Pack> t{all(one.a),     all(one.ab), all(one.ac),    one.d11,
-                                   one.d12,        one.d22,     one.inverse_ab, one.inverse_ac,
-                                   one.inverse_bc, one.inverse};
+    const PreparedTriangle<Pack> t{.a = all(one.a),
+                                   .ab = all(one.ab),
+                                   .ac = all(one.ac),
+                                   .d11 = one.d11,
+                                   .d12 = one.d12,
+                                   .d22 = one.d22,
+                                   .inverse_ab = one.inverse_ab,
+                                   .inverse_ac = one.inverse_ac,
+                                   .inverse_bc = one.inverse_bc,
+                                   .inverse = one.inverse};
     const PlaneFoot<Pack> plane = plane_foot(p, t);
     const LaneIndex triangle = same_index(polygons.order[k]);
     Mask may = distance2_bound(plane, t) < best;
@@ -41,7 +48,9 @@ struct NearestOfPack {
   DRENCH_HD void test_each(const PolygonView& polygons, LaneIndex triangle) {
     const Mask valid = is_index(triangle);
     const LaneIndex t = select(valid, triangle, same_index(0)), first = t + t + t;
-    const auto corner = [&](int c) { return polygons.place.at(polygons.position, first + c); };
+    const auto corner = [&](int c) {
+      return polygons.corner_positions.at(polygons.position, first + c);
+    };
     const Vec3<Pack> from = polygons.periodic ? beside(polygons, t) : p;
     take(closest_point<Pack>(from, corner(0), corner(1), corner(2)), triangle, valid);
   }
@@ -63,7 +72,7 @@ struct NearestOfPack {
   }
 };
 
-/// Up to eight particles that lie close together. Those of a row of cells are handed in one by one.
+/// Up to eight particles that lie close together. Those of a row of cells are added one by one.
 class PackOfNeighbours {
  public:
   PackOfNeighbours(const PolygonView& polygons, const ConstVecView& position, const int* before,

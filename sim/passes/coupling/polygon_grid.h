@@ -1,10 +1,10 @@
 #pragma once
-// The second grid of the seed: polygons by centroid (section 5.1).
+// The second grid of Harada et al. 2007: polygons by centroid (section 5.1).
 //
 // Where an axis is periodic vertices stay in coordinates of their own, however far a sheet drifts,
 // and the grid holds every image of a triangle that comes within two supports of the domain: who
 // looks through it in the neighbourhood of a particle finds the images that are there. A triangle
-// is known by its index, an image by its place in the grid's order. Sheets that are joined to
+// is known by its index, an image by its index in the grid's order. Sheets that are joined to
 // themselves across a seam have triangles and springs whose ends stand a period off their vertices.
 
 #include "sim/backend/parallel.h"
@@ -25,13 +25,6 @@ struct JoinBounds {
     return {
         {minimum(a.low.x, b.low.x), minimum(a.low.y, b.low.y), minimum(a.low.z, b.low.z)},
         {maximum(a.high.x, b.high.x), maximum(a.high.y, b.high.y), maximum(a.high.z, b.high.z)}};
-  }
-};
-
-struct Larger {
-  template <class T>
-  DRENCH_HD T operator()(T a, T b) const {
-    return a > b ? a : b;
   }
 };
 
@@ -105,8 +98,13 @@ inline TriangleImages triangle_images_of(const State& state) {
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   const float margin = 2.f * p.support_radius;
-  TriangleImages images{periods_of(p), c.low,     c.high,     c.largest_radius,
-                        {0, 0, 0},     {1, 1, 1}, c.triangles};
+  TriangleImages images{.period = periods_of(p),
+                        .low = c.low,
+                        .high = c.high,
+                        .radius = c.largest_radius,
+                        .first = {0, 0, 0},
+                        .count = {1, 1, 1},
+                        .triangles = c.triangles};
   const auto span = [&](int k, float period, float& low, float& high) {
     if (!(period > 0.f)) return;
     low = p.low[k] - margin, high = p.high[k] + margin;
@@ -132,18 +130,18 @@ struct PolygonView {
   float largest_radius;
   ConstVecView sorted_low, sorted_high;  // bounding boxes in the order of the cells
   const PreparedTriangle<float>* sorted;
-  Corners place;              // of the corners
+  Corners corner_positions;
   ConstVecView sorted_shift;  // m, of the images in that order; where an axis is periodic
   Vec3<float> period;         // m
   bool periodic;
 
   DRENCH_HD void corners(int t, Vec3<float>& a, Vec3<float>& b, Vec3<float>& c) const {
-    a = place.at(position, 3 * t), b = place.at(position, 3 * t + 1),
-    c = place.at(position, 3 * t + 2);
+    a = corner_positions.at(position, 3 * t), b = corner_positions.at(position, 3 * t + 1),
+    c = corner_positions.at(position, 3 * t + 2);
   }
-  /// The corner of what stands in a place of the order, with the vertices at x.
+  /// The corner of the image at index k of the order, with the vertices at x.
   DRENCH_HD Vec3<float> corner_in(int k, int e, const ConstVecView& x) const {
-    const Vec3<float> p = place.at(x, 3 * order[k] + e);
+    const Vec3<float> p = corner_positions.at(x, 3 * order[k] + e);
     return periodic ? p + sorted_shift[k] : p;
   }
   /// The image of p that a triangle is to be seen from. (Not always the nearest to a large one.)
@@ -173,7 +171,7 @@ struct PolygonView {
                       max0(maximum(T(low.z) - h.z, l.z - T(high.z)))};
     return length2(gap) <= T(extra * extra);
   }
-  /// Calls f(place in order) for each of those whose own box comes within `extra` of the box.
+  /// Calls f(index in order) for each of those whose own box comes within `extra` of the box.
   template <class F>
   DRENCH_HD void for_each_near_box(Vec3<float> low, Vec3<float> high, float extra,
                                    const F& f) const {
@@ -187,20 +185,20 @@ struct PolygonView {
 
 inline PolygonView polygons_of(const State& state) {
   const ClothState& c = state.cloth;
-  return {c.grid,
-          c.cell_start.data(),
-          c.order.data(),
-          c.corner.data(),
-          c.position.view(),
-          c.centroid.view(),
-          c.largest_radius,
-          c.sorted_low.view(),
-          c.sorted_high.view(),
-          c.sorted_triangle.data(),
-          corners_of(c),
-          c.sorted_shift.view(),
-          periods_of(state.parameters),
-          any_periodic(state.parameters)};
+  return {.grid = c.grid,
+          .cell_start = c.cell_start.data(),
+          .order = c.order.data(),
+          .corner = c.corner.data(),
+          .position = c.position.view(),
+          .centroid = c.centroid.view(),
+          .largest_radius = c.largest_radius,
+          .sorted_low = c.sorted_low.view(),
+          .sorted_high = c.sorted_high.view(),
+          .sorted = c.sorted_triangle.data(),
+          .corner_positions = corners_of(c),
+          .sorted_shift = c.sorted_shift.view(),
+          .period = periods_of(state.parameters),
+          .periodic = any_periodic(state.parameters)};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -3,7 +3,8 @@
 //   du/dt = -dw/dt x r - w x (w x r) - 2 w x u,      r from a point of the axis,
 // the forces of Euler, of the centrifuge and of Coriolis (Landau and Lifshitz, Mechanics, section
 // 39). Coriolis' turns velocities and does no work: the trapezoidal rule, solved in closed form,
-// keeps their length to rounding. It goes before gravity, at the places that the step starts with.
+// keeps their length to rounding. It goes before gravity, at the positions that the step starts
+// with.
 
 #include "sim/backend/parallel.h"
 #include "sim/state.h"
@@ -29,6 +30,7 @@ inline TurningFrame turning_frame_of(const State& state) {
           float(state.dt)};
 }
 
+/// What the turning of the domain does to the velocities of fluid and free vertices in a step.
 void turn_frame(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -46,14 +46,14 @@ Impulse pressure_impulse(const State& state, int which) {
           WallShare others = walls.share(x);
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image) others = law.both(others, law.of(obstacles.obstacle[k], x));
-          sum = sum(sum, times(own.gradient, factor * at.w * (1.f - others.value)));
+          sum = sum + times(own.gradient, factor * at.w * (1.f - others.value));
         }
         return sum;
       },
-      Impulse{});
+      Plus{});
 }
 
-Impulse pressure_impulse_near_sheets(const State& state, int which) {
+Impulse pressure_impulse_near_cloth(const State& state, int which) {
   const Parameters& p = state.parameters;
   const ObstacleShare law = obstacle_share_of(p);
   const ImageWalls walls = image_walls_of(p);
@@ -78,17 +78,16 @@ Impulse pressure_impulse_near_sheets(const State& state, int which) {
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image)
               others = law.both(others, law.seen(obstacles.obstacle[k], x, n, gap, walls));
-          sum = sum(sum,
-                    times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value)));
+          sum = sum + times(own.gradient, factor * place[i].w * c.open[row] * (1.f - others.value));
         }
         return sum;
       },
-      Impulse{});
+      Plus{});
 }
 
 Impulse tension_impulse(const State& state, int which) {
   MirrorImages images = mirror_images_of(state);
-  images.sheets.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
+  images.cloth.cloth_velocity = state.cloth.next_velocity.view();  // the step has swapped them
   const auto force = tension_force(state, nullptr, Straight{});
   const double factor = double(force.scale) * state.parameters.particle_mass;
   return parallel_reduce(
@@ -98,11 +97,11 @@ Impulse tension_impulse(const State& state, int which) {
         const Mirrors mirrors = images.of(i);
         for (int k = 0; k < mirrors.count; ++k) {
           if (mirrors.mirror[k].of != which) continue;
-          impulse = impulse(impulse, times(images.sum(i, mirrors, force).by[k], factor));
+          impulse = impulse + times(images.sum(i, mirrors, force).by[k], factor);
         }
         return impulse;
       },
-      Impulse{});
+      Plus{});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,8 +8,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct Impulse {
   double x = 0, y = 0, z = 0;
-  DRENCH_HD Impulse operator()(const Impulse& a, const Impulse& b) const {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  DRENCH_HD Impulse operator+(const Impulse& other) const {
+    return {x + other.x, y + other.y, z + other.z};
   }
 };
 
@@ -20,7 +20,7 @@ DRENCH_HD Impulse times(Vec3<float> v, double push) { return {push * v.x, push *
 Impulse pressure_impulse(const State& state, int which);
 
 /// The same of those that are.
-Impulse pressure_impulse_near_sheets(const State& state, int which);
+Impulse pressure_impulse_near_cloth(const State& state, int which);
 
 /// What surface tension gave to one obstacle in the step that was made, kg m/s.
 Impulse tension_impulse(const State& state, int which);

@@ -24,7 +24,7 @@ struct PathStop {
   float clearance;  // m, no path ends nearer
   float out;        // m, where to one that does is moved
 
-  /// Share of the path where it comes within a quarter of the clearance; 2 if it never does.
+  /// Fraction of the path at which it comes within a quarter of the clearance; 2 if it never does.
   DRENCH_HD float first_hit(const ObstacleView& o, const ObstaclePath& path) const {
     const float length = path.length(o), least = 0.25f * clearance;
     for (float t = 0.f; t <= 1.f;) {
@@ -138,7 +138,7 @@ struct ObstacleGuard {
         x1 = walls.inside(x1);
       }
     }
-    // Squeezed between obstacles or against a wall: the better of both places.
+    // Squeezed between obstacles or against a wall: the better of both positions.
     if (met && worst(x1) < 0.f && worst(walls.inside(x0)) > worst(x1)) x1 = walls.inside(x0);
     return x1;
   }
@@ -148,12 +148,12 @@ struct ObstacleGuard {
 inline ObstacleGuard obstacle_guard_of(State& state, int start) {
   const float dt = float(state.dt);
   const bool goes_on = start == 1 && state.cloth.vertices > 0;  // see project_density
-  return {state.obstacles.views(),
-          path_mover_of(state.parameters, dt),
-          goes_on ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt),
-          1.f / dt,
-          start,
-          {state.obstacles.stopped.data()}};
+  return {.obstacles = state.obstacles.views(),
+          .walls = path_mover_of(state.parameters, dt),
+          .ends = goes_on ? path_mover_of(state.parameters, dt) : mover_of(state.parameters, dt),
+          .inverse_dt = 1.f / dt,
+          .start = start,
+          .stopped = {state.obstacles.stopped.data()}};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

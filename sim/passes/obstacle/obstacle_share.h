@@ -86,12 +86,12 @@ struct ObstacleShare {
 
   /// The same beside a sheet at `distance` m against its normal, as ImageWalls::share: not seen
   /// through it.
-  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> sheet_normal,
+  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> cloth_normal,
                            float distance, const ImageWalls& walls) const {
     const WallShare share = of(o, x);
     if (share.value == 0.f) return share;
     const Vec3<float> own = o.to_own(1, x), n = o.turn(1, o.normal(own, o.blend[1]));
-    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, sheet_normal) - distance);
+    const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, cloth_normal) - distance);
     return {share.value * shown, share.gradient * shown};
   }
 
@@ -100,6 +100,7 @@ struct ObstacleShare {
     return {1.f - (1.f - a.value) * (1.f - b.value),
             a.gradient * (1.f - b.value) + b.gradient * (1.f - a.value)};
   }
+  /// Walls and all obstacles together at x.
   DRENCH_HD WallShare with(WallShare walls, const ObstacleViews& obstacles, Vec3<float> x) const {
     for (int k = 0; k < obstacles.count; ++k) {
       const WallShare share = of(obstacles.obstacle[k], x);

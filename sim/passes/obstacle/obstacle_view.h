@@ -39,7 +39,13 @@ struct FieldView {
 
 /// Without pointers.
 inline FieldView field_view(const LevelSet& set) {
-  FieldView view{nullptr, nullptr, 1.f / set.voxel, set.voxel, set.band, {}, {}};
+  FieldView view{.block = nullptr,
+                 .value = nullptr,
+                 .inverse_voxel = 1.f / set.voxel,
+                 .voxel = set.voxel,
+                 .band = set.band,
+                 .low = {},
+                 .blocks = {}};
   for (int k = 0; k < 3; ++k) view.low[k] = set.low[k], view.blocks[k] = set.blocks[k];
   return view;
 }

@@ -4,8 +4,7 @@
 // of divergence by rows that are exact for every particle in linear flows; then particles relax
 // towards an even arrangement (Fickian shifting: Lind, Xu, Stansby, Rogers 2012) and a second
 // solve, which velocities do not feel, makes the density even. With free surfaces the same makes
-// waves of the packing (docs/benchmarks.md). With one solve Taylor and Green's vortices decayed 11
-// % too fast at 50 particles to the side.
+// waves of the packing (docs/decisions/0005-closed-domain.md).
 
 #include "sim/passes/coupling/move.h"
 #include "sim/passes/pressure/pressure_kick.h"
@@ -14,8 +13,8 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 /// Down the gradient of the summed density, except beside walls: what a wall adds to it is known
-/// for where a lattice would stand only, and with it a crowded box took 100 iterations a step in
-/// place of 16 (half of what it pushes in the solve) or stayed 0.3 % denser (all of it).
+/// for where a lattice would stand only, and with it a crowded box takes all the iterations there
+/// are, or stays denser (docs/decisions/0005-closed-domain.md).
 template <class Separation>
 struct Relaxation {
   static constexpr int columns = 1;
@@ -50,6 +49,6 @@ struct Relaxation {
   }
 };
 
-void project_full_box(State& state);
+void project_closed_domain(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

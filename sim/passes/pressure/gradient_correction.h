@@ -4,13 +4,13 @@
 //   L_i = M_i^-1 tr M_i / 3,   M_i = sum_j m / rho_0 (x_j - x_i) (grad W_ij)^T.
 // The factor leaves an even expansion to count as the kernel's sum counts it, so that a solve still
 // finds the density it is asked for. Without L a flow that shears the arrangement of neighbours
-// without changing any volume changes the sum all the same, and pressures resist it: waves died and
-// vortices slowed.
+// without changing any volume changes the sum all the same, and pressures resist it: waves die and
+// vortices slow.
 //
 // M is averaged over the neighbours. Its own value, one particle at a time, keeps more of a wave
-// but makes packings under weight boil (rms 0.02 to 0.05 sqrt(g H) for ever, with averages as
-// without any correction): rows are then far from the gradient of the density that is taken back to
-// rest, and what differs does work round closed paths. What a packing has in common with its
+// but makes packings under weight boil (docs/decisions/0003-averaged-gradient-correction.md): rows
+// are then far from the gradient of the density that is taken back to rest, and what differs does
+// work round closed paths. What a packing has in common with its
 // neighbourhood resists shear; what a particle has of its own averages to nothing.
 // Beside walls, sheets and obstacles and at free surfaces, where half of the neighbours are
 // missing, L is that of the particles farther in, or 1.
@@ -109,7 +109,8 @@ struct GradientCorrection {
   }
 };
 
-/// L of every particle, from positions, walls and densities. Uses PressureState::vector and push.
+/// L of every particle, from positions, walls and densities. Uses PressureState::scratch_a and
+/// scratch_b.
 void correct_gradients(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -1,16 +1,15 @@
 #pragma once
 // Domain walls of the incompressible fluid: mirrors. Beyond a wall lies the fluid's own image,
-// which comes as near as the particle does: a particle at distance d misses the share of density
+// which comes as near as the particle does: a particle at distance d misses the part of density
 // that lies beyond 2 d - a/2, where the image's first layer begins; at d = a/2 that is the
 // half-space beyond the wall itself. Its gradient is twice that of a standing half-space, which is
 // what balances a uniform pressure on the first layer. With the standing half-space that layer
 // gives way until it touches the wall, and a tenth of all particles carry nine tenths of the
-// density error (mean 0.067 % in place of 0.005 %, 99.9th percentile 2.4 % in place of 0.05 %, on a
-// collapsing column).
+// density error (docs/decisions/0006-mirror-walls.md).
 
 #include "sim/backend/vec3.h"
 #include "sim/neighbours/kernels.h"
-#include "sim/parameters.h"
+#include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -19,16 +18,14 @@ struct WallShare {
   Vec3<float> gradient;  // 1/m
 };
 
-struct ImageWalls {
-  float low[3], high[3];  // m
-  bool on[3];
+struct ImageWalls : DomainWalls {
   float scale;      // makes a lattice that ends half a spacing before a wall whole
   float inverse_h;  // 1/m
   float spacing;    // m
 
-  /// Where the image of a wall at `distance` m begins, over h; at most 1.
-  DRENCH_HD float image(float distance, bool there) const {
-    return there ? minimum((2.f * distance - 0.5f * spacing) * inverse_h, 1.f) : 1.f;
+  /// Where the image of a wall of an axis at `distance` m begins, over h; at most 1.
+  DRENCH_HD float image(float distance, int axis) const {
+    return on[axis] ? minimum((2.f * distance - 0.5f * spacing) * inverse_h, 1.f) : 1.f;
   }
 
   /// 1 where the foot on a wall lies before a sheet, 0 where it lies a fifth of a spacing behind.
@@ -36,7 +33,7 @@ struct ImageWalls {
     return 1.f - minimum(max0(behind) / (0.2f * spacing), 1.f);
   }
 
-  /// Share of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
+  /// Fraction of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
   /// corners are not counted twice; H is the kernel's integral over the image, over h.
   DRENCH_HD WallShare share(Vec3<float> p) const { return share(p, {0.f, 0.f, 0.f}, 0.f); }
 
@@ -46,7 +43,7 @@ struct ImageWalls {
     float open[3], slope[3];
     for (int k = 0; k < 3; ++k) {
       const float to_low = x[k] - low[k], to_high = high[k] - x[k];
-      const float below = image(to_low, on[k]), above = image(to_high, on[k]);
+      const float below = image(to_low, k), above = image(to_high, k);
       const float seen_below = scale * seen(to_low * n[k] - distance),
                   seen_above = scale * seen(-to_high * n[k] - distance);
       open[k] = 1.f - seen_below * WendlandC2::halfspace(below) -
@@ -61,11 +58,7 @@ struct ImageWalls {
 };
 
 inline ImageWalls image_walls_of(const Parameters& p) {
-  ImageWalls walls{{}, {}, {}, p.wall_scale, 1.f / p.support_radius, p.spacing};
-  for (int k = 0; k < 3; ++k) {
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
-  }
-  return walls;
+  return {domain_walls(p), p.wall_scale, 1.f / p.support_radius, p.spacing};
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -30,11 +30,15 @@ void correct_gradients(State& state) {
   const float h = p.support_radius;
   const float scale = p.particle_mass / p.rest_density / p.lattice_sum / (h * h * h * h * h);
   with_separation(p, [&](auto separation) {
-    for_each_neighbour(
-        "neighbours: moments", s.lists, state.fluid.count,
-        GradientMoments<decltype(separation)>{
-            s.place.data(), s.wall.data(), state.fluid.density.data(), s.scratch_a.data(),
-            s.scratch_b.data(), scale, 0.95f * p.rest_density, separation});
+    for_each_neighbour("neighbours: moments", s.lists, state.fluid.count,
+                       GradientMoments<decltype(separation)>{.place = s.place.data(),
+                                                             .wall = s.wall.data(),
+                                                             .density = state.fluid.density.data(),
+                                                             .diagonal = s.scratch_a.data(),
+                                                             .cross = s.scratch_b.data(),
+                                                             .scale = scale,
+                                                             .least = 0.95f * p.rest_density,
+                                                             .separation = separation});
   });
   if (p.full) return correct_alone(state);
   for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
@@ -45,41 +49,52 @@ void correct_gradients(State& state) {
 void accelerate_by_pressure(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
-    for_each_neighbour("pressure: acceleration", s.lists, state.fluid.count,
-                       PressureAcceleration<decltype(separation)>{
-                           s.place.data(), s.correction.data(), s.correction_cross.data(),
-                           s.scratch_b.data(), s.scratch_a.data(), &s.control.data()->done,
-                           gradient_scale(state.parameters), separation});
+    for_each_neighbour(
+        "pressure: acceleration", s.lists, state.fluid.count,
+        PressureAcceleration<decltype(separation)>{.place = s.place.data(),
+                                                   .correction = s.correction.data(),
+                                                   .correction_cross = s.correction_cross.data(),
+                                                   .own_acceleration = s.scratch_b.data(),
+                                                   .vector = s.scratch_a.data(),
+                                                   .done = &s.control.data()->done,
+                                                   .scale = gradient_scale(state.parameters),
+                                                   .separation = separation});
   });
 }
 
 void density_rate(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
-    for_each_neighbour("pressure: density rate", s.lists, state.fluid.count,
-                       DensityRate<decltype(separation)>{
-                           s.place.data(), s.scratch_a.data(), s.correction.data(),
-                           s.correction_cross.data(), s.wall.data(), s.product.data(),
-                           &s.control.data()->done, gradient_scale(state.parameters), separation});
+    for_each_neighbour(
+        "pressure: density rate", s.lists, state.fluid.count,
+        DensityRate<decltype(separation)>{.place = s.place.data(),
+                                          .vector = s.scratch_a.data(),
+                                          .correction = s.correction.data(),
+                                          .correction_cross = s.correction_cross.data(),
+                                          .wall = s.wall.data(),
+                                          .rate = s.product.data(),
+                                          .done = &s.control.data()->done,
+                                          .scale = gradient_scale(state.parameters),
+                                          .separation = separation});
   });
 }
 
 namespace {
 
-/// Of D D^T, and PressureState::push; where there may be levels EvenInverseDiagonal::even as well,
-/// in PressureState::next until an iteration.
+/// Of D D^T, and InverseDiagonal::own_acceleration in PressureState::scratch_b; where there may be
+/// levels EvenInverseDiagonal::even as well, in PressureState::next until an iteration.
 void invert_diagonal(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
     using Separation = decltype(separation);
-    const InverseDiagonal<Separation> pass{s.place.data(),
-                                           s.correction.data(),
-                                           s.correction_cross.data(),
-                                           s.wall.data(),
-                                           s.scratch_b.data(),
-                                           s.inverse_diagonal.data(),
-                                           gradient_scale(state.parameters),
-                                           separation};
+    const InverseDiagonal<Separation> pass{.place = s.place.data(),
+                                           .correction = s.correction.data(),
+                                           .correction_cross = s.correction_cross.data(),
+                                           .wall = s.wall.data(),
+                                           .own_acceleration = s.scratch_b.data(),
+                                           .inverse = s.inverse_diagonal.data(),
+                                           .scale = gradient_scale(state.parameters),
+                                           .separation = separation};
     if (state.contact.near > 0)
       for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count, pass);
     else
@@ -88,8 +103,8 @@ void invert_diagonal(State& state) {
   });
 }
 
-/// -D^T q with neighbours a time `lag` (s) back, into PressureState::push: a displacement, as what
-/// the solve leaves in PressureState::vector. Walls, obstacles and sheets push as there.
+/// -D^T q with neighbours a time `lag` (s) back, into PressureState::scratch_b: a displacement, as
+/// what the solve leaves in PressureState::scratch_a. Walls, obstacles and cloth act as there.
 void find_kick(State& state, float lag) {
   FluidState& f = state.fluid;
   PressureState& s = state.pressure;
@@ -105,13 +120,19 @@ void find_kick(State& state, float lag) {
         velocity[i] = {u.x + inverse_dt * d.x, u.y + inverse_dt * d.y, u.z + inverse_dt * d.z, 1.f};
       });
   for_each_neighbour("kick: mean way", s.lists, f.count,
-                     MeanWay{s.scratch_b.data(), s.mean_displacement.data(), lag});
+                     MeanDisplacement{s.scratch_b.data(), s.mean_displacement.data(), lag});
   with_separation(p, [&](auto separation) {
     for_each_neighbour("kick", s.lists, f.count,
                        EarlierAcceleration<decltype(separation)>{
-                           s.place.data(), s.mean_displacement.data(), s.correction.data(),
-                           s.correction_cross.data(), s.wall.data(), s.scratch_b.data(),
-                           gradient_scale(p) * WendlandC2::slope(1.f), 1.f / (h * h), separation});
+                           .place = s.place.data(),
+                           .displacement = s.mean_displacement.data(),
+                           .correction = s.correction.data(),
+                           .correction_cross = s.correction_cross.data(),
+                           .wall = s.wall.data(),
+                           .kick = s.scratch_b.data(),
+                           .scale = gradient_scale(p) * WendlandC2::slope(1.f),
+                           .inverse_h2 = 1.f / (h * h),
+                           .separation = separation});
   });
 }
 
@@ -126,19 +147,18 @@ void smooth_velocities(State& state) {
       "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
-  const float share =
+  const float fraction =
       p.xsph + (smoothing_takes_viscosity(p, state.dt) ? smoothing_of_viscosity(p, state.dt) : 0.f);
   const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
   for_each_neighbour("smoothing", s.lists, state.fluid.count,
-                     VelocitySmoothing{vector, v, share * volume * h * h});
+                     VelocitySmoothing{vector, v, fraction * volume * h * h});
 }
 
 namespace {
 
 /// First guess: the pressures of the last step less their mean. No divergence asks for a mean where
-/// there is no free surface, and hardly any takes it back: left to itself it grew to 0.15 of the
-/// friction in Couette's channel, and what a sheared packing answers to it bent the profile by 2.5
-/// %.
+/// there is no free surface, and hardly any takes it back: left to itself it grows to 0.15 of the
+/// friction in Couette's channel, and what a sheared packing answers to it bends the profile.
 void start_without_mean(State& state) {
   start_from_last_step(state);
   Float4* place = state.pressure.place.data();
@@ -146,8 +166,8 @@ void start_without_mean(State& state) {
   SolveControl* control = state.pressure.control.data();
   const int n = state.fluid.count;
   reduce_then(
-      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); },
-      AddDoubles{}, DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
+      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); }, Plus{},
+      DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
       "full: first guess", n,
       DRENCH_LAMBDA(int i) { place[i].w = before[i] = before[i] - control->mean; });
@@ -184,7 +204,7 @@ void project_velocities(State& state, const Mover& move) {
       });
 }
 
-/// Positions of even density; adds to what PressureState::vector has moved them by.
+/// Positions of even density; adds to what PressureState::scratch_a has moved them by.
 void even_out(State& state, const Mover& move) {
   FluidState& f = state.fluid;
   PressureState& s = state.pressure;
@@ -225,7 +245,7 @@ void even_out(State& state, const Mover& move) {
 
 }  // namespace
 
-void project_full_box(State& state) {
+void project_closed_domain(State& state) {
   const Mover move = mover_of(state.parameters, float(state.dt));
   project_velocities(state, move);
   even_out(state, move);
@@ -278,7 +298,7 @@ void find_neighbours(State& state) {
       });
   if (p.obstacles > 0) add_obstacle_shares(state);
   const bool sheets = state.contact.near > 0;
-  if (sheets) add_sheets_to_walls(state);
+  if (sheets) add_cloth_to_walls(state);
   const float scale = mass / (h * h * h);
   const GridView grid{f.grid, f.cell_start.data()};
   const auto add_up = DRENCH_LAMBDA(int i, float sum) {
@@ -287,7 +307,7 @@ void find_neighbours(State& state) {
   };
   if (sheets) {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up,
-                                      sheet_filter(state, f.start.view(), Shaded::near));
+                                      cloth_filter(state, f.start.view(), Shaded::near));
   } else {
     build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
   }
@@ -303,7 +323,7 @@ template <class Move>
 void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   solve_pressure(state);
-  if (state.cloth.vertices > 0) settle_sheets(state);
+  if (state.cloth.vertices > 0) settle_cloth(state);
   const VecView x = f.position.view(), v = f.velocity.view();
   const Float4* displacement = state.pressure.scratch_a.data();
   const float inverse_dt = float(1 / state.dt);
@@ -330,8 +350,8 @@ void move_with_sheets(State& state) {
   const VecView x = f.position.view();
   const ConstVecView v = f.velocity.view(), start = f.start.view();
   const VecView drift = f.drift.view(), end = f.end.view();
-  finish_sheets(state);
-  if (state.contact.near > 0) take_sheets_off_walls(state);
+  finish_cloth(state);
+  if (state.contact.near > 0) take_cloth_off_walls(state);
   parallel_for(
       "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> from = start[i];
@@ -353,12 +373,17 @@ void measure_density(State& state) {
   const int* order = f.order.data();
   parallel_for(
       "measure: sort", f.count, DRENCH_LAMBDA(int i) { sorted.set(i, x[order[i]]); });
-  for_each_pair(
-      "measure: density", {f.grid, f.cell_start.data()}, f.count,
-      MeasuredDensity{sorted, order, f.density.data(), p.support_radius,
-                      p.particle_mass / p.lattice_sum * WendlandC2::factor(p.support_radius),
-                      p.rest_density, image_walls_of(p), obstacle_share_of(p),
-                      state.obstacles.views()});
+  for_each_pair("measure: density", {f.grid, f.cell_start.data()}, f.count,
+                MeasuredDensity{
+                    .position = sorted,
+                    .order = order,
+                    .density = f.density.data(),
+                    .support_radius = p.support_radius,
+                    .scale = p.particle_mass / p.lattice_sum * WendlandC2::factor(p.support_radius),
+                    .rest_density = p.rest_density,
+                    .walls = image_walls_of(p),
+                    .law = obstacle_share_of(p),
+                    .obstacles = state.obstacles.views()});
 }
 
 void predict_around_obstacles(State& state) { predict_with(state, obstacle_guard_of(state, 0)); }

@@ -3,9 +3,7 @@
 // that take the density there back to rest displace them and change that velocity. One solve a step
 // at the predicted positions in place of the two of DFSPH (Bender and Koschier 2017): density is
 // linear in the displacement, so what is left is the second order of the small correction and not
-// of the whole step. On a collapsing column, at the same step and tolerance, the mean density error
-// is 0.005 % against 0.008 %, energy after 0.15 s 0.996 against 0.947; a divergence solve after it
-// changes neither (docs/benchmarks.md).
+// of the whole step (docs/decisions/0001-one-solve-a-step.md).
 
 #include "sim/passes/coupling/cloth_filter.h"
 #include "sim/passes/coupling/move.h"

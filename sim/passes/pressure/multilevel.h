@@ -4,8 +4,8 @@
 // P_l: trilinear interpolation from the nodes of a grid, the finest over the cells that particles
 // are sorted by, every other one twice as wide; D_l: the stiffness of each node's own function.
 // Sums only, nothing is solved. The diagonal alone lowers errors of wavelength L in about L / h
-// iterations, and what it leaves is smooth: with 80 layers of water at rest the pressures came out
-// from a tenth of to five times what they should, and threw the water up.
+// iterations, and what it leaves is smooth: without levels pressures of 80 layers of water at
+// rest are up to five times what they should be, and throw the water up.
 //
 // For smooth pressures A is -rho^2 times Laplace's operator: a node's stiffness is the energy
 // sum_i rho_i^2 |grad phi(x_i)|^2, taken as that of a function whose support particles fill evenly,
@@ -27,9 +27,9 @@ struct FinestNodes {
 
   /// Where a particle stands within block (x, y, z), from 0 to 1.
   DRENCH_HD Vec3<float> within(Float4 p, int x, int y, int z) const {
-    return {share((p.x - grid.origin.x) * grid.inverse_edge.x, shift.x, x),
-            share((p.y - grid.origin.y) * grid.inverse_edge.y, shift.y, y),
-            share((p.z - grid.origin.z) * grid.inverse_edge.z, shift.z, z)};
+    return {fraction((p.x - grid.origin.x) * grid.inverse_edge.x, shift.x, x),
+            fraction((p.y - grid.origin.y) * grid.inverse_edge.y, shift.y, y),
+            fraction((p.z - grid.origin.z) * grid.inverse_edge.z, shift.z, z)};
   }
   /// Of what stands on the nodes.
   DRENCH_HD float interpolate(Float4 p, const float* nodes) const {
@@ -55,7 +55,7 @@ struct FinestNodes {
 
  private:
   DRENCH_HD static int beyond(int k, const NodeAxis& axis) { return k + 1 == axis.n ? 0 : k + 1; }
-  DRENCH_HD static float share(float cells, int shift, int block) {
+  DRENCH_HD static float fraction(float cells, int shift, int block) {
     return minimum(max0(cells / float(1 << shift) - float(block)), 1.f);
   }
 };

@@ -1,7 +1,8 @@
 #pragma once
 // The rows of the incompressible solve (as DFSPH: Bender and Koschier 2017, eqs 7 to 9). With D the
 // rate of density that velocities make,
-//   (D v)_i = sum_j m (v_i - v_j) . L_i grad W_ij + rho_0 grad S_i . v_i,   S: share of the walls,
+//   (D v)_i = sum_j m (v_i - v_j) . L_i grad W_ij + rho_0 grad S_i . v_i,   S: fraction that walls
+//   fill,
 //                                                   L: gradient_correction.h,
 // pressures p_i = rho_i^2 q_i accelerate particles by -D^T q, so that momentum is kept and D D^T is
 // symmetric and not negative. Its diagonal is what DFSPH divides by.
@@ -31,7 +32,7 @@ template <class Separation>
 struct PressureAcceleration {
   static constexpr int columns = 3;
   const Float4 *place, *correction, *correction_cross;  // position and q; L
-  const Float4* push;                                   // by q = 1 of the particle itself
+  const Float4* own_acceleration;                       // by q = 1 of the particle itself
   Float4* vector;
   const int* done;
   float scale;  // m / h^5 over the lattice sum, kg/m^5
@@ -55,7 +56,7 @@ struct PressureAcceleration {
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const float q = place[i].w;
-    const Float4 own = push[i];
+    const Float4 own = own_acceleration[i];
     const Vec3<float> all = total(sum);
     vector[i] = {scale * all.x + q * own.x, scale * all.y + q * own.y, scale * all.z + q * own.z,
                  0.f};
@@ -102,13 +103,13 @@ struct DensityRate {
   }
 };
 
-/// 1 / (D D^T)_ii, 0 for a particle that nothing pushes; and what q = 1 of a particle does to
-/// itself.
+/// 1 / (D D^T)_ii, 0 for a particle without neighbours; and the acceleration that q = 1 of a
+/// particle gives to itself.
 template <class Separation>
 struct InverseDiagonal {
   static constexpr int columns = 1;
   const Float4 *place, *correction, *correction_cross, *wall;
-  Float4* push;
+  Float4* own_acceleration;
   float* inverse;
   float scale;
   Separation separation;
@@ -146,7 +147,7 @@ struct InverseDiagonal {
     const float square = d.x * x.x + c.x * x.y + c.z * x.z + c.x * y.x + d.y * y.y + c.y * y.z +
                          c.z * z.x + c.y * z.y + d.z * z.z;
     const float diagonal = p.x * p.x + p.y * p.y + p.z * p.z + scale * scale * square;
-    push[i] = p;
+    own_acceleration[i] = p;
     inverse[i] = diagonal > 0.f ? 1.f / diagonal : 0.f;
   }
 };
@@ -177,7 +178,7 @@ struct EvenInverseDiagonal : InverseDiagonal<Separation> {
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     Base::finish(i, sum.own);
-    const Float4 own = this->push[i];
+    const Float4 own = this->own_acceleration[i];
     const Vec3<float> all = total(sum.others);
     even[i] = length2(Vec3<float>{this->scale * all.x + own.x, this->scale * all.y + own.y,
                                   this->scale * all.z + own.z});

@@ -1,5 +1,6 @@
 #include "sim/passes/pressure/pressure_solve.h"
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/pressure/multilevel.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -83,10 +84,9 @@ void shape_levels(State& state) {
 namespace {
 
 /// Levels are for errors that are small and smooth. In fluid that an impact has crushed they are
-/// neither, and what is free of the bound changes with every iteration: by levels particles were
-/// thrown there at 53 km/s. Nor do they know sheets: with the bound of add_sheets_to_diagonal in
-/// their stiffness pools on sheets are solved as well as without levels, but a sheet that folds
-/// around water ended in pressures without end.
+/// neither, and what is free of the bound changes with every iteration: levels throw particles.
+/// Nor do they know cloth, in whose folds pressures would grow without end
+/// (docs/decisions/0004-where-levels-take-part.md).
 void choose_levels(State& state) {
   constexpr float small = 0.02f;  // of the rest density, in the mean
   SolveControl* control = state.pressure.control.data();
@@ -95,7 +95,7 @@ void choose_levels(State& state) {
   const double most = double(small) * state.parameters.rest_density * state.fluid.count;
   reduce_then(
       "levels: error", state.fluid.count, 0.0,
-      DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, AddDoubles{},
+      DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->levels = !sheets && sum <= most; });
 }
 
@@ -129,7 +129,7 @@ void prepare_levels(State& state) {
     const float smooth = bend(level.x) * mean(level.y) * mean(level.z) +
                          mean(level.x) * bend(level.y) * mean(level.z) +
                          mean(level.x) * mean(level.y) * bend(level.z);
-    constexpr float part = 0.3f;  // of a node's own step; 0.15 to 0.5 tried: levels overlap
+    constexpr float part = 0.3f;  // of a node's own step, as levels overlap
     parallel_for(
         "levels: stiffness", level.count(), DRENCH_LAMBDA(int n) {
           const int at = level.first + n;
@@ -153,29 +153,17 @@ void correct_on_levels(State& state, const FreeGradient& gradient) {
   for (int l = h.levels - 1; l > 0; --l) prolong_nodes(state, l, answer);
 }
 
-/// Has the solve ended? On the GPU the host asks now and then only; launches after the end do
-/// nothing.
-bool solve_ended(const PressureState& s, int iteration) {
-#if defined(__CUDACC__)
-  constexpr int patience = 8;
-  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
-#else
-  (void)iteration;
-  return s.control.data()->done;
-#endif
-}
-
 /// A fluid without a free surface has nowhere to go: its mean density is what it is (the kernel's
 /// sum over particles out of order is above rest), and no pressure changes it. What pressures can
 /// do is to make it even. Against rest density they would rise without end: Taylor and Green's
-/// vortices decayed 56 % too fast at 50 particles to the side in place of 18.6 %.
+/// vortices decay three times as much too fast (docs/decisions/0005-closed-domain.md).
 void remove_mean(State& state) {
   PressureState& s = state.pressure;
   SolveControl* control = s.control.data();
   float* source = s.source.data();
   const int n = state.fluid.count;
   reduce_then(
-      "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); }, AddDoubles{},
+      "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
       "solve: source", n, DRENCH_LAMBDA(int i) { source[i] -= control->mean; });
@@ -229,7 +217,7 @@ void keep_pressures(State& state) {
         const double square = double(term[i]) * term[i];
         return Two<double>{square, square * square};
       },
-      AddPairs{},
+      Plus{},
       DRENCH_LAMBDA(const Two<double>& sum) {
         control->peak = sum.a > 0 ? rest * float(sqrt(5. / 3. * sum.b / sum.a)) : 0.f;
       });
@@ -240,35 +228,39 @@ void find_pressures(State& state, float least) {
   const int n = state.fluid.count, most_iterations = state.parameters.most_iterations;
   if (state.parameters.full) remove_mean(state);
   const bool sheets = state.contact.near > 0;
-  if (sheets) start_sheets(state);
+  if (sheets) start_cloth(state);
   prepare_levels(state);
-  const FreeGradient gradient{s.place.data(),   s.product.data(),
-                              s.source.data(),  s.inverse_diagonal.data(),
-                              s.control.data(), least};
-  const PressureIteration iteration{s.place.data(),
-                                    s.before.data(),
-                                    s.next.data(),
-                                    s.source.data(),
-                                    s.inverse_diagonal.data(),
-                                    s.product.data(),
-                                    s.control.data(),
-                                    state.parameters.tolerance,
-                                    1.f / (float(n) * state.parameters.rest_density),
-                                    most_iterations,
-                                    gradient,
-                                    {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
-                                    s.hierarchy.answer.data()};
-  for (int k = 0; k <= most_iterations && !solve_ended(s, k - 1); ++k) {
+  const FreeGradient gradient{.place = s.place.data(),
+                              .product = s.product.data(),
+                              .source = s.source.data(),
+                              .inverse_diagonal = s.inverse_diagonal.data(),
+                              .control = s.control.data(),
+                              .least = least};
+  const PressureIteration iteration{
+      .place = s.place.data(),
+      .before = s.before.data(),
+      .next = s.next.data(),
+      .source = s.source.data(),
+      .inverse_diagonal = s.inverse_diagonal.data(),
+      .product = s.product.data(),
+      .control = s.control.data(),
+      .tolerance = state.parameters.tolerance,
+      .scale = 1.f / (float(n) * state.parameters.rest_density),
+      .most_iterations = most_iterations,
+      .on_levels = gradient,
+      .finest = {state.fluid.grid, s.hierarchy.level[0], s.hierarchy.shift},
+      .answer = s.hierarchy.answer.data()};
+  for (int k = 0; !ended(s.control, k, most_iterations + 1); ++k) {  // the last one decides only
     accelerate_by_pressure(state);
     density_rate(state);
     if (sheets) {
-      respond_sheets(state, k == 0 ? first_sweeps : next_sweeps, sheet_tolerance);
-      subtract_sheet_rate(state);
+      respond_cloth(state, k == 0 ? first_sweeps : next_sweeps, cloth_tolerance);
+      subtract_cloth_rate(state);
     }
     correct_on_levels(state, gradient);
     reduce_then(
-        "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        SolveSums{}, DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });
+        "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); }, Plus{},
+        DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });
     parallel_for(
         "solve: extrapolate", n, DRENCH_LAMBDA(int i) { iteration.extrapolate(i); });
   }

@@ -3,11 +3,8 @@
 // and leave no density above rest. Accelerated projected gradients (Nesterov 1983, restarted as in
 // O'Donoghue and Candes 2015; with contact as in Mazhar et al. 2015), preconditioned by the
 // diagonal and coarse levels (multilevel.h): one application of A an iteration and no line search.
-// On a collapsing column, with the diagonal alone, it needs less than half of the iterations of
-// plain projected Jacobi for the same residual, with the levels half of those, and a tenth of them
-// in deep water. Conjugate gradients with projected steps (MPRGP) were tried and dropped: near a
-// free surface each step meets the bound and starts the conjugation anew, so that they need more
-// iterations than Jacobi.
+// Not conjugate gradients with projected steps: near a free surface each step meets the bound and
+// starts the conjugation anew (docs/decisions/0002-accelerated-projected-gradients.md).
 
 #include "sim/backend/parallel.h"
 #include "sim/passes/coupling/cloth_pressure.h"
@@ -17,15 +14,15 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct SolveSums {
   double residual = 0, uphill = 0;
-  DRENCH_HD SolveSums operator()(const SolveSums& a, const SolveSums& b) const {
-    return {a.residual + b.residual, a.uphill + b.uphill};
+  DRENCH_HD SolveSums operator+(const SolveSums& other) const {
+    return {residual + other.residual, uphill + other.uphill};
   }
 };
 
 /// Mean residual up to which the pressures of the last step are taken as they are; up to the
 /// tolerance they get one iteration at least. A mean does not see what is crushed in one place, and
-/// the same pressures again and again throw it out: a collapsing cube at 0.3 % took 27,000 steps in
-/// place of 600.
+/// the same pressures again and again throw it out: a collapsing cube at 0.3 % takes 27,000 steps
+/// in place of 600.
 constexpr float nothing_to_do = 1e-5f;
 
 /// What an iteration reads and writes; copied into every launch.
@@ -108,7 +105,7 @@ void keep_pressures(State& state);
 /// s.scratch_a.
 void find_pressures(State& state, float least);
 
-/// Pressures that push fluid apart to rest density.
+/// Pressures that take crowded fluid back to rest density.
 void solve_pressure(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

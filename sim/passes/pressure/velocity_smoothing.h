@@ -1,5 +1,6 @@
 #pragma once
-// XSPH (Monaghan 1989): every step a particle takes on a share c of its neighbours' mean velocity,
+// XSPH (Monaghan 1989): every step a particle takes on a fraction c of its neighbours' mean
+// velocity,
 //   v_i += c sum_j m / rho_0 (v_j - v_i) W_ij,
 // antisymmetric in i and j: momentum is kept. Walls let slip. Physical viscosity: viscosity_rows.h;
 // where it does less than a hundredth of what this does, as water's does at spacings of a

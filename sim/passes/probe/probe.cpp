@@ -27,9 +27,14 @@ double surface_height(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
   const HalfDensity enough = half_density(p, query);
   const float h = p.support_radius;
-  LineDensity line{
-      state.fluid.position.view(),   query.place[0], query.place[2], 1e30f, 0.25f * h, h,
-      p.particle_mass / (h * h * h), periods_of(p)};
+  LineDensity line{.position = state.fluid.position.view(),
+                   .x = query.place[0],
+                   .z = query.place[2],
+                   .from = 1e30f,
+                   .step = 0.25f * h,
+                   .h = h,
+                   .scale = p.particle_mass / (h * h * h),
+                   .period = periods_of(p)};
   bool fine = false;
   while (true) {
     const LineSamples s =
@@ -59,50 +64,45 @@ StepPressure step_pressure_of(const State& state) {
   const FluidState& f = state.fluid;
   const bool projected = p.incompressible;
   const float h = p.support_radius, h4 = h * h * h * h;
-  StepPressure s{f.position.view(),
-                 f.velocity.view(),
-                 f.acceleration.view(),
-                 f.pressure_term.data(),
-                 projected ? nullptr : f.inverse_density.data(),
-                 projected ? state.pressure.place.data() : nullptr,
-                 projected ? state.pressure.correction.data() : nullptr,
-                 projected ? state.pressure.correction_cross.data() : nullptr,
-                 float(state.dt),
-                 h,
-                 p.particle_mass,
-                 p.rest_density,
-                 p.wall_viscosity,
-                 // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
-                 p.particle_mass / p.rest_density *
-                     (projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h)),
-                 {}};
-  s.walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    s.walls.low[k] = p.low[k], s.walls.high[k] = p.high[k], s.walls.on[k] = p.wall[k];
-  return s;
+  // As in pressure_rows.h; the spiky gradient is 45 / (pi h^6) (h - r)^2.
+  const float gradient = projected ? 1.f / (p.lattice_sum * h4 * h) : 45.f / (pi * h4 * h);
+  return {.position = f.position.view(),
+          .velocity = f.velocity.view(),
+          .acceleration = f.acceleration.view(),
+          .term = f.pressure_term.data(),
+          .inverse_density = projected ? nullptr : f.inverse_density.data(),
+          .predicted = projected ? state.pressure.place.data() : nullptr,
+          .correction = projected ? state.pressure.correction.data() : nullptr,
+          .correction_cross = projected ? state.pressure.correction_cross.data() : nullptr,
+          .dt = float(state.dt),
+          .h = h,
+          .mass = p.particle_mass,
+          .rest_density = p.rest_density,
+          .wall_viscosity = p.wall_viscosity,
+          .pair_scale = p.particle_mass / p.rest_density * gradient,
+          .walls = halfspace_walls_of(p)};
 }
 
 BodyParts body_parts_of(const State& state) {
-  return {step_pressure_of(state),
-          image_walls_of(state.parameters),
-          obstacle_share_of(state.parameters),
-          state.obstacles.views(),
-          cloth_rows(state),
-          state.fluid.normal.view()};
+  return {.step = step_pressure_of(state),
+          .image = image_walls_of(state.parameters),
+          .law = obstacle_share_of(state.parameters),
+          .obstacles = state.obstacles.views(),
+          .rows = cloth_rows(state),
+          .normal = state.fluid.normal.view()};
 }
 
 /// Sum of f(particle, row) over all particles, each once.
 template <int N, class F>
 Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
   const bool near = state.parameters.incompressible && state.contact.near > 0;
-  const AddTotals<N> add;
   const Totals<N> away =
       parallel_reduce(name, state.fluid.count, Totals<N>{},
-                      AwayFromSheets<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, add);
+                      AwayFromCloth<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, Plus{});
   if (!near) return away;
   const ClothRows rows = cloth_rows(state);
-  return add(away, parallel_reduce(name, rows.rows, Totals<N>{},
-                                   BesideSheets<N, F>{f, rows.particle}, add));
+  return away + parallel_reduce(name, rows.rows, Totals<N>{}, BesideClothOf<N, F>{f, rows.particle},
+                                Plus{});
 }
 
 SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
@@ -118,17 +118,22 @@ DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) 
                     other =
                         fabsf(n.x) < 0.6f ? Vec3<float>{1.f, 0.f, 0.f} : Vec3<float>{0.f, 1.f, 0.f},
                     across = cross(n, other), u = across * (1.f / length(across));
-  return {disc, u, cross(n, u), layers, rings, spokes};
+  return {
+      .disc = disc, .u = u, .v = cross(n, u), .layers = layers, .rings = rings, .spokes = spokes};
 }
 
 /// The nearest sheet; none in a shot without any.
-SensorBody sheet_at(const State& state, Vec3<float> place) {
+SensorBody cloth_at(const State& state, Vec3<float> centre) {
   const ClothState& c = state.cloth;
   if (!state.parameters.incompressible) return {};
   return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
-                         SheetAt{corners_of(c), c.position.view(), c.half_thickness.data(),
-                                 c.sheet.data(), place, periods_of(state.parameters)},
-                         SensorBody{});
+                         ClothAt{.corners = corners_of(c),
+                                 .position = c.position.view(),
+                                 .half_thickness = c.half_thickness.data(),
+                                 .sheet = c.sheet.data(),
+                                 .centre = centre,
+                                 .period = periods_of(state.parameters)},
+                         NearerBody{});
 }
 
 /// What a disc lies on: within half a spacing and 25 degrees of its surface. On obstacles either
@@ -140,7 +145,7 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
     body.facing = along_axis(q.axis, q.side == 0 ? 1.f : -1.f);
     return body;
   }
-  const Vec3<float> place{q.place[0], q.place[1], q.place[2]},
+  const Vec3<float> centre{q.place[0], q.place[1], q.place[2]},
       n{q.normal[0], q.normal[1], q.normal[2]};
   const float reach = 0.5f * state.parameters.spacing * 1.001f;
   const auto lies_on = [&](const SensorBody& b) {
@@ -148,12 +153,12 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
   };
   const ObstacleViews obstacles = state.obstacles.views();
   body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
-                         ObstacleAt{obstacles, place, q.on}, SensorBody{});
+                         ObstacleAt{obstacles, centre, q.on}, NearerBody{});
   if (lies_on(body)) {
     body.facing = dot(body.facing, n) < 0.f ? -n : n;
     return body;
   }
-  body = sheet_at(state, place);
+  body = cloth_at(state, centre);
   if (lies_on(body)) {
     body.facing = n;
     return body;
@@ -166,10 +171,14 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   if (body.kind == SensorBody::sheet) {
-    return parallel_reduce(
-               "probe: sheet's area", c.triangles, Totals<1>{},
-               SheetExtent{corners_of(c), c.position.view(), c.sheet.data(), disc, body.of, reach},
-               AddTotals<1>{})
+    return parallel_reduce("probe: sheet's area", c.triangles, Totals<1>{},
+                           ClothExtent{.corners = corners_of(c),
+                                       .position = c.position.view(),
+                                       .sheet = c.sheet.data(),
+                                       .disc = disc,
+                                       .of = body.of,
+                                       .reach = reach},
+                           Plus{})
         .value[0];
   }
   const ObstacleViews obstacles = state.obstacles.views();
@@ -182,7 +191,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
                                        body,
                                        p.spacing,
                                        reach},
-                         AddTotals<1>{})
+                         Plus{})
       .value[0];
 }
 
@@ -192,10 +201,13 @@ double surface_pressure(const State& state, const ProbeQuery& q, const SensorBod
   const float reach = disc.radius + disc.rim;
   const double extent = surface_extent(state, q, disc, body, reach);
   if (!(extent > 1e-3 * disc.rim * disc.rim)) return 0;
-  const Totals<1> sum = sum_by_particle<1>(
-      "probe: pressure on a surface", state,
-      SurfaceSensor{body_parts_of(state), disc, body, state.fluid.triangle.data(),
-                    state.cloth.sheet.data(), reach});
+  const Totals<1> sum = sum_by_particle<1>("probe: pressure on a surface", state,
+                                           SurfaceSensor{.parts = body_parts_of(state),
+                                                         .disc = disc,
+                                                         .body = body,
+                                                         .triangle = state.fluid.triangle.data(),
+                                                         .sheet = state.cloth.sheet.data(),
+                                                         .reach = reach});
   return sum.value[0] / extent;
 }
 
@@ -206,7 +218,7 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
   const SoftDisc disc = soft_disc_of(q, p);
   const ObstacleViews obstacles = state.obstacles.views();
   // Fluid on the disc's side of the nearest sheet alone, if that is in reach.
-  const SensorBody sheet = sheet_at(state, disc.centre);
+  const SensorBody sheet = cloth_at(state, disc.centre);
   Vec3<float> normal{0.f, 0.f, 0.f};
   if (sheet.distance < disc.rim) {
     const Vec3<float> up = disc.from_centre(sheet.foot) * -1.f;
@@ -219,17 +231,17 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
         parallel_reduce(
             "probe: volume of a disc", points.count(), Totals<1>{},
             InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
-            AddTotals<1>{})
+            Plus{})
             .value[0];
   }
   if (!(extent > 1e-3 * disc.rim * disc.rim * disc.rim)) return 0;
   const Totals<1> sum = sum_by_particle<1>("probe: pressure", state,
-                                           InnerSensor{body_parts_of(state),
-                                                       disc,
-                                                       {f.grid, f.cell_start.data()},
-                                                       view_of(state.pressure.lists),
-                                                       normal,
-                                                       sheet.foot});
+                                           InnerSensor{.parts = body_parts_of(state),
+                                                       .disc = disc,
+                                                       .grid = {f.grid, f.cell_start.data()},
+                                                       .list = view_of(state.pressure.lists),
+                                                       .cloth_normal = normal,
+                                                       .cloth_foot = sheet.foot});
   return sum.value[0] / extent;
 }
 
@@ -240,11 +252,11 @@ double disc_pressure(const State& state, const ProbeQuery& q) {
                                        : surface_pressure(state, q, body);
 }
 
-/// Pressure of what gravity the walls of a full box hold up, Pa; none in its middle.
-double held_pressure(const Parameters& p, const float (&place)[3]) {
+/// Pressure of what gravity the walls of a closed domain hold up, Pa; none in its middle.
+double held_pressure(const Parameters& p, const float (&position)[3]) {
   double sum = 0;
   for (int k = 0; k < 3; ++k)
-    sum += double(p.rest_density) * p.held[k] * (place[k] - 0.5 * (p.low[k] + p.high[k]));
+    sum += double(p.rest_density) * p.held[k] * (position[k] - 0.5 * (p.low[k] + p.high[k]));
   return sum;
 }
 
@@ -267,7 +279,7 @@ std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
 }
 
 double pressure(State& state, const ProbeQuery& query) {
-  // What evens out a full box has had rows of its own since.
+  // What evens out a closed domain has had rows of its own since.
   if (state.parameters.full && query.kind == ProbeKind::inner_pressure) correct_gradients(state);
   return disc_pressure(state, query) + held_pressure(state.parameters, query.place);
 }
@@ -275,8 +287,7 @@ double pressure(State& state, const ProbeQuery& query) {
 /// Force of the fluid on a range of vertices, N: the impulses they were given in the step, over dt.
 std::vector<double> cloth_force(const State& state, const ProbeQuery& query) {
   return to_vector(parallel_reduce("probe: cloth force", query.end - query.begin, Totals<3>{},
-                                   VertexForce{state.cloth.force.view(), query.begin},
-                                   AddTotals<3>{}));
+                                   VertexForce{state.cloth.force.view(), query.begin}, Plus{}));
 }
 
 std::vector<double> energy(const State& state, const ProbeQuery& query) {
@@ -286,27 +297,39 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const Vec3<float> gravity{p.gravity[0] + p.held[0], p.gravity[1] + p.held[1],
                             p.gravity[2] + p.held[2]};
   const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
-  const AddTotals<3> add;
-  const Totals<3> fluid = parallel_reduce(
-      "probe: fluid energy", f.count, Totals<3>{},
-      PointEnergy{f.position.view(), f.velocity.view(), nullptr, p.particle_mass, gravity, zero},
-      add);
+  const Totals<3> fluid = parallel_reduce("probe: fluid energy", f.count, Totals<3>{},
+                                          PointEnergy{.position = f.position.view(),
+                                                      .velocity = f.velocity.view(),
+                                                      .masses = nullptr,
+                                                      .mass = p.particle_mass,
+                                                      .gravity = gravity,
+                                                      .zero = zero},
+                                          Plus{});
   const float behind =
       sheets_are_implicit(p) ? 0.f : float(0.5 * state.dt / std::max(1, state.substeps));
-  const Totals<3> cloth = parallel_reduce(
-      "probe: cloth energy", c.vertices, Totals<3>{},
-      VertexEnergy{{c.position.view(), c.velocity.view(), c.mass.data(), 0.f, gravity, zero},
-                   {c.position.view(), c.velocity.view(), spring_ends_of(c), c.rest_length.data(),
-                    c.stiffness.data(), c.spring_damping.data()},
-                   c.force.view(),
-                   c.inverse_mass.data(),
-                   behind},
-      add);
+  const Totals<3> cloth =
+      parallel_reduce("probe: cloth energy", c.vertices, Totals<3>{},
+                      VertexEnergy{.points = {.position = c.position.view(),
+                                              .velocity = c.velocity.view(),
+                                              .masses = c.mass.data(),
+                                              .mass = 0.f,
+                                              .gravity = gravity,
+                                              .zero = zero},
+                                   .springs = {.position = c.position.view(),
+                                               .velocity = c.velocity.view(),
+                                               .ends = spring_ends_of(c),
+                                               .rest_length = c.rest_length.data(),
+                                               .stiffness = c.stiffness.data(),
+                                               .damping = c.spring_damping.data()},
+                                   .fluid_force = c.force.view(),
+                                   .inverse_mass = c.inverse_mass.data(),
+                                   .behind = behind},
+                      Plus{});
   const Totals<3> springs = parallel_reduce(
       "probe: spring energy", c.vertices, Totals<3>{},
       SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},
-      add);
-  return to_vector(add(add(fluid, cloth), springs));
+      Plus{});
+  return to_vector(fluid + cloth + springs);
 }
 
 /// Measures the incompressible fluid's density anew; that of the weakly compressible one is of the
@@ -316,9 +339,9 @@ std::vector<double> volume(State& state) {
   if (n > 0 && state.parameters.incompressible) measure_density(state);
   const Totals<4> sum =
       parallel_reduce("probe: volume", n, Totals<4>{},
-                      PlaceAndDensity{state.fluid.position.view(), state.fluid.density.data(),
-                                      1.f / state.parameters.rest_density},
-                      AddTotals<4>{});
+                      PositionAndDensity{state.fluid.position.view(), state.fluid.density.data(),
+                                         1.f / state.parameters.rest_density},
+                      Plus{});
   std::vector<double> all{double(n)};
   for (const double value : sum.value)
     all.push_back(n > 0 ? value / n : std::numeric_limits<double>::quiet_NaN());
@@ -333,7 +356,7 @@ std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
                                                        {q.place[0], q.place[1], q.place[2]},
                                                        periods_of(state.parameters),
                                                        q.radius * q.radius},
-                                        AddTotals<4>{});
+                                        Plus{});
   if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
   return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
 }
@@ -343,10 +366,9 @@ double front(const State& state, const ProbeQuery& q) {
   if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
   return 0.5 * state.parameters.spacing +
          parallel_reduce(
-             "probe: front", state.fluid.count, Farthest{},
-             PlaceAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
-             Farthest{})
-             .value;
+             "probe: front", state.fluid.count, -1e30,
+             PositionAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
+             Larger{});
 }
 
 std::vector<double> vertex(const State& state, int v) {

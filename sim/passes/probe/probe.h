@@ -73,7 +73,7 @@ struct VertexEnergy {
   }
 };
 
-struct PlaceAndDensity {
+struct PositionAndDensity {
   ConstVecView position;
   const float* density;
   float inverse_rest;
@@ -95,17 +95,11 @@ struct VelocityInBall {
   }
 };
 
-struct Farthest {
-  double value = -1e30;
-  DRENCH_HD Farthest operator()(const Farthest& a, const Farthest& b) const {
-    return b.value > a.value ? b : a;
-  }
-};
-struct PlaceAlong {
+struct PositionAlong {
   ConstVecView position;
   Vec3<float> normal;
-  DRENCH_HD Farthest operator()(int i) const {
-    return {dot(to_double(position[i]), to_double(normal))};
+  DRENCH_HD double operator()(int i) const {
+    return dot(to_double(position[i]), to_double(normal));
   }
 };
 

@@ -52,7 +52,7 @@ struct LineDensity {
   }
 };
 
-/// Half of rest density, less the share that lies behind walls.
+/// Half of rest density, less the fraction that lies behind walls.
 struct HalfDensity {
   float half;  // kg/m^3, of what the walls beside the line leave open
   float low, high, h;

@@ -3,7 +3,7 @@
 // gave it. Nothing here knows p but through q = p / rho^2, the FluidState::pressure_term that
 // pushed the particles.
 //
-// Walls, obstacles and sheets each replace a share of a particle's density and leave the rest to
+// Walls, obstacles and sheets each replace a fraction of a particle's density and leave the rest to
 // the others (image_walls.h, obstacle_share.h, cloth_pressure.h): S = 1 - prod (1 - S_b). The part
 // of body b in grad S is grad S_b times what the others leave. The parts sum to the whole, so that
 // every push is counted once, on the body that gave it, whatever else touches the fluid there.
@@ -21,12 +21,10 @@ namespace drench::sim::DRENCH_BACKEND {
 template <int N>
 struct Totals {
   double value[N] = {};
-};
-template <int N>
-struct AddTotals {
-  DRENCH_HD Totals<N> operator()(Totals<N> a, const Totals<N>& b) const {
-    for (int k = 0; k < N; ++k) a.value[k] += b.value[k];
-    return a;
+  DRENCH_HD Totals operator+(const Totals& other) const {
+    Totals sum;
+    for (int k = 0; k < N; ++k) sum.value[k] = value[k] + other.value[k];
+    return sum;
   }
 };
 template <int N>
@@ -38,20 +36,21 @@ std::vector<double> to_vector(const Totals<N>& sum) {
 struct StepPressure {
   ConstVecView position, velocity, acceleration;  // the last one weakly compressible only
   const float *term, *inverse_density;            // q; 1 / rho, weakly compressible only
-  const Float4* place;                            // of the incompressible solver's solve, else null
+  const Float4* predicted;                        // of the incompressible solver's solve, else null
   const Float4 *correction, *correction_cross;
   float dt, h, mass, rest_density, wall_viscosity, pair_scale;
-  Walls walls;
+  HalfspaceWalls walls;
 
   /// Where the particle was when it was pushed, m: the incompressible solver's prediction, or where
-  /// the step started. (Near cloth, whose path test may have moved it, that is not exact.)
+  /// the step started. (Not exact near cloth, where a collision may have moved it.)
   DRENCH_HD Vec3<float> at(int i) const {
-    if (place) return {place[i].x, place[i].y, place[i].z};
+    if (predicted) return {predicted[i].x, predicted[i].y, predicted[i].z};
     return position[i] - velocity[i] * dt;
   }
 
-  /// rho_0 times the gradient of the walls' share of density, kg/m^4: -q of it is the acceleration
-  /// that walls give in the weakly compressible fluid. See PressureViscosity::wall_acceleration.
+  /// rho_0 times the gradient of the walls' fraction of density, kg/m^4: -q of it is the
+  /// acceleration that walls give in the weakly compressible fluid. See
+  /// PressureViscosity::wall_acceleration.
   DRENCH_HD Vec3<float> wall_gradient(int i) const {
     const Vec3<float> p = at(i);
     const float x[3] = {p.x, p.y, p.z};
@@ -67,7 +66,7 @@ struct StepPressure {
 
   /// L n, see gradient_correction.h.
   DRENCH_HD Vec3<float> corrected(int i, Vec3<float> n) const {
-    if (!place) return n;
+    if (!predicted) return n;
     const Float4 v = multiply_symmetric(correction[i], correction_cross[i], {n.x, n.y, n.z, 0.f});
     return {v.x, v.y, v.z};
   }
@@ -75,7 +74,7 @@ struct StepPressure {
   /// -W'(r) / r times m over rho_0 for a distance r, 1/m^2.
   DRENCH_HD float pair_weight(float r) const {
     const float u = max0(1.f - r / h);
-    if (place) return pair_scale * WendlandC2::slope(u);
+    if (predicted) return pair_scale * WendlandC2::slope(u);
     return r > 0.f ? pair_scale * u * u * h / r : 0.f;
   }
 };
@@ -83,12 +82,12 @@ struct StepPressure {
 /// What a particle sees of the sheet that it is beside, where it was pushed.
 struct Beside {
   Vec3<float> x, normal;  // m; unit, or zero: none
-  float gap, open;        // m to the sheet's surface; share of the density that it leaves
+  float gap, open;        // m to the sheet's surface; fraction of the density that it leaves
 };
 
-/// A body's part in the gradient, kg/m^4, and the way from the particle to its surface, m.
+/// A body's part in the gradient, kg/m^4, and the displacement from the particle to its surface, m.
 struct BodyPart {
-  Vec3<float> gradient{0.f, 0.f, 0.f}, way{0.f, 0.f, 0.f};
+  Vec3<float> gradient{0.f, 0.f, 0.f}, to_surface{0.f, 0.f, 0.f};
 };
 
 DRENCH_HD float component(Vec3<float> v, int axis) {
@@ -124,7 +123,7 @@ struct BodyParts {
     float open = 1.f;
     for (int side = 0; side < 2; ++side)
       open -= wall_seen(b, axis, side) *
-              WendlandC2::halfspace(image.image(to_wall(b, axis, side), image.on[axis]));
+              WendlandC2::halfspace(image.image(to_wall(b, axis, side), axis));
     return open;
   }
   DRENCH_HD float open_walls(const Beside& b) const {
@@ -143,19 +142,19 @@ struct BodyParts {
     if (!image.on[axis]) return {};
     const float distance = to_wall(b, axis, side);
     if (!(distance < step.h)) return {};
-    const Vec3<float> way = along_axis(axis, side == 0 ? -max0(distance) : max0(distance));
-    if (!step.place) {
+    const Vec3<float> to_surface = along_axis(axis, side == 0 ? -max0(distance) : max0(distance));
+    if (!step.predicted) {
       const bool near = (step.walls.sign(axis, component(b.x, axis)) > 0.f) == (side == 0);
       if (!near) return {};
-      return {along_axis(axis, component(step.wall_gradient(i), axis)), way};
+      return {along_axis(axis, component(step.wall_gradient(i), axis)), to_surface};
     }
-    const float begins = image.image(distance, true);
+    const float begins = image.image(distance, axis);
     if (!(begins < 1.f)) return {};
     float slope = step.rest_density * 2.f * image.inverse_h * wall_seen(b, axis, side) *
                   WendlandC2::plane(begins) * b.open * open_obstacles(b, -1);
     for (int k = 0; k < 3; ++k)
       if (k != axis) slope *= open_axis(b, k);
-    return {along_axis(axis, side == 0 ? -slope : slope), way};
+    return {along_axis(axis, side == 0 ? -slope : slope), to_surface};
   }
 
   /// Of one obstacle, or image of it.
@@ -177,7 +176,7 @@ struct BodyParts {
 };
 
 template <int N, class F>
-struct AwayFromSheets {
+struct AwayFromCloth {
   F f;
   const int* triangle;
   DRENCH_HD Totals<N> operator()(int i) const {
@@ -185,7 +184,7 @@ struct AwayFromSheets {
   }
 };
 template <int N, class F>
-struct BesideSheets {
+struct BesideClothOf {
   F f;
   const int* particle;
   DRENCH_HD Totals<N> operator()(int row) const {
@@ -206,18 +205,18 @@ struct WallForce {
   /// Of the weakly compressible fluid; what no-slip walls take from the other is not in it.
   DRENCH_HD float drag(int i) const {
     const StepPressure& step = parts.step;
-    if (step.place || step.wall_viscosity == 0.f) return 0.f;
+    if (step.predicted || step.wall_viscosity == 0.f) return 0.f;
     const Vec3<float> p = step.at(i);
     const float x[3] = {p.x, p.y, p.z};
     if ((step.walls.sign(wall.axis, x[wall.axis]) > 0.f) != (wall.side == 0)) return 0.f;
-    float share = step.rest_density;
+    float layer = step.rest_density;
     for (int k = 0; k < 3; ++k) {
       const float q = minimum(max0(step.walls.distance(k, x[k])) / step.h, 1.f);
-      share *= k == wall.axis ? viscosity_halfspace(q) / (step.h * step.h)
+      layer *= k == wall.axis ? viscosity_halfspace(q) / (step.h * step.h)
                               : 1.f - step.walls.scale * spiky_halfspace(q);
     }
     const float inverse_rho = step.inverse_density[i];
-    return step.mass * step.wall_viscosity * share * inverse_rho * inverse_rho;
+    return step.mass * step.wall_viscosity * layer * inverse_rho * inverse_rho;
   }
   DRENCH_HD Totals<3> operator()(int i, int row) const {
     const StepPressure& step = parts.step;

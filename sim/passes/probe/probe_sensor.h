@@ -3,8 +3,8 @@
 // over its area; a disc elsewhere the stress in the fluid. Both are of the forces that moved the
 // particles, so that discs side by side sum to the force on what they cover.
 //
-// Inside the fluid a pair's force is what one particle hands to the other along the line between
-// them, and a body's along the perpendicular to its surface; the stress is that handed through
+// Inside the fluid a pair's force is what one particle exerts on the other along the line between
+// them, and a body's along the perpendicular to its surface; the stress is that transferred through
 // planes, the mean over planes with the disc's weight (bond functions: Hardy 1982; Murdoch 1983).
 // At rest it balances the weight above every plane, between the last particles and a wall, too,
 // where a sum over particles has only their layers (14 % off half a spacing before a wall).
@@ -25,13 +25,13 @@ struct SoftDisc {
     const Vec3<float> flat = d - normal * dot(d, normal);
     return minimum(max0((radius + rim - length(flat)) / (2.f * rim)), 1.f);
   }
-  /// The mean weight along the line from d to d + way: the integral of the tent along the normal is
-  /// exact, the place across is the line's middle.
-  DRENCH_HD float bond(Vec3<float> d, Vec3<float> way) const {
-    const float from = dot(d, normal) / rim, to = from + dot(way, normal) / rim;
+  /// The mean weight along the line from d to d + along: the integral of the tent along the normal
+  /// is exact, the position across is the line's middle.
+  DRENCH_HD float bond(Vec3<float> d, Vec3<float> along) const {
+    const float from = dot(d, normal) / rim, to = from + dot(along, normal) / rim;
     const float mean = fabsf(to - from) > 0.02f ? (below(to) - below(from)) / (to - from)
                                                 : max0(1.f - fabsf(0.5f * (from + to)));
-    return mean > 0.f ? mean * across(d + way * 0.5f) : 0.f;
+    return mean > 0.f ? mean * across(d + along * 0.5f) : 0.f;
   }
   /// Integral of the tent up to t.
   static DRENCH_HD float below(float t) {
@@ -57,7 +57,7 @@ struct DiscPoints {
     const float ring = (disc.radius + disc.rim) / float(rings);
     return layers > 1 ? maximum(ring, 2.f * disc.rim / float(layers)) : ring;
   }
-  DRENCH_HD Vec3<float> place(int k, float& weight) const {
+  DRENCH_HD Vec3<float> point(int k, float& weight) const {
     const int spoke = k % spokes, ring = k / spokes % rings, layer = k / (spokes * rings);
     const float edge = (disc.radius + disc.rim) / float(rings), r = edge * (float(ring) + 0.5f),
                 angle = 2.f * pi * (float(spoke) + 0.5f) / float(spokes);
@@ -78,6 +78,8 @@ struct SensorBody {
   Vec3<float> facing{0.f, 0.f, 0.f};  // unit, to the fluid that is measured
   Vec3<float> foot{0.f, 0.f, 0.f};    // m, on a sheet
   float distance = 1e30f;             // m, of the disc's centre from its surface
+};
+struct NearerBody {
   DRENCH_HD SensorBody operator()(const SensorBody& a, const SensorBody& b) const {
     return fabsf(b.distance) < fabsf(a.distance) ? b : a;
   }
@@ -85,13 +87,13 @@ struct SensorBody {
 
 struct ObstacleAt {
   ObstacleViews obstacles;
-  Vec3<float> place;
+  Vec3<float> centre;
   int only;  // -1: any
   DRENCH_HD SensorBody operator()(int k) const {
     const ObstacleView& o = obstacles.obstacle[k];
     SensorBody body;
     if (only >= 0 && o.of != only) return body;
-    const Vec3<float> own = o.to_own(1, place);
+    const Vec3<float> own = o.to_own(1, centre);
     body.kind = SensorBody::obstacle, body.of = o.of;
     body.distance = o.distance(own, o.blend[1]);
     body.facing = o.turn(1, o.normal(own, o.blend[1]));
@@ -99,15 +101,15 @@ struct ObstacleAt {
   }
 };
 
-struct SheetAt {
+struct ClothAt {
   Corners corners;
   ConstVecView position;
   const float* half_thickness;
   const int* sheet;
-  Vec3<float> place, period;
+  Vec3<float> centre, period;
   DRENCH_HD SensorBody operator()(int t) const {
     const Vec3<float> a = corners.at(position, 3 * t), b = corners.at(position, 3 * t + 1),
-                      c = corners.at(position, 3 * t + 2), d = nearest(place - a, period),
+                      c = corners.at(position, 3 * t + 2), d = nearest(centre - a, period),
                       none{0.f, 0.f, 0.f}, n = cross(b - a, c - a);
     const auto foot = closest_point(d, none, b - a, c - a);
     const float size = length(n);
@@ -115,7 +117,7 @@ struct SheetAt {
     body.kind = SensorBody::sheet, body.of = sheet[t];
     body.distance = sqrtf(foot.distance2) - half_thickness[t];
     body.facing = n * (size > 0.f ? 1.f / size : 0.f);
-    body.foot = place - d + (b - a) * foot.wb + (c - a) * foot.wc;
+    body.foot = centre - d + (b - a) * foot.wb + (c - a) * foot.wc;
     return body;
   }
 };
@@ -130,7 +132,7 @@ struct SurfaceSensor {
 
   DRENCH_HD double push(const BodyPart& part, Vec3<float> from, int i) const {
     const float inward = -dot(part.gradient, body.facing);
-    const Vec3<float> d = from + part.way;
+    const Vec3<float> d = from + part.to_surface;
     if (!(inward > 0.f) || fabsf(dot(d, disc.normal)) > reach) return 0;
     return double(disc.across(d)) * parts.step.mass * parts.step.term[i] * inward;
   }
@@ -158,12 +160,12 @@ struct SurfaceSensor {
 struct OpenSpace {
   ImageWalls walls;
   ObstacleViews obstacles;
-  Vec3<float> sheet_normal, sheet_foot;  // a zero normal: no sheet
-  float cell;                            // m, over which the share of a point falls
+  Vec3<float> cloth_normal, cloth_foot;  // a zero normal: no sheet
+  float cell;                            // m, over which the open fraction of a point falls
 
   DRENCH_HD float step(float distance) const { return minimum(max0(0.5f + distance / cell), 1.f); }
-  /// The share of a point's cell that is open. @param but  an axis, or an obstacle, left out.
-  DRENCH_HD float share(Vec3<float> x, int but_axis, int but_obstacle) const {
+  /// The fraction of a point's cell that is open. @param but  an axis, or an obstacle, left out.
+  DRENCH_HD float open_fraction(Vec3<float> x, int but_axis, int but_obstacle) const {
     float open = 1.f;
     for (int k = 0; k < 3; ++k)
       if (walls.on[k] && k != but_axis)
@@ -173,7 +175,7 @@ struct OpenSpace {
       if (o.of == but_obstacle || !o.near_path(x, x, cell)) continue;
       open *= step(o.distance(o.to_own(1, x), o.blend[1]));
     }
-    if (length2(sheet_normal) > 0.f) open *= step(dot(x - sheet_foot, sheet_normal));
+    if (length2(cloth_normal) > 0.f) open *= step(dot(x - cloth_foot, cloth_normal));
     return open;
   }
 };
@@ -210,17 +212,17 @@ struct SurfaceExtent {
   }
   DRENCH_HD Totals<1> operator()(int k) const {
     float weight, height = 0.f;
-    const Vec3<float> x = points.place(k, weight);
+    const Vec3<float> x = points.point(k, weight);
     const bool on_obstacle = body.kind == SensorBody::obstacle;
     if (on_obstacle && !surface(x, height)) return {};
     const Vec3<float> before = x + body.facing * (height + 0.25f * spacing);
-    return {{double(weight) *
-             space.share(before, on_obstacle ? -1 : body.axis, on_obstacle ? body.of : -1)}};
+    return {{double(weight) * space.open_fraction(before, on_obstacle ? -1 : body.axis,
+                                                  on_obstacle ? body.of : -1)}};
   }
 };
 
 /// Area of a sheet over a disc, seen along its normal, m^2: triangles in 64 parts each.
-struct SheetExtent {
+struct ClothExtent {
   Corners corners;
   ConstVecView position;
   const int* sheet;
@@ -256,7 +258,7 @@ struct InnerSensor {
   SoftDisc disc;
   GridView grid;
   NeighbourView list;
-  Vec3<float> sheet_normal, sheet_foot;  // particles behind it do not count; zero: none
+  Vec3<float> cloth_normal, cloth_foot;  // particles behind it do not count; zero: none
 
   DRENCH_HD float pair(Vec3<float> from, Vec3<float> d, Vec3<float> corrected) const {
     const float bond = disc.bond(from, d);
@@ -267,7 +269,7 @@ struct InnerSensor {
     const StepPressure& step = parts.step;
     const Vec3<float> corrected = step.corrected(i, disc.normal);
     float sum = 0.f;
-    if (step.place) {
+    if (step.predicted) {
       for (size_t k = list.first(i); k < list.end(i); ++k)
         if (list.closeness(k) > 0.f)
           sum += pair(from, nearest(step.at(list.index(k)) - x, disc.period), corrected);
@@ -283,8 +285,9 @@ struct InnerSensor {
     return sum;
   }
   DRENCH_HD float body(const BodyPart& part, Vec3<float> from) const {
-    const float across = dot(part.gradient, disc.normal) * dot(part.way, disc.normal);
-    return across == 0.f ? 0.f : across / parts.step.rest_density * disc.bond(from, part.way);
+    const float across = dot(part.gradient, disc.normal) * dot(part.to_surface, disc.normal);
+    return across == 0.f ? 0.f
+                         : across / parts.step.rest_density * disc.bond(from, part.to_surface);
   }
   DRENCH_HD float bodies(int i, const Beside& b, int row, Vec3<float> from) const {
     float sum = body(parts.sheet(b, row), from);
@@ -298,7 +301,7 @@ struct InnerSensor {
     const Beside b = parts.beside(i, row);
     const Vec3<float> from = disc.from_centre(b.x);
     if (step.term[i] == 0.f || !disc.near(from, step.h)) return {};
-    if (dot(disc.centre + from - sheet_foot, sheet_normal) < 0.f) return {};
+    if (dot(disc.centre + from - cloth_foot, cloth_normal) < 0.f) return {};
     return {{double(step.mass) * step.rest_density * step.term[i] *
              (pairs(i, b.x, from) + bodies(i, b, row, from))}};
   }
@@ -309,8 +312,8 @@ struct InnerExtent {
   OpenSpace space;
   DRENCH_HD Totals<1> operator()(int k) const {
     float weight;
-    const Vec3<float> x = points.place(k, weight);
-    return {{double(weight) * space.share(x, -1, -1)}};
+    const Vec3<float> x = points.point(k, weight);
+    return {{double(weight) * space.open_fraction(x, -1, -1)}};
   }
 };
 

@@ -8,17 +8,18 @@
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
 #include "sim/passes/coupling/contact_exact.h"
+#include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 /// What a mirror belongs to; obstacles by their index.
-constexpr int domain_wall = -1, nearest_sheet = -2;
+constexpr int domain_wall = -1, nearest_cloth = -2;
 
 struct Mirror {
   Vec3<float> normal;  // unit, towards the fluid
   float offset;        // m, normal . x on the plane
   float distance;      // m, of the particle
-  float share;         // of its images: 1, less where a sheet ends
+  float weight;        // of its images: 1, less where a sheet ends
   int of;
 
   DRENCH_HD float height(Vec3<float> x) const { return dot(normal, x) - offset; }
@@ -77,7 +78,7 @@ struct ImageSums {
 };
 
 /// The sheets as mirrors of the particles near them.
-struct SheetMirrors {
+struct ClothMirrors {
   NearView near;
   ConstVecView normal, start, cloth_velocity;
   const float *distance, *edge, *half_thickness;
@@ -93,30 +94,30 @@ struct SheetMirrors {
     const Vec3<float> n = normal[i];
     const float gap = distance[i] - half_thickness[t] + dot(n, x - start[i] - foot),
                 held = maximum(gap, least);
-    if (held < h) mirrors.add({n, dot(n, x) - held, held, edge[i], nearest_sheet});
+    if (held < h) mirrors.add({n, dot(n, x) - held, held, edge[i], nearest_cloth});
   }
 };
 
 struct MirrorImages {
-  const Float4* place;  // m
+  const Float4* position;  // m
   NeighbourView list;
-  float low[3], high[3];  // m
-  bool on[3];
+  DomainWalls walls;
   float support_radius, spacing;  // m
   float period[3], inverse[3];    // m, 1/m; 0 where an axis is not periodic
   ObstacleViews obstacles;
-  SheetMirrors sheets;
-  bool any_sheet, any;
+  ClothMirrors cloth;
+  bool any_cloth, any;
 
   DRENCH_HD Mirrors of(int i) const {
     Mirrors mirrors;
-    const float h = support_radius, p[3] = {place[i].x, place[i].y, place[i].z};
+    const float h = support_radius, p[3] = {position[i].x, position[i].y, position[i].z};
     const Vec3<float> x{p[0], p[1], p[2]};
     for (int k = 0; k < 3; ++k) {
       const Vec3<float> up{float(k == 0), float(k == 1), float(k == 2)};
-      const float below = p[k] - low[k], above = high[k] - p[k];
-      if (on[k] && below < h) mirrors.add({up, low[k], below, 1.f, domain_wall});
-      if (on[k] && above < h) mirrors.add({-up, -high[k], above, 1.f, domain_wall});
+      if (!walls.on[k]) continue;
+      const float below = p[k] - walls.low[k], above = walls.high[k] - p[k];
+      if (below < h) mirrors.add({up, walls.low[k], below, 1.f, domain_wall});
+      if (above < h) mirrors.add({-up, -walls.high[k], above, 1.f, domain_wall});
     }
     for (int k = 0; k < obstacles.count; ++k) {
       const ObstacleView& o = obstacles.obstacle[k];
@@ -127,20 +128,20 @@ struct MirrorImages {
       const Vec3<float> n = o.turn(1, o.normal(own, o.blend[1]));
       if (length2(n) > 0.5f) mirrors.add({n, dot(n, x) - d, d, 1.f, o.of});
     }
-    if (any_sheet) sheets.add(mirrors, i, x, h, 0.1f * spacing);
+    if (any_cloth) cloth.add(mirrors, i, x, h, 0.1f * spacing);
     mirrors.keep_seen(x, 0.05f * spacing);
     return mirrors;
   }
 
   /// Where an image stands. False: there is none, its particle is behind the mirror.
-  DRENCH_HD bool reflect(const Mirrors& mirrors, int in, Vec3<float>& x, float& share) const {
+  DRENCH_HD bool reflect(const Mirrors& mirrors, int in, Vec3<float>& x, float& weight) const {
     for (int k = 0; k < mirrors.count; ++k) {
       if (!(in >> k & 1)) continue;
       const Mirror& m = mirrors.mirror[k];
       const float above = m.height(x);
       if (above <= 0.f) return false;
       x = x - m.normal * (2.f * above);
-      share *= m.share;
+      weight *= m.weight;
     }
     return true;
   }
@@ -150,25 +151,25 @@ struct MirrorImages {
   DRENCH_HD ImageSums sum(int i, const Mirrors& mirrors, const Term& term) const {
     ImageSums sums;
     if (mirrors.count == 0) return sums;
-    const float h = support_radius, own[3] = {place[i].x, place[i].y, place[i].z};
+    const float h = support_radius, own[3] = {position[i].x, position[i].y, position[i].z};
     const size_t end = list.end(i);
     for (size_t k = list.first(i); k < end; ++k) {
       if (!(list.closeness(k) > 0.f)) continue;
       const int j = list.index(k);
-      const float at[3] = {place[j].x, place[j].y, place[j].z};
+      const float at[3] = {position[j].x, position[j].y, position[j].z};
       float near[3];  // the nearest image across periodic axes
       for (int c = 0; c < 3; ++c)
         near[c] = at[c] + period[c] * rintf((own[c] - at[c]) * inverse[c]);
       for (int in = 1; in < 1 << mirrors.count; ++in) {
         Vec3<float> there{near[0], near[1], near[2]};
-        float share = 1.f;
-        if (!reflect(mirrors, in, there, share)) continue;
+        float weight = 1.f;
+        if (!reflect(mirrors, in, there, weight)) continue;
         const Vec3<float> x{own[0] - there.x, own[1] - there.y, own[2] - there.z};
         const float r2 = length2(x);
         if (r2 >= h * h) continue;
         const int nearest = in & 1 ? 0 : in & 2 ? 1 : 2;
         const Image image{&mirrors, in, x, 1.f - square_root(r2) / h};
-        sums.by[nearest] = sums.by[nearest] + term(i, j, image) * share;
+        sums.by[nearest] = sums.by[nearest] + term(i, j, image) * weight;
       }
     }
     return sums;
@@ -180,26 +181,26 @@ inline MirrorImages mirror_images_of(const State& state) {
   const PressureState& s = state.pressure;
   const FluidState& f = state.fluid;
   MirrorImages images{};
-  images.place = s.place.data(), images.list = view_of(s.lists);
+  images.position = s.place.data(), images.list = view_of(s.lists);
   images.support_radius = p.support_radius, images.spacing = p.spacing;
   images.obstacles = state.obstacles.views();
-  images.any_sheet = state.contact.near > 0;
-  images.any = p.obstacles > 0 || images.any_sheet;
+  images.walls = domain_walls(p);
+  images.any_cloth = state.contact.near > 0;
+  images.any = p.obstacles > 0 || images.any_cloth;
   for (int k = 0; k < 3; ++k) {
-    images.low[k] = p.low[k], images.high[k] = p.high[k], images.on[k] = p.wall[k];
     images.period[k] = p.periodic[k] ? p.high[k] - p.low[k] : 0.f;
     images.inverse[k] = p.periodic[k] ? 1.f / images.period[k] : 0.f;
     images.any |= p.wall[k];
   }
-  if (images.any_sheet) {
-    images.sheets = {near_list(state),
-                     f.normal.view(),
-                     f.start.view(),
-                     state.cloth.velocity.view(),
-                     f.sheet_distance.data(),
-                     f.edge.data(),
-                     state.cloth.half_thickness.data(),
-                     float(state.dt)};
+  if (images.any_cloth) {
+    images.cloth = {.near = near_list(state),
+                    .normal = f.normal.view(),
+                    .start = f.start.view(),
+                    .cloth_velocity = state.cloth.velocity.view(),
+                    .distance = f.sheet_distance.data(),
+                    .edge = f.edge.data(),
+                    .half_thickness = state.cloth.half_thickness.data(),
+                    .dt = float(state.dt)};
   }
   return images;
 }

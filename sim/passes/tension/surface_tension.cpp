@@ -19,7 +19,7 @@ void make_unit(State& state) {
       });
 }
 
-/// Adds the images' share to a column of vectors.
+/// Adds the images' part to a column of vectors.
 template <class Term>
 void add_images(const char* name, const State& state, Float4* vector, const Term& term) {
   const MirrorImages images = mirror_images_of(state);
@@ -51,10 +51,10 @@ void pull_on_walls(State& state, const TensionForce<Separation>& force) {
         const Vec3<float> all = sums.total() * force.scale;
         kick[i] = {kick[i].x - all.x, kick[i].y - all.y, kick[i].z - all.z, 0.f};
         for (int k = 0; k < mirrors.count; ++k)
-          if (mirrors.mirror[k].of == nearest_sheet)
+          if (mirrors.mirror[k].of == nearest_cloth)
             owed.set(i, owed[i] - sums.by[k] * (force.scale * mass));
       });
-  state.owes |= images.any_sheet;
+  state.owes |= images.any_cloth;
 }
 
 }  // namespace
@@ -91,7 +91,7 @@ void find_faces(State& state) {
   const ObstacleViews obstacles = images.obstacles;
   const float *of_triangle = state.cloth.wetting.data(), at_walls = state.parameters.wetting,
               inverse_h = 1.f / state.parameters.support_radius;
-  const int* triangle = images.any_sheet ? state.fluid.triangle.data() : nullptr;
+  const int* triangle = images.any_cloth ? state.fluid.triangle.data() : nullptr;
   const Float4* surface = state.tension.normal.data();
   Float4* face = state.tension.wetting.data();
   parallel_for(
@@ -101,10 +101,10 @@ void find_faces(State& state) {
         for (int k = 0; k < mirrors.count; ++k) {
           const Mirror& m = mirrors.mirror[k];
           const float wetting = m.of == domain_wall     ? at_walls
-                                : m.of == nearest_sheet ? of_triangle[triangle[i]]
+                                : m.of == nearest_cloth ? of_triangle[triangle[i]]
                                                         : obstacles.obstacle[m.of].wetting;
-          float s = wetting * m.share * (8.f / 3) * WendlandC2::plane(m.distance * inverse_h);
-          if (s > 0.f) s *= backed_share(surface[i], m.normal);
+          float s = wetting * m.weight * (8.f / 3) * WendlandC2::plane(m.distance * inverse_h);
+          if (s > 0.f) s *= backed_fraction(surface[i], m.normal);
           if (fabsf(s) > fabsf(largest.w)) largest = {m.normal.x, m.normal.y, m.normal.z, s};
         }
         face[i] = largest;

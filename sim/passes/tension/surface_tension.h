@@ -24,16 +24,16 @@ namespace drench::sim::DRENCH_BACKEND {
 template <class Separation>
 struct ColourGradient {
   static constexpr int columns = 1;
-  const Float4* place;
+  const Float4* position;
   Float4* gradient;
   float scale;  // 1/m^2, of the sum
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<1> inputs() const { return {{place}}; }
+  DRENCH_HD Columns<1> inputs() const { return {{position}}; }
   template <class Q>
   struct Particle {
-    Q place;
+    Q position;
   };
   template <class Q>
   struct Sum {
@@ -45,7 +45,7 @@ struct ColourGradient {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    sum.outwards = multiply_add(separation(i.place, j.place), weight, sum.outwards);
+    sum.outwards = multiply_add(separation(i.position, j.position), weight, sum.outwards);
   }
   DRENCH_HD void finish(int i, const Sum<Float4>& sum) const {
     const Float4 s = sum.outwards;
@@ -97,17 +97,17 @@ constexpr float tension_constant = 32.f;  // k
 template <class Separation>
 struct TensionForce {
   static constexpr int columns = 2;
-  const Float4 *place, *normal;  // normal: unit; w: s
-  Float4* kick;                  // m/s
-  float scale;                   // 1/(m^2 s), of the sum
-  float spacing;                 // over h
+  const Float4 *position, *normal;  // normal: unit; w: s
+  Float4* kick;                     // m/s
+  float scale;                      // 1/(m^2 s), of the sum
+  float spacing;                    // over h
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<2> inputs() const { return {{place, normal}}; }
+  DRENCH_HD Columns<2> inputs() const { return {{position, normal}}; }
   template <class Q>
   struct Particle {
-    Q place, normal;
+    Q position, normal;
   };
   template <class Q>
   struct Sum {
@@ -121,7 +121,7 @@ struct TensionForce {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q x = separation(i.place, j.place), square = splat_sum(x * x);
+    const Q x = separation(i.position, j.position), square = splat_sum(x * x);
     const Q a = splat_sum(i.normal * x), b = splat_sum(j.normal * x);
     const Q along = splat_w(i.normal) * (square - a * a) + splat_w(j.normal) * (square - b * b);
     sum.pull = multiply_add(x, weight * along, sum.pull);
@@ -175,15 +175,17 @@ TensionForce<Separation> tension_force(const State& state, Float4* kick, Separat
   const Parameters& p = state.parameters;
   const float a = p.spacing, h = p.support_radius;
   const float strength = float(state.dt) * tension_constant * p.surface_tension;
-  return {state.pressure.place.data(),
-          state.tension.normal.data(),
-          kick,
-          strength / (p.rest_density * a * a * h * h * h),
-          a / h,
-          separation};
+  return {.position = state.pressure.place.data(),
+          .normal = state.tension.normal.data(),
+          .kick = kick,
+          .scale = strength / (p.rest_density * a * a * h * h * h),
+          .spacing = a / h,
+          .separation = separation};
 }
 
-/// Uses PressureState::vector.
+/// Adds the step's kicks to the velocities; leaves unit normals in TensionState::normal, for
+/// contact angles and the impulses of obstacles, and in FluidState::owed what sheets receive.
+/// Overwrites PressureState::scratch_a.
 void apply_surface_tension(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -8,16 +8,17 @@
 // kernel's integral over the plane; as neighbours end at the wall, the stress over all depths is
 // sigma cos(theta) times the integral of D H, H = 1 - WendlandC2::halfspace, which the factor 8 / 3
 // makes 1: nothing is fitted. Forces are equal and opposite between particles, and averaged over
-// neighbourhoods as in surface_tension.h. What holds a drop at a wall is the mirrors' share of
+// neighbourhoods as in surface_tension.h. What holds a drop at a wall is the mirrors' part of
 // surface tension.
 
 #include "sim/passes/tension/surface_tension.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Share of a wetting stress beside this surface (unit normal; w: s, surface_tension.h): none where
-/// the fluid is one layer thick, s = 0.5 along the wall's normal, which no tension holds together.
-DRENCH_HD float backed_share(const Float4& surface, Vec3<float> wall_normal) {
+/// Fraction of a wetting stress beside this surface (unit normal; w: s, surface_tension.h): none
+/// where the fluid is one layer thick, s = 0.5 along the wall's normal, which no tension holds
+/// together.
+DRENCH_HD float backed_fraction(const Float4& surface, Vec3<float> wall_normal) {
   const Vec3<float> n{surface.x, surface.y, surface.z};
   return max0(1.f - 2.f * max0(surface.w * dot(n, wall_normal)));
 }
@@ -26,16 +27,16 @@ DRENCH_HD float backed_share(const Float4& surface, Vec3<float> wall_normal) {
 template <class Separation>
 struct FaceForce {
   static constexpr int columns = 2;
-  const Float4 *place, *face;  // face: unit normal of the wall; w: P h / sigma
-  Float4* kick;                // m/s
-  float scale;                 // 1/s, of the sum
+  const Float4 *position, *face;  // face: unit normal of the wall; w: P h / sigma
+  Float4* kick;                   // m/s
+  float scale;                    // 1/s, of the sum
   Separation separation;
 
   DRENCH_HD bool idle() const { return false; }
-  DRENCH_HD Columns<2> inputs() const { return {{place, face}}; }
+  DRENCH_HD Columns<2> inputs() const { return {{position, face}}; }
   template <class Q>
   struct Particle {
-    Q place, face;
+    Q position, face;
   };
   template <class Q>
   struct Sum {
@@ -47,7 +48,7 @@ struct FaceForce {
   }
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
-    const Q x = separation(i.place, j.place);
+    const Q x = separation(i.position, j.position);
     const Q along_i = x - i.face * splat_sum(i.face * x);
     const Q along_j = x - j.face * splat_sum(j.face * x);
     const Q stress = splat_w(i.face) * along_i + splat_w(j.face) * along_j;
@@ -59,7 +60,8 @@ struct FaceForce {
   }
 };
 
-/// Uses PressureState::vector.
+/// Adds the step's kicks to the velocities, by the normals of apply_surface_tension. Overwrites
+/// PressureState::scratch_a.
 void apply_contact_angles(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

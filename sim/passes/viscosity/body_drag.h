@@ -2,11 +2,11 @@
 // What obstacles and sheets brake the fluid by where it does not slip along them: as a wall of the
 // domain does (viscosity_rows.h), whose velocity is theirs at the foot of the particle's
 // perpendicular. A body that fills less of what lies beyond its tangent plane brakes less: by the
-// share of the kernel that it fills of the half-space's, with the closed forms of obstacle_share.h;
-// by its square along what is curved, as what lies beside the perpendicular weighs most there.
-// Against the integral over a ball of 3 spacings this is 5 to 13 % too much along and 4 to 8 % too
-// little across, and up to 29 % too much at a box's edge (tests/sim/body_drag_test.cpp). Walls and
-// obstacles behind a sheet are not seen through it.
+// fraction of the half-space's integral of the kernel that it fills, with the closed forms of
+// obstacle_share.h; by its square along what is curved, as what lies beside the perpendicular
+// weighs most there. Against the integral over a ball of 3 spacings this is
+// up to 13 % off, at a box's edge 29 % (tests/sim/body_drag_test.cpp). Walls and obstacles behind a
+// sheet are not seen through it.
 //
 // Of all these a particle has one block of the viscous matrix. That of a sheet acts on both: rows
 // of the near list keep its rates for viscosity_cloth.h.
@@ -28,7 +28,7 @@ DRENCH_HD void add_surface(WallDrag& drag, float along, float across, Vec3<float
 }
 
 /// What a particle sees of a sheet that it is beside: nothing, with a normal of zero.
-struct BesideSheet {
+struct BesideCloth {
   Vec3<float> normal{0.f, 0.f, 0.f};
   float gap = 0.f;  // m
 };
@@ -40,15 +40,16 @@ struct BodyDrag {
   ObstacleViews obstacles;
   float support_radius, inverse_dt;  // m, 1/s
 
-  DRENCH_HD float closeness_of(float distance) const {
+  /// Over the support radius.
+  DRENCH_HD float relative_distance(float distance) const {
     return maximum(distance * walls.inverse_h, walls.least);
   }
   DRENCH_HD float along(float distance) const {
-    const float q = closeness_of(distance);
+    const float q = relative_distance(distance);
     return q < 1.f ? walls.strength * ViscousWeight::wall_along(q) : 0.f;
   }
   DRENCH_HD float across(float distance) const {
-    const float q = closeness_of(distance);
+    const float q = relative_distance(distance);
     return q < 1.f ? walls.strength * ViscousWeight::wall_across(q) : 0.f;
   }
 
@@ -86,7 +87,7 @@ struct BodyDrag {
     return (moved + turned + n * grown) * inverse_dt;
   }
 
-  DRENCH_HD void add_obstacle(const ObstacleView& o, Vec3<float> x, const BesideSheet& sheet,
+  DRENCH_HD void add_obstacle(const ObstacleView& o, Vec3<float> x, const BesideCloth& sheet,
                               WallDrag& drag) const {
     if (o.no_slip == 0.f || !o.near_path(x, x, support_radius)) return;
     const Vec3<float> own = o.to_own(1, x);
@@ -94,14 +95,14 @@ struct BodyDrag {
     if (!(d < support_radius)) return;
     const Vec3<float> own_normal = o.normal(own, o.blend[1]), n = o.turn(1, own_normal);
     const float fill = filled(o, own, d), less = o.shape == ObstacleShape::box ? 1.f : fill;
-    const float share =
+    const float fraction =
         image.seen(d * dot(n, sheet.normal) - sheet.gap) * fill * length2(own_normal);
-    add_surface(drag, share * less * along(d), share * across(d), n,
+    add_surface(drag, fraction * less * along(d), fraction * across(d), n,
                 velocity(o, own - own_normal * d, n));
   }
 
   /// All but the sheet.
-  DRENCH_HD WallDrag of(Vec3<float> place, const BesideSheet& sheet) const {
+  DRENCH_HD WallDrag of(Vec3<float> place, const BesideCloth& sheet) const {
     const float x[3] = {place.x, place.y, place.z},
                 n[3] = {sheet.normal.x, sheet.normal.y, sheet.normal.z};
     WallDrag drag{};
@@ -111,9 +112,9 @@ struct BodyDrag {
       const float distance[2] = {x[k] - walls.low[k], walls.high[k] - x[k]};
       for (int end = 0; end < 2; ++end) {
         const float d = distance[end], facing = end == 0 ? n[k] : -n[k];
-        const float share = image.seen(d * facing - sheet.gap);
+        const float fraction = image.seen(d * facing - sheet.gap);
         const float* v = walls.velocity[k][end];
-        add_surface(drag, share * along(d), share * across(d), up, {v[0], v[1], v[2]});
+        add_surface(drag, fraction * along(d), fraction * across(d), up, {v[0], v[1], v[2]});
       }
     }
     for (int k = 0; k < obstacles.count; ++k)
@@ -129,14 +130,14 @@ inline BodyDrag body_drag_of(const State& state) {
 }
 
 /// Particles by their rows: the gap to the sheet at the predicted places, as the pressure has it.
-struct SheetGaps {
+struct ClothGaps {
   ClothRows rows;
   ConstVecView start, normal, cloth_velocity;
   const float *distance, *edge, *half_thickness;
   const int* triangle;
   float dt;  // s
 
-  DRENCH_HD BesideSheet of(int row, Vec3<float> x) const {
+  DRENCH_HD BesideCloth of(int row, Vec3<float> x) const {
     const int i = rows.particle[row];
     if (edge[i] <= 0.f) return {};
     const Vec3<float> n = normal[i], foot = rows.at_foot(row, cloth_velocity) * dt;
@@ -145,7 +146,7 @@ struct SheetGaps {
 };
 
 /// Rates of the sheets' rows, along and across.
-struct SheetRates {
+struct ClothRates {
   float *along, *across;
 };
 

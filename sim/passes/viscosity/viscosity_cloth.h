@@ -13,9 +13,9 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 /// Rows of the near list as the solve reads them.
-struct SheetDragRows {
+struct ClothDragRows {
   ClothRows rows;
-  SheetRates rates;
+  ClothRates rates;
   VecView load;  // what a row gives to its vertices
   ConstVecView normal;
 
@@ -37,18 +37,18 @@ struct VertexLoads {
   }
 };
 
-/// The vertices' share of the conjugate gradients of viscosity_solve.h. The unknown w stands in
+/// The vertices' part of the conjugate gradients of viscosity_solve.h. The unknown w stands in
 /// ClothSystem::answer.
-struct SheetDragIteration {
+struct ClothDragIteration {
   BlockInverse block;
   ClothMatrix matrix;
-  FreeWays free;
+  ConstraintProjection constraints;
   VecView solution, residual, direction, image;
   ViscousControl* control;
   float mass, inverse_mass;  // kg, 1/kg, of a particle
 
   DRENCH_HD Vec3<float> preconditioned(int v) const {
-    return free.of(v, block.times(v, residual[v])) * mass;
+    return constraints.project(v, block.times(v, residual[v])) * mass;
   }
   DRENCH_HD Two<double> sums(int v) const {
     const double product = dot_double(residual[v], preconditioned(v));
@@ -56,13 +56,14 @@ struct SheetDragIteration {
   }
   /// Residual and preconditioned residual of w = 0, from what the rows load a vertex with.
   DRENCH_HD Two<double> start(int v, Vec3<float> load) const {
-    residual.set(v, free.of(v, load));
+    residual.set(v, constraints.project(v, load));
     solution.set(v, {0.f, 0.f, 0.f}), direction.set(v, preconditioned(v));
     return sums(v);
   }
   DRENCH_HD double curvature(int v, Vec3<float> load) const {
     if (control->done) return 0;
-    const Vec3<float> product = matrix.times(direction, v) * inverse_mass - free.of(v, load);
+    const Vec3<float> product =
+        matrix.times(direction, v) * inverse_mass - constraints.project(v, load);
     image.set(v, product);
     return dot_double(direction[v], product);
   }

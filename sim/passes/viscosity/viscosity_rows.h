@@ -15,11 +15,12 @@
 
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/passes/motion/domain_walls.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// The share of the matrix of what brakes a particle, a symmetric 3 x 3 block.
+/// What walls, obstacles and cloth add to the matrix of a particle, a symmetric 3 x 3 block.
 struct WallDrag {
   Vec3<float> rate, cross;  // xx, yy, zz and xy, yz, zx
   Vec3<float> source;       // the block times the wall's velocity, m/s
@@ -32,14 +33,13 @@ struct WallDrag {
 };
 
 /// The domain's walls as what brakes the fluid within a step, or all that does (body_drag.h).
-struct NoSlipWalls {
-  float low[3], high[3];  // m
-  bool on[3];
-  float velocity[3][2][3];  // m/s
-  float inverse_h;          // 1/m
-  float least;              // of a distance, over h: a quarter of a spacing
-  float strength;           // dt nu / h^2
-  const Float4 *body_rate, *body_cross, *body_source;  // of all that brakes; null: walls alone
+struct NoSlipWalls : DomainWalls {
+  float velocity[3][2][3] = {};  // m/s
+  float inverse_h = 0;           // 1/m
+  float least = 0;               // of a distance, over h: a quarter of a spacing
+  float strength = 0;            // dt nu / h^2
+  /// Of all that brakes; null: walls alone.
+  const Float4 *body_rate = nullptr, *body_cross = nullptr, *body_source = nullptr;
 
   DRENCH_HD void add(float distance, int axis, const float* moving, WallDrag& drag) const {
     const float q = distance * inverse_h;
@@ -99,15 +99,16 @@ struct ViscousProduct : ViscousPairs<Separation> {
   };
   template <class Q>
   struct Sum {
-    Q push;
+    Q friction;
   };
   template <class Q>
   DRENCH_HD void pair(const Particle<Q>& i, const Particle<Q>& j, Q weight, Sum<Q>& sum) const {
     const Q apart = separation(i.place, j.place);
-    sum.push = multiply_add(weight * apart, splat_sum(apart * (i.vector - j.vector)), sum.push);
+    sum.friction =
+        multiply_add(weight * apart, splat_sum(apart * (i.vector - j.vector)), sum.friction);
   }
   DRENCH_HD Vec3<float> result(int i, const Sum<Float4>& sum) const {
-    const Float4 v = vector[i], p = sum.push;
+    const Float4 v = vector[i], p = sum.friction;
     const Vec3<float> drag = walls.drag(i, place[i]).times({v.x, v.y, v.z});
     return {scale * p.x + drag.x, scale * p.y + drag.y, scale * p.z + drag.z};
   }
@@ -168,9 +169,9 @@ struct ViscousBlocks : ViscousPairs<Separation> {
 };
 
 inline NoSlipWalls no_slip_walls_of(const Parameters& p, float strength) {
-  NoSlipWalls walls{};
+  NoSlipWalls walls{domain_walls(p)};
   for (int k = 0; k < 3; ++k) {
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.no_slip && p.wall[k];
+    walls.on[k] &= p.no_slip;
     for (int end = 0; end < 2; ++end) {
       for (int c = 0; c < 3; ++c) walls.velocity[k][end][c] = p.wall_velocity[k][end][c];
     }

@@ -1,5 +1,6 @@
 #include "sim/passes/viscosity/viscosity_solve.h"
 
+#include "sim/backend/solve_control.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_cloth.h"
 #include "sim/passes/viscosity/viscosity_rows.h"
@@ -9,27 +10,27 @@ namespace drench::sim::DRENCH_BACKEND {
 namespace {
 
 /// @param cloth_velocity  of the start of the step, m/s
-SheetGaps sheet_gaps(const State& state, const ConstVecView& cloth_velocity) {
+ClothGaps cloth_gaps(const State& state, const ConstVecView& cloth_velocity) {
   const FluidState& f = state.fluid;
-  return {cloth_rows(state),
-          f.start.view(),
-          f.normal.view(),
-          cloth_velocity,
-          f.sheet_distance.data(),
-          f.edge.data(),
-          state.cloth.half_thickness.data(),
-          f.triangle.data(),
-          float(state.dt)};
+  return {.rows = cloth_rows(state),
+          .start = f.start.view(),
+          .normal = f.normal.view(),
+          .cloth_velocity = cloth_velocity,
+          .distance = f.sheet_distance.data(),
+          .edge = f.edge.data(),
+          .half_thickness = state.cloth.half_thickness.data(),
+          .triangle = f.triangle.data(),
+          .dt = float(state.dt)};
 }
 
-SheetRates sheet_rates(State& state) {
+ClothRates cloth_rates(State& state) {
   return {state.contact.rate_along.data(), state.contact.rate_across.data()};
 }
 
 /// Beside sheets: all that brakes, and the sheets' rates.
-void set_drag_near_sheets(State& state, const BodyDrag& law) {
-  const SheetGaps gaps = sheet_gaps(state, state.cloth.velocity.view());
-  const SheetRates rates = sheet_rates(state);
+void set_drag_near_cloth(State& state, const BodyDrag& law) {
+  const ClothGaps gaps = cloth_gaps(state, state.cloth.velocity.view());
+  const ClothRates rates = cloth_rates(state);
   const ConstVecView velocity = state.cloth.velocity.view();
   const ConstVecView change = state.cloth_system.change.view();
   const float* held = state.parameters.no_slip_sheets ? state.cloth.no_slip.data() : nullptr;
@@ -42,7 +43,7 @@ void set_drag_near_sheets(State& state, const BodyDrag& law) {
         rates.along[row] = rates.across[row] = 0.f;
         if (i < 0) return;
         const Vec3<float> x{place[i].x, place[i].y, place[i].z};
-        const BesideSheet sheet = gaps.of(row, x);
+        const BesideCloth sheet = gaps.of(row, x);
         WallDrag drag = law.of(x, sheet);
         if (held && held[gaps.triangle[i]] > 0.f && gaps.edge[i] > 0.f) {
           const float along = gaps.edge[i] * law.along(sheet.gap),
@@ -70,12 +71,12 @@ void find_body_drag(State& state) {
   parallel_for(
       "drag: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
         if (triangle && triangle[i] >= 0) return;
-        const WallDrag drag = law.of({place[i].x, place[i].y, place[i].z}, BesideSheet{});
+        const WallDrag drag = law.of({place[i].x, place[i].y, place[i].z}, BesideCloth{});
         rate[i] = {drag.rate.x, drag.rate.y, drag.rate.z, 0.f};
         cross[i] = {drag.cross.x, drag.cross.y, drag.cross.z, 0.f};
         source[i] = {drag.source.x, drag.source.y, drag.source.z, 0.f};
       });
-  if (sheets) set_drag_near_sheets(state, law);
+  if (sheets) set_drag_near_cloth(state, law);
 }
 
 Impulse drag_impulse(const State& state, int which) {
@@ -96,12 +97,12 @@ Impulse drag_impulse(const State& state, int which) {
         const Vec3<float> x{place[i].x, place[i].y, place[i].z};
         for (int k = 0; k < obstacles.count; ++k)
           if (obstacles.obstacle[k].of == which)
-            law.add_obstacle(obstacles.obstacle[k], x, BesideSheet{}, drag);
+            law.add_obstacle(obstacles.obstacle[k], x, BesideCloth{}, drag);
         return velocity.on(drag, i, mass);
       },
-      Impulse{});
+      Plus{});
   if (!sheets) return far;
-  const SheetGaps gaps = sheet_gaps(state, state.cloth.next_velocity.view());  // swapped by now
+  const ClothGaps gaps = cloth_gaps(state, state.cloth.next_velocity.view());  // swapped by now
   const Impulse near = parallel_reduce(
       "drag: impulse near sheets", gaps.rows.rows, Impulse{},
       DRENCH_LAMBDA(int row) {
@@ -114,18 +115,18 @@ Impulse drag_impulse(const State& state, int which) {
             law.add_obstacle(obstacles.obstacle[k], x, gaps.of(row, x), drag);
         return velocity.on(drag, i, mass);
       },
-      Impulse{});
-  return far(far, near);
+      Plus{});
+  return far + near;
 }
 
 namespace {
 
-bool drags_sheets(const State& state) {
+bool drags_cloth(const State& state) {
   return state.parameters.no_slip_sheets && state.contact.near > 0;
 }
 
-SheetDragRows sheet_drag_rows(State& state) {
-  return {cloth_rows(state), sheet_rates(state), state.contact.change.view(),
+ClothDragRows cloth_drag_rows(State& state) {
+  return {cloth_rows(state), cloth_rates(state), state.contact.change.view(),
           state.fluid.normal.view()};
 }
 
@@ -138,16 +139,16 @@ VertexLoads sum_drag_loads(State& state) {
   return {near_list(state), state.contact.impulse.view(), state.cloth.share.data()};
 }
 
-/// Inverse blocks of A with the rows' drag added to their diagonals, on free ways.
+/// Inverse blocks of A with the rows' drag added to their diagonals, on free directions.
 void invert_drag_blocks(State& state) {
-  const SheetDragRows drag = sheet_drag_rows(state);
+  const ClothDragRows drag = cloth_drag_rows(state);
   parallel_for(
       "sheet drag: shares", drag.rows.rows, DRENCH_LAMBDA(int row) {
         drag.load.set(row, {drag.rates.along[row], drag.rates.across[row], 0.f});
       });
   const VertexLoads loads = sum_drag_loads(state);
   const BlockInverse whole = block_inverse(state), block = drag_block_inverse(state);
-  const FreeWays free = free_ways(state);
+  const ConstraintProjection constraints = constraint_projection(state);
   const float mass = state.parameters.particle_mass, *inertia = state.cloth_system.inertia.data();
   parallel_for(
       "sheet drag: blocks", state.cloth.vertices, DRENCH_LAMBDA(int v) {
@@ -162,29 +163,29 @@ void invert_drag_blocks(State& state) {
                             d0 * l20 * l20 + d1 * l21 * l21 + d2 + more};
         const float least = maximum(inertia[v], 1e-20f);
         block.put(v, b, least);
-        if (free.obstacles && length2(free.normal[v]) > 0.f)
-          block.put_free(v, block, free.axis[v], free.normal[v], least);
+        if (constraints.obstacles && length2(constraints.normal[v]) > 0.f)
+          block.put_free(v, block, constraints.axis[v], constraints.normal[v], least);
       });
 }
 
-SheetDragIteration sheet_drag_iteration(State& state) {
+ClothDragIteration cloth_drag_iteration(State& state) {
   ClothSystem& s = state.cloth_system;
   const float mass = state.parameters.particle_mass;
-  return {drag_block_inverse(state),
-          cloth_matrix(state),
-          free_ways(state),
-          s.answer.view(),
-          s.residual.view(),
-          s.direction.view(),
-          s.image.view(),
-          state.viscosity.control.data(),
-          mass,
-          1.f / mass};
+  return {.block = drag_block_inverse(state),
+          .matrix = cloth_matrix(state),
+          .constraints = constraint_projection(state),
+          .solution = s.answer.view(),
+          .residual = s.residual.view(),
+          .direction = s.direction.view(),
+          .image = s.image.view(),
+          .control = state.viscosity.control.data(),
+          .mass = mass,
+          .inverse_mass = 1.f / mass};
 }
 
 /// Loads of the rows at the fluid's velocities `u` and the vertices' so far.
 void load_by_drag(State& state) {
-  const SheetDragRows drag = sheet_drag_rows(state);
+  const ClothDragRows drag = cloth_drag_rows(state);
   const Float4* u = state.viscosity.solution.data();
   const ConstVecView velocity = state.cloth.velocity.view();
   const ConstVecView change = state.cloth_system.change.view(),
@@ -202,21 +203,21 @@ void load_by_drag(State& state) {
 }
 
 /// Before the fluid's own start, at whose velocities the solve begins.
-void start_sheet_drag(State& state) {
+void start_cloth_drag(State& state) {
   invert_drag_blocks(state);
   state.cloth_system.answer.clear();
   load_by_drag(state);
   const VertexLoads loads = sum_drag_loads(state);
-  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
       "sheet drag: start", state.cloth.vertices, Two<double>{0, 0},
-      DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, AddPairs{},
+      DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) { iteration.keep(sums); });
 }
 
 /// The sheets' part of the product with the direction; before its curvature is summed.
-void multiply_sheet_drag(State& state) {
-  const SheetDragRows drag = sheet_drag_rows(state);
+void multiply_cloth_drag(State& state) {
+  const ClothDragRows drag = cloth_drag_rows(state);
   const Float4* direction = state.viscosity.direction.data();
   Float4* product = state.viscosity.product.data();
   const ConstVecView of_vertex = state.cloth_system.direction.view();
@@ -232,32 +233,33 @@ void multiply_sheet_drag(State& state) {
         drag.load.set(row, drag.times(row, d) - sheet);
       });
   const VertexLoads loads = sum_drag_loads(state);
-  const SheetDragIteration iteration = sheet_drag_iteration(state);
+  const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
       "sheet drag: curvature", state.cloth.vertices, 0.,
-      DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, AddDoubles{},
+      DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(double sum) { iteration.control->sheet_curvature = sum; });
 }
 
-void step_sheet_drag(State& state) {
-  const SheetDragIteration iteration = sheet_drag_iteration(state);
+void step_cloth_drag(State& state) {
+  const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
       "sheet drag: step", state.cloth.vertices, Two<double>{0, 0},
-      DRENCH_LAMBDA(int v) { return iteration.step(v); }, AddPairs{},
+      DRENCH_LAMBDA(int v) { return iteration.step(v); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) {
         if (!iteration.control->done) iteration.keep(sums);
       });
 }
 
-void turn_sheet_drag(State& state) {
-  const SheetDragIteration iteration = sheet_drag_iteration(state);
+void turn_cloth_drag(State& state) {
+  const ClothDragIteration iteration = cloth_drag_iteration(state);
   parallel_for(
       "sheet drag: turn", state.cloth.vertices, DRENCH_LAMBDA(int v) { iteration.turn(v); });
 }
 
 /// What the fluid lost to the sheets is a load of their step like those of the pressures. What the
-/// solve leaves of their answer, and no shift closes of sheets that are held, sweeps take up.
-void give_back_sheet_drag(State& state) {
+/// solve leaves of their answer, and no shift closes of sheets that are held, more iterations take
+/// up.
+void give_back_cloth_drag(State& state) {
   load_by_drag(state);
   const VertexLoads loads = sum_drag_loads(state);
   ClothSystem& s = state.cloth_system;
@@ -272,18 +274,8 @@ void give_back_sheet_drag(State& state) {
         const bool rubs = grip && grip[v] >= 0;  // friction as settle_at_obstacles has found it
         more.set(v, rubs ? right[v] + rub[v] : right[v]);
       });
-  sweep_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);
-  balance_loose_sheets(state, change, right);
-}
-
-bool viscous_solve_ended(const ViscosityState& s, int iteration) {
-#if defined(__CUDACC__)
-  constexpr int patience = 8;
-  return iteration % patience == patience - 1 && value_at(s.control, 0).done;
-#else
-  (void)iteration;
-  return s.control.data()->done;
-#endif
+  solve_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);
+  balance_loose_cloth(state, change, right);
 }
 
 ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
@@ -291,24 +283,24 @@ ViscousIteration viscous_iteration_of(State& state, const NoSlipWalls& walls) {
   ViscosityState& s = state.viscosity;
   const float dt = float(state.dt);
   const double unseen = 1e-6 * p.spacing / state.dt;  // m/s
-  return {state.fluid.velocity.view(),
-          state.pressure.place.data(),
-          state.pressure.scratch_a.data(),
-          s.product.data(),
-          s.diagonal.data(),
-          s.cross.data(),
-          s.solution.data(),
-          s.residual.data(),
-          s.direction.data(),
-          s.control.data(),
-          walls,
-          {dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]},
-          turning_frame_of(state),
-          p.turns,
-          float(1 / state.dt),
-          p.viscous_tolerance,
-          unseen * unseen * state.fluid.count,
-          p.most_viscous_iterations};
+  return {.velocity = state.fluid.velocity.view(),
+          .place = state.pressure.place.data(),
+          .displacement = state.pressure.scratch_a.data(),
+          .product = s.product.data(),
+          .diagonal = s.diagonal.data(),
+          .cross = s.cross.data(),
+          .solution = s.solution.data(),
+          .residual = s.residual.data(),
+          .direction = s.direction.data(),
+          .control = s.control.data(),
+          .walls = walls,
+          .kick = {dt * p.gravity[0], dt * p.gravity[1], dt * p.gravity[2]},
+          .frame = turning_frame_of(state),
+          .turns = p.turns,
+          .inverse_dt = float(1 / state.dt),
+          .tolerance = p.viscous_tolerance,
+          .least = unseen * unseen * state.fluid.count,
+          .most_iterations = p.most_viscous_iterations};
 }
 
 template <class Separation>
@@ -331,30 +323,29 @@ void solve_viscosity(State& state, const Separation& separation) {
       "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   parallel_for(
       "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
-  const bool sheets = drags_sheets(state);
+  const bool sheets = drags_cloth(state);
   for_each_neighbour("viscosity: product", lists, n, product);
-  if (sheets) start_sheet_drag(state);
+  if (sheets) start_cloth_drag(state);
   reduce_then(
       "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
-      ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
-  for (int k = 0; k < state.parameters.most_viscous_iterations && !viscous_solve_ended(s, k - 1);
-       ++k) {
+      Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
+  for (int k = 0; !ended(s.control, k, state.parameters.most_viscous_iterations); ++k) {
     for_each_neighbour("viscosity: product", lists, n, product);
-    if (sheets) multiply_sheet_drag(state);
+    if (sheets) multiply_cloth_drag(state);
     reduce_then(
         "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
-        AddDoubles{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
-    if (sheets) step_sheet_drag(state);
+        Plus{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
+    if (sheets) step_cloth_drag(state);
     reduce_then(
         "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        ViscousSums{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
+        Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
     parallel_for(
         "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
-    if (sheets) turn_sheet_drag(state);
+    if (sheets) turn_cloth_drag(state);
   }
   parallel_for(
       "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
-  if (sheets) give_back_sheet_drag(state);
+  if (sheets) give_back_cloth_drag(state);
 }
 
 template <class Separation>

@@ -11,8 +11,8 @@
 // at rest. What is about to be added is known where gravity and pressure nearly balance, and is
 // never longer than dt g there; after an impact it is not, so that it is cut to this length.
 // Without the cut the pressure of an impact would keep itself up: as friction undoes what it does,
-// the next step finds it again. In a full box a is that of its second solve, which velocities do
-// not feel; with that of the first, or none, sheared packings stir more (docs/benchmarks.md).
+// the next step finds it again. In a closed domain a is that of its second solve, which velocities
+// do not feel; with that of the first, or none, sheared packings stir more.
 //
 // What a solve leaves, r = b - (1 + K) u, is added to u: v = b - K u is what forces between pairs
 // make of b, so that momentum and angular momentum are kept to rounding, and since 0 <= K the error
@@ -27,8 +27,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 struct ViscousSums {
   double square = 0, product = 0, size = 0;  // r . r, r . B r, b . b
-  DRENCH_HD ViscousSums operator()(const ViscousSums& a, const ViscousSums& b) const {
-    return {a.square + b.square, a.product + b.product, a.size + b.size};
+  DRENCH_HD ViscousSums operator+(const ViscousSums& other) const {
+    return {square + other.square, product + other.product, size + other.size};
   }
 };
 
@@ -51,13 +51,13 @@ struct ViscousIteration {
   /// f, no longer than dt g.
   DRENCH_HD Vec3<float> coming(int i) const {
     const Float4 d = displacement[i];
-    Vec3<float> push = kick;
+    Vec3<float> expected = kick;
     if (turns) {
       const Vec3<float> u = velocity[i], x{place[i].x, place[i].y, place[i].z};
-      push = push + (frame(x, u) - u);
+      expected = expected + (frame(x, u) - u);
     }
-    const Vec3<float> f = push + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
-    const float longest2 = length2(push), length2_f = length2(f);
+    const Vec3<float> f = expected + Vec3<float>{d.x, d.y, d.z} * inverse_dt;
+    const float longest2 = length2(expected), length2_f = length2(f);
     return length2_f > longest2 ? f * sqrtf(longest2 / length2_f) : f;
   }
   DRENCH_HD Float4 preconditioned(const Float4& r, int i) const {

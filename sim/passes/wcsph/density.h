@@ -1,13 +1,12 @@
 #pragma once
 #include "sim/neighbours/kernels.h"
 #include "sim/neighbours/pairs.h"
+#include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Domain walls as the fluid sees them: planes, each on or off, in the simulator's local frame.
-struct Walls {
-  float low[3], high[3];  // m
-  bool on[3];
+/// Domain walls as the weakly compressible fluid sees them: half-spaces of rest density.
+struct HalfspaceWalls : DomainWalls {
   float scale;  // Parameters::wall_scale
 
   /// Distance to the nearer wall of an axis; far when the axis is open.
@@ -19,11 +18,15 @@ struct Walls {
   }
 };
 
-/// Share of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
+inline HalfspaceWalls halfspace_walls_of(const Parameters& p) {
+  return {domain_walls(p), p.wall_scale};
+}
+
+/// Fraction of density that the walls around a particle replace: 1 - prod(1 - H), so that edges and
 /// corners are not counted twice. H is the half-space integral of the kernel, scaled so that a
 /// lattice that ends half a spacing before a wall has rest density: the kernel is too narrow for
 /// the integral itself.
-DRENCH_HD float wall_density_share(const Walls& walls, Vec3<float> p, float inverse_h) {
+DRENCH_HD float wall_density_fraction(const HalfspaceWalls& walls, Vec3<float> p, float inverse_h) {
   const float x[3] = {p.x, p.y, p.z};
   float open = 1.f;
   for (int k = 0; k < 3; ++k) {
@@ -37,23 +40,23 @@ DRENCH_HD float wall_density_share(const Walls& walls, Vec3<float> p, float inve
 //   rho_i = sum_j m W(r_ij, h)            Mueller, Charypar, Gross 2003, section 3.1
 //   p_i   = c^2 (rho_i - rho_0), never negative (a free surface must not pull)
 // Mueller et al. sum density with poly6 and take the pressure force from spiky. The two do not
-// belong to one energy: a column that should come to rest boils (rms speed 0.55 m/s in 0.2 m of
-// water at alpha 0.1, any time step). With spiky for both it comes to rest (0.03 m/s); poly6 stays
-// with the paper coupling. A cubic lattice at rest sums to lattice_sum m / a^3; dividing by it
-// makes the lattice stress-free. Walls and cloth add their half-space share (eq 9 of the seed with
-// the layer filled up).
+// belong to one energy, and a column that should come to rest boils: spiky serves for both
+// (docs/decisions/0026-one-kernel-for-density-and-pressure.md), poly6 the paper coupling alone. A
+// cubic lattice at rest sums to lattice_sum m / a^3; dividing by it makes the lattice stress-free.
+// Walls and cloth add their half-space fraction (eq 9 of Harada et al. 2007 with the layer filled
+// up).
 template <class Kernel>
 struct DensitySum {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
   ConstVecView position;
-  const float* cloth_share;                          // share of density replaced by cloth, or null
+  const float* cloth_share;  // fraction of density replaced by cloth, or null
   float *density, *pressure_term, *inverse_density;  // kg/m^3, p / rho^2 in m^5/(kg s^2), m^3/kg
   float support_radius;                              // m
   float scale;                                       // m Kernel::factor(h) / lattice_sum
   float rest_density;                                // kg/m^3
   float sound_speed2;                                // m^2/s^2
-  Walls walls;
+  HalfspaceWalls walls;
 
   DRENCH_HD Inputs<3> inputs() const { return {{position.x, position.y, position.z}}; }
 
@@ -70,9 +73,9 @@ struct DensitySum {
     sum.w = sum.w + Kernel::shape(length2(i.position - j.position), T(support_radius));
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
-    const float share = wall_density_share(walls, position[i], 1.f / support_radius) +
-                        (cloth_share ? cloth_share[i] : 0.f);
-    const float rho = scale * sum.w + rest_density * share, inverse = 1.f / rho;
+    const float fraction = wall_density_fraction(walls, position[i], 1.f / support_radius) +
+                           (cloth_share ? cloth_share[i] : 0.f);
+    const float rho = scale * sum.w + rest_density * fraction, inverse = 1.f / rho;
     density[i] = rho;
     inverse_density[i] = inverse;
     pressure_term[i] = sound_speed2 * max0(rho - rest_density) * inverse * inverse;

@@ -3,8 +3,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-// Pressure and viscosity between particles, and gravity and walls on each (seed eq 2 without
-// cloth):
+// Pressure and viscosity between particles, and gravity and walls on each (Harada et al. 2007, eq
+// 2, without cloth):
 //   a_i = -sum_j m (p_i/rho_i^2 + p_j/rho_j^2) grad W_spiky + mu sum_j m (v_j - v_i)/(rho_i rho_j)
 //   lap W_vis + g
 // Mueller, Charypar, Gross 2003 average the two pressures, which gives half the gradient of a
@@ -23,7 +23,7 @@ struct PressureViscosity {
   float wall_viscosity;     // Pa s, fluid on walls
   float rest_density;       // kg/m^3
   Vec3<float> gravity;      // m/s^2
-  Walls walls;
+  HalfspaceWalls walls;
 
   DRENCH_HD Inputs<8> inputs() const {
     return {{position.x, position.y, position.z, velocity.x, velocity.y, velocity.z, pressure_term,
@@ -51,10 +51,9 @@ struct PressureViscosity {
     acceleration.set(i, sum.force * scale + wall_acceleration(i) + gravity);
   }
 
-  /// p_i rho_0 / rho_i^2 times the half-space gradient of each wall, shares as in the density.
+  /// p_i rho_0 / rho_i^2 times the half-space gradient of each wall, fractions as in the density.
   /// Mirrored pressure would double it; but a wall stores no energy of its own, and twice the force
-  /// on the way out makes energy: 0.2 m of water at rest kept an rms speed of 0.3 m/s, against 0.02
-  /// m/s so.
+  /// as a particle leaves makes energy (docs/decisions/0027-walls-push-once.md).
   DRENCH_HD Vec3<float> wall_acceleration(int i) const {
     const Vec3<float> p = position[i], v = velocity[i];
     const float x[3] = {p.x, p.y, p.z}, u[3] = {v.x, v.y, v.z};
@@ -67,9 +66,9 @@ struct PressureViscosity {
     for (int k = 0; k < 3; ++k) {
       const float q = max0(walls.distance(k, x[k])) * inverse_h;
       if (q >= 1.f) continue;
-      const float share = open[(k + 1) % 3] * open[(k + 2) % 3] * rest_density;
-      a[k] += pressure_term[i] * share * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
-      const float drag = wall_viscosity * share * inverse_rho * inverse_rho *
+      const float fraction = open[(k + 1) % 3] * open[(k + 2) % 3] * rest_density;
+      a[k] += pressure_term[i] * fraction * spiky_plane(q) * inverse_h * walls.sign(k, x[k]);
+      const float drag = wall_viscosity * fraction * inverse_rho * inverse_rho *
                          viscosity_halfspace(q) * inverse_h * inverse_h;
       for (int m = 0; m < 3; ++m) {
         if (m != k) a[m] -= drag * u[m];

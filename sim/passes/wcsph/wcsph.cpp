@@ -8,30 +8,22 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-Walls walls_of(const Parameters& p) {
-  Walls walls{};
-  walls.scale = p.wall_scale;
-  for (int k = 0; k < 3; ++k)
-    walls.low[k] = p.low[k], walls.high[k] = p.high[k], walls.on[k] = p.wall[k];
-  return walls;
-}
-
 GridView grid_of(const State& state) { return {state.fluid.grid, state.fluid.cell_start.data()}; }
 
 template <class Kernel>
 DensitySum<Kernel> density_pass(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
-  return {f.position.view(),
-          f.cloth_share.size() ? f.cloth_share.data() : nullptr,
-          f.density.data(),
-          f.pressure_term.data(),
-          f.inverse_density.data(),
-          p.support_radius,
-          p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
-          p.rest_density,
-          p.sound_speed * p.sound_speed,
-          walls_of(p)};
+  return {.position = f.position.view(),
+          .cloth_share = f.cloth_share.size() ? f.cloth_share.data() : nullptr,
+          .density = f.density.data(),
+          .pressure_term = f.pressure_term.data(),
+          .inverse_density = f.inverse_density.data(),
+          .support_radius = p.support_radius,
+          .scale = p.particle_mass * Kernel::factor(p.support_radius) / p.lattice_sum,
+          .rest_density = p.rest_density,
+          .sound_speed2 = p.sound_speed * p.sound_speed,
+          .walls = halfspace_walls_of(p)};
 }
 
 }  // namespace
@@ -43,28 +35,28 @@ void sum_density(State& state) {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
   } else {
     for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
-                  sheet_filter(state, state.fluid.position.view(), Shaded::near));
+                  cloth_filter(state, state.fluid.position.view(), Shaded::near));
   }
 }
 
 void pressure_viscosity(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
-  const PressureViscosity pass{f.position.view(),
-                               f.velocity.view(),
-                               f.pressure_term.data(),
-                               f.inverse_density.data(),
-                               f.acceleration.view(),
-                               p.support_radius,
-                               p.particle_mass * spiky_gradient_factor(p.support_radius),
-                               p.dynamic_viscosity,
-                               p.wall_viscosity,
-                               p.rest_density,
-                               {p.gravity[0], p.gravity[1], p.gravity[2]},
-                               walls_of(p)};
+  const PressureViscosity pass{.position = f.position.view(),
+                               .velocity = f.velocity.view(),
+                               .pressure_term = f.pressure_term.data(),
+                               .inverse_density = f.inverse_density.data(),
+                               .acceleration = f.acceleration.view(),
+                               .support_radius = p.support_radius,
+                               .scale = p.particle_mass * spiky_gradient_factor(p.support_radius),
+                               .dynamic_viscosity = p.dynamic_viscosity,
+                               .wall_viscosity = p.wall_viscosity,
+                               .rest_density = p.rest_density,
+                               .gravity = {p.gravity[0], p.gravity[1], p.gravity[2]},
+                               .walls = halfspace_walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
-                  sheet_filter(state, state.fluid.position.view(), Shaded::hidden));
+                  cloth_filter(state, state.fluid.position.view(), Shaded::hidden));
   } else {
     for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
   }

@@ -1,0 +1,56 @@
+// What the step plan says of passes is what they do.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+
+#include "pipeline/contract/geometry/level_set.h"
+#include "pipeline/contract/shot/shot_file.h"
+#include "sim/step_plan.h"
+#include "tests/sim/support.h"
+
+namespace drench::sim_tests {
+namespace {
+
+std::string names_of(sim::ColumnSet set) {
+  std::string names;
+  for (size_t k = 0; k < sim::column_group_names.size(); ++k)
+    if (set.contains(sim::ColumnGroup(k)))
+      names += (names.empty() ? "" : ", ") + std::string(name_of(sim::ColumnGroup(k)));
+  return names;
+}
+
+struct Written {
+  sim::ColumnSet changed, declared;
+};
+
+/// By shot and pass, of the shots whose bits are kept: what launches in some steps changed. They
+/// use every pass.
+std::map<std::pair<std::string, std::string>, Written> written_in_kept_shots() {
+  std::map<std::pair<std::string, std::string>, Written> written;
+  for (const auto& entry : std::filesystem::directory_iterator(DRENCH_SOURCE_DIR "/tests/bits")) {
+    if (entry.path().extension() != ".toml") continue;
+    Stepper run(read_shot(entry.path(), {}), make_level_set);
+    run.solver->observe_passes([&](const sim::PassInfo& pass, sim::ColumnSet groups) {
+      Written& of = written[{entry.path().stem(), pass.name}];
+      of.changed |= groups, of.declared |= pass.writes;
+    });
+    for (int k = 0; k < 500; ++k) run.step();
+  }
+  return written;
+}
+
+TEST(Passes, TouchOnlyWhatTheyDeclare) {
+  std::map<std::string, sim::ColumnSet> changed, declared;
+  for (const auto& [name, written] : written_in_kept_shots()) {
+    EXPECT_EQ(names_of(written.changed.without(written.declared)), "")
+        << name.second << " writes what it does not declare, in " << name.first;
+    changed[name.second] |= written.changed, declared[name.second] |= written.declared;
+  }
+  for (const auto& [name, groups] : declared)
+    EXPECT_EQ(names_of(groups.without(changed[name])), "") << name << " declares what it leaves";
+}
+
+}  // namespace
+}  // namespace drench::sim_tests
