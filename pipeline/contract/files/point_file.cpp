@@ -17,11 +17,13 @@ namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
 
-// In the library, as those of vdb_trees.h are.
+// As in vdb_trees.h.
+#if defined(__OPTIMIZE__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 extern template class tree::Tree<points::PointDataTree::RootNodeType>;
 extern template class tree::Tree<tools::PointIndexTree::RootNodeType>;
 extern template class Grid<points::PointDataTree>;
 extern template class Grid<tools::PointIndexTree>;
+#endif
 
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb
