@@ -329,7 +329,7 @@ float choose_radius(const std::vector<Photon>& photons, const Imath::Box3f& boun
 
 }  // namespace
 
-PhotonMap::PhotonMap(std::vector<Photon> photons, int samples, int rounds) {
+PhotonMap::PhotonMap(const std::vector<Photon>& photons, int samples, int rounds) {
   if (photons.empty()) return;
   size_ = photons.size();
   for (const Photon& p : photons) reach_.extendBy(p.position);
@@ -452,7 +452,7 @@ Caustics trace_photons(const Scene& scene, uint32_t seed, uint32_t count, int sa
   for (const std::vector<Found>& part : found)
     for (const Found& f : part)
       if (walks == ManifoldWalks::none || !f.walked) left.push_back(f.photon);
-  out.photons = PhotonMap(std::move(left), samples, round.rounds);
+  out.photons = PhotonMap(left, samples, round.rounds);
   return out;
 }
 

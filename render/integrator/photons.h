@@ -71,7 +71,7 @@ class PhotonMap {
   PhotonMap() = default;
   /// @param samples  of a pixel, which may divide the photons
   /// @param rounds   maps of as many photons whose light is averaged
-  explicit PhotonMap(std::vector<Photon> photons, int samples = 1, int rounds = 1);
+  explicit PhotonMap(const std::vector<Photon>& photons, int samples = 1, int rounds = 1);
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
