@@ -316,9 +316,10 @@ class BackendSolver : public Solver {
       v->resize(c.padded);
     }
     c.force.clear();
-    for (VecColumn* v : {&c.air_diagonal, &c.air_cross, &c.air_push})
-      v->resize(state_.parameters.air_density > 0.f ? c.padded : 0);
-    if (state_.parameters.air_density > 0.f) from_host(c.air_share, t.air_share);
+    if (state_.parameters.air_density > 0.f) {
+      for (VecColumn* v : {&c.air_diagonal, &c.air_cross, &c.air_push}) v->resize(c.padded);
+      from_host(c.air_share, t.air_share);
+    }
     c.centroid.resize(c.triangles);
     c.sorted_low.resize(c.triangles + 8);
     c.sorted_high.resize(c.triangles + 8);

@@ -188,7 +188,9 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
   for (const Pass& pass : all_passes) {
     if (!pass.when(parameters, cloth)) continue;
     plan.push_back(pass);
-    if (cloth) plan.back().writes |= pass.writes_beside_cloth;
+    // The published coupling remembers nothing from step to step.
+    const ColumnSet forgotten = parameters.paper ? memory | near_cloth | start : ColumnSet();
+    if (cloth) plan.back().writes |= pass.writes_beside_cloth.without(forgotten);
   }
   return plan;
 }

@@ -145,7 +145,7 @@ void set_viscosity(const Shot& shot, Parameters& p) {
   for (int k = 0; k < 3; ++k) {
     for (int end = 0; end < 2; ++end) {
       for (int c = 0; c < 3; ++c)
-        p.wall_velocity[k][end][c] = float(velocity[size_t(2 * k + end)][c]);
+        p.wall_velocity[k][end][c] = float(velocity[2 * size_t(k) + size_t(end)][c]);
     }
   }
 }

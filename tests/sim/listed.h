@@ -39,10 +39,10 @@ struct Listed {
     sim::cpu::FluidState& f = state.fluid;
     f.count = count;
     using enum sim::ColumnGroup;
-    sim::cpu::resize_particles(
-        state,
-        position | velocity | cells | density | pressure | lists | projection | solve | scratch,
-        size_t(count));
+    sim::cpu::resize_particles(state,
+                               position | velocity | cells | sorting | density | pressure | lists |
+                                   projection | solve | scratch,
+                               size_t(count));
     const sim::cpu::VecView x = f.position.view();
     for (int i = 0; i < count; ++i) {
       const V3d& p = places[size_t(i)];

@@ -160,7 +160,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   const auto solver = sim::cpu::make_solver(scene.parameters, scene.cloth);
   solver->load(scene.start);
   solver->refresh();  // density by cells
-  const std::vector<float> expected = solver->density();
+  const std::vector<float> measured = solver->density();
   const double h = scene.parameters.support_radius;
   const sim::cpu::ImageWalls walls = sim::cpu::image_walls_of(scene.parameters);
 
@@ -169,10 +169,10 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
   sim::cpu::FluidState& f = state.fluid;
   const int n = f.count = int(scene.start.id.size());
   using enum sim::ColumnGroup;
-  sim::cpu::resize_particles(
-      state,
-      position | velocity | cells | density | pressure | lists | projection | solve | scratch,
-      size_t(n));
+  sim::cpu::resize_particles(state,
+                             position | velocity | cells | sorting | density | pressure | lists |
+                                 projection | solve | scratch,
+                             size_t(n));
   sim::cpu::PressureState& s = state.pressure;
   for (int i = 0; i < n; ++i) {
     const V3d p = at(scene.start.position, size_t(i));
@@ -214,7 +214,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
         scene.parameters.particle_mass / scene.parameters.lattice_sum / (h * h * h);
     const double rho = scale * sum + 1000 * wall.value;
     EXPECT_NEAR(f.density.data()[i], rho, 1e-4 * rho);
-    EXPECT_NEAR(expected[size_t(f.id.data()[i])], rho, 1e-4 * rho) << "measured";
+    EXPECT_NEAR(measured[size_t(f.id.data()[i])], rho, 1e-4 * rho) << "measured";
     rate *= scale / (h * h);
     rate += 1000 * V3d(wall.gradient.x, wall.gradient.y, wall.gradient.z).dot(vector(i));
     EXPECT_NEAR(s.product.data()[i], rate, 5);  // of a few 10^4 kg/(m^3 s)
