@@ -19,9 +19,8 @@ namespace drench {
 enum class Device { automatic, cpu, cuda };
 
 struct SimulatorOptions {
-  Device device = Device::automatic;          // automatic: CUDA when there is a device, else CPU
-  std::filesystem::path checkpoint_dir = {};  // named in the message of a blow-up; may be empty
-  LevelSetMaker level_set = {};               // make_level_set; needed for obstacles of type mesh
+  Device device = Device::automatic;  // automatic: CUDA when there is a device, else CPU
+  LevelSetMaker level_set = {};       // make_level_set; needed for obstacles of type mesh
 };
 
 /// What the last call to advance did, for logs and stats.jsonl.

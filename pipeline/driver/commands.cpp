@@ -164,7 +164,7 @@ ExecuteOptions execute_options(const ShotArguments& arguments) {
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style());
   const std::unique_ptr<Stages> stages =
-      shot_stages(job.shot, job.folder, {arguments.device, arguments.memory_gib});
+      shot_stages(job.shot, {arguments.device, arguments.memory_gib});
   Retries retries(job.folder, manifest);
   for (int attempt = 1;; ++attempt) {
     const Plan plan =

@@ -114,9 +114,8 @@ class ShotSimulation final : public Simulation {
 
 class ShotStages final : public Stages {
  public:
-  ShotStages(const Shot& shot, fs::path folder, const StageOptions& options)
+  ShotStages(const Shot& shot, const StageOptions& options)
       : shot_(shot),
-        folder_(std::move(folder)),
         options_(options),
         cache_(std::make_shared<render::SceneCache>(
             render::PictureMemory::within(options.memory_gib))) {
@@ -128,7 +127,6 @@ class ShotStages final : public Stages {
   std::unique_ptr<Simulation> start_simulation() override {
     SimulatorOptions options;
     options.device = options_.device;
-    options.checkpoint_dir = folder_ / "sim/checkpoint";
     options.level_set = level_sets_within(options_.memory_gib);
     return std::make_unique<ShotSimulation>(shot_, options);
   }
@@ -286,7 +284,6 @@ class ShotStages final : public Stages {
   }
 
   Shot shot_;
-  fs::path folder_;
   StageOptions options_;
   const std::shared_ptr<render::SceneCache> cache_;
 };
@@ -300,9 +297,8 @@ std::vector<std::string> NoisyFiles::all() const {
   return files;
 }
 
-std::unique_ptr<Stages> shot_stages(const Shot& shot, const fs::path& folder,
-                                    const StageOptions& options) {
-  return std::make_unique<ShotStages>(shot, folder, options);
+std::unique_ptr<Stages> shot_stages(const Shot& shot, const StageOptions& options) {
+  return std::make_unique<ShotStages>(shot, options);
 }
 
 }  // namespace drench

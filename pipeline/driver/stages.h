@@ -76,8 +76,7 @@ struct StageOptions {
   double memory_gib = 0;  // 0: the shot's own limit of surfacing grids stands
 };
 
-/// The simulator, the surfacing and the renderer of a shot in an output folder.
-std::unique_ptr<Stages> shot_stages(const Shot& shot, const std::filesystem::path& folder,
-                                    const StageOptions& options);
+/// The simulator, the surfacing and the renderer of a shot.
+std::unique_ptr<Stages> shot_stages(const Shot& shot, const StageOptions& options);
 
 }  // namespace drench

@@ -42,7 +42,7 @@ class Hollow : public testing::Test {
     return obstacle;
   }
   static Simulator simulator_of(const Shot& shot) {
-    return {shot, {.device = Device::cpu, .checkpoint_dir = {}, .level_set = make_level_set}};
+    return {shot, {.device = Device::cpu, .level_set = make_level_set}};
   }
   TemporaryFolder folder_;
 };

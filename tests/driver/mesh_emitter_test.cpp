@@ -49,7 +49,7 @@ class MeshEmitter : public testing::Test {
   }
   Shot shot_of(const FluidEmitter& emitter) const { return shot_of(std::vector{emitter}); }
   static Simulator simulator_of(const Shot& shot) {
-    return {shot, {.device = Device::cpu, .checkpoint_dir = {}, .level_set = make_level_set}};
+    return {shot, {.device = Device::cpu, .level_set = make_level_set}};
   }
   static std::string refusal(const Shot& shot) {
     try {
@@ -114,8 +114,7 @@ double share_of_flow(Shot shot, const V3d& velocity, double step) {
   shot.fluid.emitter[0].velocity = velocity;
   shot.gravity = V3d(0), shot.timeline.fps = 5, shot.time_step = step;
   shot.domain.min = V3d(-4), shot.domain.max = V3d(4);
-  Simulator simulator(shot,
-                      {.device = Device::cpu, .checkpoint_dir = {}, .level_set = make_level_set});
+  Simulator simulator(shot, {.device = Device::cpu, .level_set = make_level_set});
   const double area = (std::abs(velocity.x) + std::abs(velocity.y) + std::abs(velocity.z)) * 0.04;
   return (double(emitted_in(simulator, 2)) - 1000) * a * a * a / (area * 0.4);
 }

@@ -151,7 +151,7 @@ TEST(TurningFrame, LeavesWhatIsFreeAtRestInTheWorld) {
     shot.fluid.solver = solver;
     shot.fluid.box.clear();
     add_box(shot, V3d(0.4, 0.1, 0), {1, 1, 1});
-    Simulator simulator(shot, {.device = Device::cpu, .checkpoint_dir = {}, .level_set = {}});
+    Simulator simulator(shot, {.device = Device::cpu, .level_set = {}});
     simulator.preroll();
     const V3f from = simulator.particles().position.at(0);
     const V3d r = V3d(from) - shot.frame_center;

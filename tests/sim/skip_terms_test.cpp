@@ -48,7 +48,7 @@ struct End {
   std::vector<ClothFrame> cloth;
 };
 End end_of(const Shot& shot) {
-  Simulator simulator(shot, {.device = Device::cpu, .checkpoint_dir = {}, .level_set = {}});
+  Simulator simulator(shot, {.device = Device::cpu, .level_set = {}});
   for (int k = 0; k < 10; ++k) simulator.advance_frame();
   return {simulator.particles(), simulator.cloth()};
 }

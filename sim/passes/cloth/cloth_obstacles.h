@@ -221,7 +221,7 @@ void settle_at_obstacles(State& state, const ConstVecView& given, int most_itera
 /// and their own impulse.
 void finish_at_obstacles(State& state, const ConstVecView& given);
 
-/// The path test has stopped vertices where they were: obstacles carry them on.
+/// Continuous collision detection has stopped vertices where they were: obstacles carry them on.
 void carry_held_vertices(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND
