@@ -12,7 +12,7 @@ void sort_contacts(State& state, float reach) {
   const float contact_distance = contact_distance_of(state.parameters);
   int* key = state.contact.key.data();
   parallel_for(
-      "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
         const int t = triangle[i];
         if (t < 0) {
           key[i] = 2 * triangles;
@@ -20,8 +20,8 @@ void sort_contacts(State& state, float reach) {
         }
         key[i] = distance[i] - half_thickness[t] - contact_distance > reach ? triangles + t : t;
       });
-  stable_sort_keys(state.contact.key, state.fluid.count, 2 * triangles, state.contact.order,
-                   state.contact.start, state.scratch);
+  stable_sort_keys(state.queue, state.contact.key, state.fluid.count, 2 * triangles,
+                   state.contact.order, state.contact.start);
   state.contact.near = value_at(state.contact.start, 2 * triangles);
   state.contact.close = value_at(state.contact.start, triangles);
 }
@@ -69,7 +69,7 @@ void sum_by_triangle(State& state, Rows which, IdleCorners idle) {
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
   const bool skip = which == Rows::close && idle == IdleCorners::zero;
   parallel_for(
-      "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
+      state.queue, "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
         if (skip && start[t] == start[t + 1]) return;
         Vec3<float> sum[3] = {};
         for (int soft = 0; soft <= last; ++soft) {
@@ -96,7 +96,7 @@ void start_contacts(State& state) {
   const VecView force = cloth.force.view();
   const bool owes = state.owes;
   parallel_for(
-      "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
+      state.queue, "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
         const int index = c.index_in_list(row), i = index < 0 ? -1 : near.order[index];
         particle[row] = i;
         for (int k = 0; k < 3; ++k) {
@@ -108,14 +108,14 @@ void start_contacts(State& state) {
   const ConstVecView impulse = state.contact.impulse.view();
   if (owes) {
     sum_by_triangle(state, Rows::all);
-    state.fluid.owed.clear();
+    state.fluid.owed.clear(state.queue);
     state.owes = false;
   }
   float* contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
   parallel_for(
-      "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
         float weights = 0.f;
         near.for_each_corner(v, [&](int t, int e) {
           for (int row = near.start[t]; row < near.start[t + 1]; ++row) weights += c.weight[e][row];
@@ -141,22 +141,23 @@ void solve_contacts(State& state) {
   const float *inverse_mass = cloth.inverse_mass.data(), *contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
-      "contact: prepare", c.list.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
+      state.queue, "contact: prepare", c.list.rows,
+      DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
   for_each_lane(
-      "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
+      state.queue, "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
         update_contact(c, row + c.list.soft_begin, predicted, inverse_particle_mass, 1.f);
       });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
     for_each_lane(
-        "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
+        state.queue, "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
     sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close,
                     iteration > 1 ? IdleCorners::zero : IdleCorners::unset);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
-        "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
+        state.queue, "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
           if (contact_weight[v] == 0.f) return;
           const Vec3<float> sum = near.sum_on_vertex(impulse, v);
           predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
@@ -164,7 +165,7 @@ void solve_contacts(State& state) {
         });
   }
   parallel_for(
-      "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
         if (c.list.particle[row] >= 0) velocity.set(c.list.particle[row], c.velocity[row]);
       });
 }
@@ -183,7 +184,7 @@ void find_nearest_centroids(State& state) {
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
   const float reach = 1.f / polygons.grid.inverse_edge.x;
   parallel_for(
-      "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> p = position[i];
         triangle[i] = -1, edge[i] = 0.f, fraction[i] = 0.f, distance[i] = 1e30f;
         normal.set(i, {0.f, 0.f, 0.f});
@@ -235,7 +236,7 @@ void add_paper_forces(State& state) {
               mass = p.particle_mass;
   const float viscosity = p.wall_viscosity * mass / (spacing * spacing * h * h * h);
   parallel_for(
-      "paper: forces", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "paper: forces", f.count, DRENCH_LAMBDA(int i) {
         impulse.set(i, {0.f, 0.f, 0.f});
         const int t = triangle[i];
         if (t < 0) return;
@@ -263,7 +264,7 @@ void gather_paper_reaction(State& state) {
   const VecView force = c.force.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
-      "paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
         Vec3<float> sum{0.f, 0.f, 0.f};
         near.for_each_corner(v, [&](int t, int corner) {
           for (int k = near.start[t]; k < near.start[t + 1]; ++k) {
