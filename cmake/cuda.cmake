@@ -1,11 +1,17 @@
-# The CUDA simulator is built whenever nvcc is there: code for sm_90 and PTX for anything from 8.0 on.
+# The CUDA simulator is built whenever nvcc is there: PTX for anything from 8.0 on, and code for sm_90
+# made of the same PTX. PTX for 9.0 would be the same but for its name, and is most of nvcc's time.
+# CMAKE_CUDA_ARCHITECTURES asks for others.
 set(DRENCH_HAS_CUDA OFF)
 if(NOT DRENCH_CUDA STREQUAL OFF)
-  set(CMAKE_CUDA_ARCHITECTURES "80-virtual;90-real" CACHE STRING "CUDA architectures")
+  if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+    set(CMAKE_CUDA_ARCHITECTURES OFF)
+    set(cuda_code " --generate-code=arch=compute_80,code=[compute_80,sm_90]")
+  endif()
   include(CheckLanguage)
   check_language(CUDA)
   if(CMAKE_CUDA_COMPILER)
     enable_language(CUDA)
+    string(APPEND CMAKE_CUDA_FLAGS "${cuda_code}")
     find_package(CUDAToolkit REQUIRED)
     set(DRENCH_HAS_CUDA ON)
   elseif(DRENCH_CUDA STREQUAL ON)

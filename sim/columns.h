@@ -86,10 +86,10 @@ void for_each_solve_column(S& state, const Visit& visit) {
   using enum Extent;
   using Group = ColumnGroup;
   visit({"cell_start", "1", Group::cells}, state.fluid.cell_start, none);
-  visit({"histogram", "1", Group::sorting}, state.scratch.histogram, none);
-  visit({"order_in", "1", Group::sorting}, state.scratch.order_in, none);
-  visit({"key_out", "1", Group::sorting}, state.scratch.key_out, none);
-  visit({"bytes", "1", Group::sorting}, state.scratch.bytes, none);
+  visit({"histogram", "1", Group::sorting}, state.queue.sort.histogram, none);
+  visit({"order_in", "1", Group::sorting}, state.queue.sort.order_in, none);
+  visit({"key_out", "1", Group::sorting}, state.queue.sort.key_out, none);
+  visit({"bytes", "1", Group::sorting}, state.queue.sort.bytes, none);
   visit({"lists.block", "1", Group::lists}, p.lists.block, none);
   visit({"lists.base", "1", Group::lists}, p.lists.base, none);
   visit({"lists.begin", "1", Group::lists}, p.lists.begin, none);

@@ -87,7 +87,7 @@ class BackendSolver : public Solver {
       upload(column, values.size() == n ? values : repeated(column, n, info.initial));
       if (info.extent == Extent::vertices) column.resize(state_.cloth.padded);
     });
-    state_.fluid.far_by.clear_bytes(0);
+    state_.fluid.far_by.clear_bytes(state_.queue, 0);
     state_.owes = true;
     state_.guard_hits = host.guard_hits;
     state_.guard_holds = host.guard_holds;
@@ -218,7 +218,7 @@ class BackendSolver : public Solver {
     from_host(o.view, views);
     const Parameters& p = state_.parameters;
     o.stopped.resize(size_t(4) * (which == Solids::sinks ? p.sinks : p.obstacles));
-    o.stopped.clear_bytes(0);
+    o.stopped.clear_bytes(state_.queue, 0);
   }
   void blow(const WindNow& wind) override { state_.wind = wind; }
   void drive(const FrameNow& frame) override {
@@ -315,7 +315,7 @@ class BackendSolver : public Solver {
          {&c.position, &c.velocity, &c.next, &c.next_velocity, &c.start, &c.predicted, &c.force}) {
       v->resize(c.padded);
     }
-    c.force.clear();
+    c.force.clear(state_.queue);
     if (state_.parameters.air_density > 0.f) {
       for (VecColumn* v : {&c.air_diagonal, &c.air_cross, &c.air_push}) v->resize(c.padded);
       from_host(c.air_share, t.air_share);

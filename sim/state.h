@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "sim/backend/sort.h"
+#include "sim/backend/queue.h"
 #include "sim/frame_now.h"
 #include "sim/neighbours/grid.h"
 #include "sim/neighbours/neighbours.h"
@@ -22,7 +22,9 @@ struct VecColumn {
   ConstVecView view() const { return {x.data(), y.data(), z.data()}; }
   void resize(size_t n) { x.resize(n), y.resize(n), z.resize(n); }
   void swap(VecColumn& o) noexcept { x.swap(o.x), y.swap(o.y), z.swap(o.z); }
-  void clear() { x.clear_bytes(0), y.clear_bytes(0), z.clear_bytes(0); }
+  void clear(Queue& queue) {
+    for (Column<float>* c : {&x, &y, &z}) c->clear_bytes(queue, 0);
+  }
 };
 
 /// Particles, sorted by cell at the start of every step.
@@ -294,8 +296,8 @@ struct State {
   ContactState contact;
   ObstacleState obstacles, sinks;
   WindNow wind;
-  FrameNow frame;  // where Parameters::turns
-  SortScratch scratch;
+  FrameNow frame;       // where Parameters::turns
+  mutable Queue queue;  // where launches go, of what only reads the state as well
   Column<float> swap_float;
   double dt = 0;     // s, of the step being made
   int substeps = 1;  // cloth steps in it

@@ -196,7 +196,7 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
 }
 
 void step_cloth_alone(State& state) {
-  state.cloth.force.clear();
+  state.cloth.force.clear(state.queue);
   if (state.parameters.turns) turn_frame(state);
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
 }

@@ -17,6 +17,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 #if defined(__CUDACC__)
 
+class Queue;
+
 template <class T>
 class Column {
  public:
@@ -56,9 +58,7 @@ class Column {
     if (size == 0) return;
     check_cuda(cudaMemcpy(target, data_, size * sizeof(T), cudaMemcpyDeviceToHost), "downloading");
   }
-  void clear_bytes(int byte) {
-    if (size_) check_cuda(cudaMemsetAsync(data_, byte, size_ * sizeof(T)), "clearing");
-  }
+  void clear_bytes(Queue& queue, int byte);  // queue.h
   T* data() { return data_; }
   const T* data() const { return data_; }
   size_t size() const { return size_; }
@@ -74,6 +74,8 @@ class Column {
 };
 
 #else
+
+struct Queue;
 
 /// Eight elements of room stand behind the last one, so that a pack may be read where the column
 /// ends.
@@ -91,9 +93,7 @@ class Column {
   void download(T* target, size_t size) const {
     if (size) std::memcpy(target, data_.data(), size * sizeof(T));
   }
-  void clear_bytes(int byte) {
-    if (!data_.empty()) std::memset(data_.data(), byte, data_.size() * sizeof(T));
-  }
+  void clear_bytes(Queue& queue, int byte);  // queue.h
   T* data() { return data_.data(); }
   const T* data() const { return data_.data(); }
   size_t size() const { return size_; }

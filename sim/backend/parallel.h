@@ -3,8 +3,8 @@
 // Results never depend on the number of threads: every index writes its own element, and the only
 // reductions are maxima and minima (order-free) or sums over fixed chunks.
 
-#include "sim/backend/column.h"
 #include "sim/backend/pack.h"
+#include "sim/backend/queue.h"
 
 #if defined(__CUDACC__)
 #else
@@ -27,16 +27,16 @@ __global__ void launch_for(int n, F f) {
 
 /// f(0..n-1), each index by a thread of its own. @param name  of the launch, in errors and profiles
 template <class F>
-void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
+void parallel_for(Queue& queue, const char* name, int n, const F& f) {
   if (n <= 0) return;
-  launch_for<<<(n + 127) / 128, 128>>>(n, f);
+  launch_for<<<(n + 127) / 128, 128, 0, queue.stream()>>>(n, f);
   check_cuda(cudaGetLastError(), name);
 }
 
 /// A launch whose index is eight consecutive ones at once on a CPU core.
 template <class F>
-void for_each_lane(const char* name, int n, const F& f) {
-  parallel_for(name, n, f);
+void for_each_lane(Queue& queue, const char* name, int n, const F& f) {
+  parallel_for(queue, name, n, f);
 }
 
 constexpr int reduce_block = 256, reduce_blocks = 128;
@@ -61,16 +61,17 @@ __global__ void launch_reduce(int n, T start, F f, Combine combine, T* out) {
 
 /// combine over f(0..n-1) by a fixed tree; waits for the device.
 template <class T, class F, class Combine>
-T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
+T parallel_reduce(Queue& queue, const char* name, int n, T start, const F& f,
                   const Combine& combine) {
   if (n <= 0) return start;
-  static Column<T> partial;  // one simulator a process uses the device at a time
-  partial.resize(reduce_blocks);
+  T* partial = queue.partial<T>(reduce_blocks);
   const int blocks = std::min(reduce_blocks, (n + reduce_block - 1) / reduce_block);
-  launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
+  launch_reduce<<<blocks, reduce_block, 0, queue.stream()>>>(n, start, f, combine, partial);
   check_cuda(cudaGetLastError(), name);
   T value = start;
-  for (const T& part : to_host(partial, blocks)) value = combine(value, part);
+  std::vector<T> parts(blocks);
+  check_cuda(cudaMemcpy(parts.data(), partial, blocks * sizeof(T), cudaMemcpyDeviceToHost), name);
+  for (const T& part : parts) value = combine(value, part);
   return value;
 }
 
@@ -82,13 +83,13 @@ __global__ void launch_then(int blocks, T value, const T* partial, Combine combi
 
 /// As parallel_reduce, but the result goes to `then` on the device: the host does not wait.
 template <class T, class F, class Combine, class Then>
-void reduce_then(const char* name, int n, T start, const F& f, const Combine& combine,
+void reduce_then(Queue& queue, const char* name, int n, T start, const F& f, const Combine& combine,
                  const Then& then) {
-  static Column<T> partial;
-  partial.resize(reduce_blocks);
+  T* partial = queue.partial<T>(reduce_blocks);
   const int blocks = std::min(reduce_blocks, (n + reduce_block - 1) / reduce_block);
-  if (n > 0) launch_reduce<<<blocks, reduce_block>>>(n, start, f, combine, partial.data());
-  launch_then<<<1, 1>>>(blocks, start, partial.data(), combine, then);
+  if (n > 0)
+    launch_reduce<<<blocks, reduce_block, 0, queue.stream()>>>(n, start, f, combine, partial);
+  launch_then<<<1, 1, 0, queue.stream()>>>(blocks, start, partial, combine, then);
   check_cuda(cudaGetLastError(), name);
 }
 
@@ -96,7 +97,7 @@ void reduce_then(const char* name, int n, T start, const F& f, const Combine& co
 
 /// f(0..n-1) on all cores.
 template <class F>
-void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
+void parallel_for(Queue&, const char*, int n, const F& f) {
   constexpr int grain = 256;
   if (n <= grain) {
     for (int i = 0; i < n; ++i) f(i);
@@ -110,14 +111,13 @@ void parallel_for([[maybe_unused]] const char* name, int n, const F& f) {
 /// A launch whose index is eight consecutive ones at once; columns are padded to a multiple of
 /// eight.
 template <class F>
-void for_each_lane(const char* name, int n, const F& f) {
-  parallel_for(name, (n + 7) / 8, [&](int block) { f(Lanes{8 * block}); });
+void for_each_lane(Queue& queue, const char* name, int n, const F& f) {
+  parallel_for(queue, name, (n + 7) / 8, [&](int block) { f(Lanes{8 * block}); });
 }
 
 /// combine over f(0..n-1), chunk by chunk of fixed size, chunks in order.
 template <class T, class F, class Combine>
-T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
-                  const Combine& combine) {
+T parallel_reduce(Queue&, const char*, int n, T start, const F& f, const Combine& combine) {
   constexpr int chunk = 4096;
   const int chunks = (n + chunk - 1) / chunk;
   std::vector<T> partial(chunks, start);
@@ -133,9 +133,9 @@ T parallel_reduce([[maybe_unused]] const char* name, int n, T start, const F& f,
 
 /// As parallel_reduce, but the result goes to `then` where the data are.
 template <class T, class F, class Combine, class Then>
-void reduce_then(const char* name, int n, T start, const F& f, const Combine& combine,
+void reduce_then(Queue& queue, const char* name, int n, T start, const F& f, const Combine& combine,
                  const Then& then) {
-  then(parallel_reduce(name, n, start, f, combine));
+  then(parallel_reduce(queue, name, n, start, f, combine));
 }
 
 #endif
@@ -146,13 +146,13 @@ struct Either {
 
 /// Is f true in any lane? f is called for all of them.
 template <class F>
-bool any_lane(const char* name, int n, const F& f) {
+bool any_lane(Queue& queue, const char* name, int n, const F& f) {
 #if defined(__CUDACC__)
   return parallel_reduce(
-             name, n, 0, [=] __device__(int i) { return int(f(i)); }, Either{}) != 0;
+             queue, name, n, 0, [=] __device__(int i) { return int(f(i)); }, Either{}) != 0;
 #else
   std::atomic<int> any{0};
-  for_each_lane(name, n, [&](Lanes i) {
+  for_each_lane(queue, name, n, [&](Lanes i) {
     if ((f(i) & below(i, n)).bits()) any.store(1, std::memory_order_relaxed);
   });
   return any != 0;
@@ -185,9 +185,9 @@ struct Two {
 
 /// f of all lanes returns Two; their sums go to then(a, b) where the data are.
 template <class F, class Then>
-void sum_lanes_then(const char* name, int n, const F& f, const Then& then) {
+void sum_lanes_then(Queue& queue, const char* name, int n, const F& f, const Then& then) {
   reduce_then(
-      name, n, Two<double>{0., 0.},
+      queue, name, n, Two<double>{0., 0.},
       [=] __device__(int i) {
         const Two<float> one = f(i);
         return Two<double>{one.a, one.b};
@@ -200,7 +200,7 @@ void sum_lanes_then(const char* name, int n, const F& f, const Then& then) {
 /// f of all lanes returns Two; their sums, in float within fixed chunks, in double over these, go
 /// to then(a, b) where the data are. Columns are padded to a multiple of eight, with zeros.
 template <class F, class Then>
-void sum_lanes_then(const char*, int n, const F& f, const Then& then) {
+void sum_lanes_then(Queue&, const char*, int n, const F& f, const Then& then) {
   constexpr int chunk = 64;
   const int packs = (n + 7) / 8, chunks = (packs + chunk - 1) / chunk;
   std::vector<Two<double>> partial(chunks);

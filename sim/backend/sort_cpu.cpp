@@ -7,8 +7,8 @@
 
 namespace drench::sim::cpu {
 
-void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>& order,
-                      Column<int>& start, SortScratch& scratch) {
+void stable_sort_keys(Queue& queue, const Column<int>& keys, int n, int key_count,
+                      Column<int>& order, Column<int>& start) {
   const int threads = ::tbb::this_task_arena::max_concurrency();
   // A histogram a chunk costs key_count integers: no more of them than the points pay for.
   int chunks = n / (key_count + 1) + 1;
@@ -18,9 +18,10 @@ void stable_sort_keys(const Column<int>& keys, int n, int key_count, Column<int>
   const size_t keys_and_out = size_t(key_count) + 1, stride = (keys_and_out + 31) / 32 * 32;
   order.resize(n);
   start.resize(keys_and_out);
-  scratch.histogram.resize(stride * chunks);
-  scratch.histogram.clear_bytes(0);
-  int* histogram = scratch.histogram.data();
+  Column<int>& counts = queue.sort.histogram;
+  counts.resize(stride * chunks);
+  counts.clear_bytes(queue, 0);
+  int* histogram = counts.data();
   const int* key = keys.data();
   const auto begin = [=](int c) { return int(int64_t(n) * c / chunks); };
 

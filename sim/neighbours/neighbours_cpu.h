@@ -168,8 +168,8 @@ inline void order_visits(const GridView& grid, std::vector<NeighbourLists::Range
 
 /// Lists of all particles. density(i, sum) gets the sum of Kernel::value over the neighbours.
 template <class Kernel, class Density, class Filter = NoFilter>
-void build_neighbour_lists(const GridView& grid, int n, const ConstVecView& position, float h,
-                           NeighbourLists& lists, SortScratch&, const Density& density,
+void build_neighbour_lists(Queue&, const GridView& grid, int n, const ConstVecView& position,
+                           float h, NeighbourLists& lists, const Density& density,
                            const Filter& filter = {}) {
   lists.begin.resize(n), lists.blocks.resize(n);
   order_visits(grid, lists.visits);
@@ -273,7 +273,8 @@ DRENCH_HD void visit_neighbours(const NeighbourView& list, const Float4* const* 
 }
 
 template <class Physics>
-void for_each_neighbour(const char*, const NeighbourLists& lists, int, const Physics& physics) {
+void for_each_neighbour(Queue&, const char*, const NeighbourLists& lists, int,
+                        const Physics& physics) {
   if (physics.idle()) return;
   const NeighbourView list = view_of(lists);
   const auto inputs = physics.inputs();

@@ -28,23 +28,23 @@ __device__ void for_each_within(const GridView& grid, const ConstVecView& positi
 }
 
 template <class Kernel, class Density, class Filter = NoFilter>
-void build_neighbour_lists(const GridView& grid, int n, const ConstVecView& position, float h,
-                           NeighbourLists& lists, SortScratch& scratch, const Density& density,
+void build_neighbour_lists(Queue& queue, const GridView& grid, int n, const ConstVecView& position,
+                           float h, NeighbourLists& lists, const Density& density,
                            const Filter& filter = {}) {
   lists.begin.resize(size_t(n) + 1), lists.blocks.resize(n);
   int* blocks = lists.blocks.data();
-  parallel_for("neighbours: count", n, [=] __device__(int i) {
+  parallel_for(queue, "neighbours: count", n, [=] __device__(int i) {
     BlockFiller filler;
     for_each_within(grid, position, i, h, filter, [&](int j, float) { filler.opens(j); });
     blocks[i] = filler.blocks;
   });
-  exclusive_scan(lists.blocks, n, lists.begin, scratch);
+  exclusive_scan(queue, lists.blocks, n, lists.begin);
   const size_t all = value_at(lists.begin, n);
   if (lists.block.size() < all) lists.block.renew(all + all / 16), lists.base.renew(all + all / 16);
   NeighbourBlock* block = lists.block.data();
   int* base = lists.base.data();
   const unsigned* first = lists.begin.data();
-  parallel_for("neighbours: fill", n, [=] __device__(int i) {
+  parallel_for(queue, "neighbours: fill", n, [=] __device__(int i) {
     BlockFiller filler;
     NeighbourBlock* to = block + first[i] - 1;
     float sum = 0.f;
@@ -99,10 +99,10 @@ __global__ void launch_neighbours(NeighbourView list, int n, Physics physics) {
 }
 
 template <class Physics>
-void for_each_neighbour(const char* name, const NeighbourLists& lists, int n,
+void for_each_neighbour(Queue& queue, const char* name, const NeighbourLists& lists, int n,
                         const Physics& physics) {
   if (n <= 0) return;
-  launch_neighbours<<<(n + 127) / 128, 128>>>(view_of(lists), n, physics);
+  launch_neighbours<<<(n + 127) / 128, 128, 0, queue.stream()>>>(view_of(lists), n, physics);
   check_cuda(cudaGetLastError(), name);
 }
 

@@ -92,10 +92,10 @@ __global__ void launch_pairs(GridView grid, int n, Physics physics, Filter filte
 }
 
 template <class Physics, class Filter = NoFilter>
-void for_each_pair(const char* name, const GridView& grid, int n, const Physics& physics,
-                   const Filter& filter = {}) {
+void for_each_pair(Queue& queue, const char* name, const GridView& grid, int n,
+                   const Physics& physics, const Filter& filter = {}) {
   if (n <= 0) return;
-  launch_pairs<<<(n + 127) / 128, 128>>>(grid, n, physics, filter);
+  launch_pairs<<<(n + 127) / 128, 128, 0, queue.stream()>>>(grid, n, physics, filter);
   check_cuda(cudaGetLastError(), name);
 }
 
@@ -277,8 +277,8 @@ typename Physics::template Sum<float> add_lanes(const typename Physics::template
 }
 
 template <class Physics, class Filter = NoFilter>
-void for_each_pair([[maybe_unused]] const char* name, const GridView& grid, [[maybe_unused]] int n,
-                   const Physics& physics, const Filter& filter = {}) {
+void for_each_pair(Queue&, const char*, const GridView& grid, int, const Physics& physics,
+                   const Filter& filter = {}) {
   const GridShape& g = grid.shape;
   ::tbb::parallel_for(::tbb::blocked_range<int>(0, g.ny * g.nz, 4), [&](const auto& range) {
     Tile& tile = of_this_thread<Tile>();

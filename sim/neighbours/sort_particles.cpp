@@ -9,19 +9,19 @@ namespace drench::sim::DRENCH_BACKEND {
 namespace {
 
 template <class T>
-void permute(Column<T>& column, Column<T>& spare, const int* order, int n) {
+void permute(Queue& queue, Column<T>& column, Column<T>& spare, const int* order, int n) {
   const T* from = column.data();
   T* to = spare.data();
   parallel_for(
-      "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
+      queue, "permute", n, DRENCH_LAMBDA(int i) { to[i] = from[order[i]]; });
   column.swap(spare);
 }
 void permute(Column<float>& column, State& state, const int* order, int n) {
-  permute(column, state.swap_float, order, n);
+  permute(state.queue, column, state.swap_float, order, n);
 }
 /// The cells of particles are of no use any more.
 void permute(Column<int>& column, State& state, const int* order, int n) {
-  permute(column, state.fluid.cell, order, n);
+  permute(state.queue, column, state.fluid.cell, order, n);
 }
 void permute(VecColumn& column, State& state, const int* order, int n) {
   for (Column<float>* c : {&column.x, &column.y, &column.z}) permute(*c, state, order, n);
@@ -40,7 +40,7 @@ void sort_by_cell(State& state) {
   const Vec3<float> support{p.support_radius, p.support_radius, p.support_radius},
       lower = Vec3<float>{domain.low[0], domain.low[1], domain.low[2]} - support,
       upper = Vec3<float>{domain.high[0], domain.high[1], domain.high[2]} + support;
-  Bounds box = bounds_of_points("fluid bounds", x, n);
+  Bounds box = bounds_of_points(state.queue, "fluid bounds", x, n);
   const auto clamped = [&](Vec3<float> q) {
     return Vec3<float>{minimum(maximum(q.x, lower.x), upper.x),
                        minimum(maximum(q.y, lower.y), upper.y),
@@ -56,14 +56,14 @@ void sort_by_cell(State& state) {
   const int lost = grid.cells(), sinks = state.sinks.count;
   int* cell = f.cell.data();
   parallel_for(
-      "fluid cells", n, DRENCH_LAMBDA(int i) {
+      state.queue, "fluid cells", n, DRENCH_LAMBDA(int i) {
         const Vec3<float> q = x[i];
         const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y &&
                             q.z >= lower.z && q.z <= upper.z;
         cell[i] = inside ? grid.cell(q) : lost + sinks;
       });
   if (state.sinks.count > 0) mark_drained(state, lost);
-  stable_sort_keys(f.cell, n, lost + state.sinks.count, f.order, f.cell_start, state.scratch);
+  stable_sort_keys(state.queue, f.cell, n, lost + state.sinks.count, f.order, f.cell_start);
 }
 
 void sort_particles(State& state) {

@@ -240,6 +240,25 @@ TEST_P(Cuda, GivesTheSameBitsInEveryRun) {
   EXPECT_TRUE(same_bits(a.cloth_velocity, b.cloth_velocity));
 }
 
+// Each on a queue of its own, with scratch of its own.
+TEST_P(Cuda, GivesTheSameBitsBesideAnotherSolver) {
+  Shot wave = pour_on_sheet();
+  wave.fluid.solver = projected, without_sheet(wave);
+  const sim::Scene other = sim::build_scene(wave);
+  const auto stepper = [](const sim::Scene& of) {
+    return sim::Stepper(of, sim::cuda::make_solver(of.parameters, of.cloth));
+  };
+  sim::Stepper beside = stepper(other), run = stepper(scene);
+  for (int s = 0; s < 5; ++s) {
+    beside.step(step_of(other.parameters));
+    run.step(step_of(scene.parameters));
+  }
+  const sim::HostState alone = on_cuda(scene, 5), in_turns = run.solver->save();
+  EXPECT_EQ(alone.id, in_turns.id);
+  EXPECT_TRUE(same_bits(alone.position, in_turns.position));
+  EXPECT_TRUE(same_bits(alone.cloth_position, in_turns.cloth_position));
+}
+
 INSTANTIATE_TEST_SUITE_P(Cases, Cuda, ::testing::ValuesIn(situations),
                          [](const auto& situation) { return situation.param.name; });
 

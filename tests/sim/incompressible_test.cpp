@@ -101,7 +101,7 @@ TEST(PressureRows, DensityOfTheStepAndOfTheMeasureAreTheSum) {
   for (int i = 0; i < listed.count(); ++i)
     EXPECT_NEAR(listed.state.fluid.density.data()[i], expected[size_t(i)],
                 1e-4 * expected[size_t(i)]);
-  listed.state.fluid.density.clear_bytes(0);
+  listed.state.fluid.density.clear_bytes(listed.state.queue, 0);
   sim::cpu::measure_density(listed.state);
   for (int i = 0; i < listed.count(); ++i)
     EXPECT_NEAR(listed.state.fluid.density.data()[i], expected[size_t(i)],

@@ -171,7 +171,7 @@ class ViscousMatrix : public testing::Test {
   std::vector<V3d> times(const std::vector<V3d>& x) {
     for (size_t i = 0; i < x.size(); ++i)
       vector.data()[i] = {float(x[i].x), float(x[i].y), float(x[i].z), 0.f};
-    for_each_neighbour("product", listed.state.pressure.lists, listed.count(),
+    for_each_neighbour(listed.state.queue, "product", listed.state.pressure.lists, listed.count(),
                        sim::cpu::ViscousProduct<sim::cpu::Straight>{
                            viscous_pairs_of(listed.state, sim::cpu::Straight{}), vector.data(),
                            product.data(), &done});
@@ -219,7 +219,7 @@ TEST_F(ViscousMatrix, BlocksAreInverse) {
   sim::cpu::Column<sim::cpu::Float4> diagonal, cross;
   diagonal.resize(500), cross.resize(500);
   for_each_neighbour(
-      "blocks", listed.state.pressure.lists, listed.count(),
+      listed.state.queue, "blocks", listed.state.pressure.lists, listed.count(),
       sim::cpu::ViscousBlocks<sim::cpu::Straight>{
           viscous_pairs_of(listed.state, sim::cpu::Straight{}), diagonal.data(), cross.data()});
   for (const size_t i : {size_t(0), size_t(170), size_t(499)}) {

@@ -16,7 +16,7 @@ void blow_at_cloth(State& state, const ConstVecView& position, const ConstVecVie
   const WindNow wind = state.wind;
   const AirDrag drag = air_drag_of(state);
   parallel_for(
-      "wind on cloth", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "wind on cloth", c.vertices, DRENCH_LAMBDA(int i) {
         const Vec3<float> air = wind_at(wind, position[i]);
         Vec3<float> d{0.f, 0.f, 0.f}, m{0.f, 0.f, 0.f};
         for (int k = fan_start[i]; k < fan_start[i + 1]; ++k) {
@@ -59,7 +59,7 @@ void wind_on_fluid(State& state) {
   const float rest = 1.f / p.rest_density;
   const float step = float(state.dt) * 0.5f * p.air_density * p.fluid_drag / p.particle_mass;
   parallel_for(
-      "wind on fluid", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "wind on fluid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> u = wind_at(wind, x[i]) - v[i];
         const float speed = length(u);
         if (!(speed > 1e-6f)) return;

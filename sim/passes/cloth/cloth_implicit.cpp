@@ -22,7 +22,7 @@ void cloth_verlet(State& state, const ClothBuffers& b, float dt) {
   const ConstVecView air_push = c.air_push.view();
   if (air.on) blow_at_cloth(state, b.position, b.velocity);
   for_each_lane(
-      "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
+      state.queue, "cloth: damped Verlet", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
         const T w = load(inverse_mass, i);
         const auto free = w > T(0.f);
@@ -58,7 +58,7 @@ void cloth_predict(State& state) {
   const VecView predicted = c.predicted.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
-      "cloth: mean velocity", c.vertices,
+      state.queue, "cloth: mean velocity", c.vertices,
       DRENCH_LAMBDA(int i) { predicted.set(i, (to[i] - from[i]) * inverse_dt); });
 }
 
@@ -82,9 +82,9 @@ void linearise_cloth(State& state) {
   const ConstVecView air_push = c.air_push.view();
   ClothControl* control = s.control.data();
   parallel_for(
-      "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+      state.queue, "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   for_each_lane(
-      "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
+      state.queue, "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(mass, i));
         const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
         const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
@@ -133,7 +133,7 @@ void hold_at_walls(State& state) {
   const float reach = state.parameters.spacing;  // a step is not to end farther off
   const float* inertia = s.inertia.data();
   parallel_for(
-      "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "cloth: hold at walls", c.vertices, DRENCH_LAMBDA(int i) {
         const Vec3<float> straight = x[i] + v[i] * dt,
                           to = straight + block.times(i, base[i] + right[i]);
         Vec3<float> stop = to, unused{0.f, 0.f, 0.f}, axes = free[i], w = change[i];
@@ -165,7 +165,7 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
   for (const VertexRange& sheet : state.cloth.loose) {
     const int first = sheet.first;
     reduce_then(
-        "cloth: lack", sheet.count, ClothImbalance{},
+        state.queue, "cloth: lack", sheet.count, ClothImbalance{},
         DRENCH_LAMBDA(int k) {
           const int i = first + k;
           const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
@@ -181,7 +181,7 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
                             float(lack.z * inverse)};
         });
     parallel_for(
-        "cloth: balance", sheet.count,
+        state.queue, "cloth: balance", sheet.count,
         DRENCH_LAMBDA(int k) { w.set(first + k, w[first + k] + control->shift); });
   }
 }
@@ -196,10 +196,11 @@ void hold_at_obstacles(State& state) {
   float* slides = s.slides.data();
   const BlockInverse block = block_inverse(state);
   const ClothHold hold = cloth_hold_of(state);
-  state.cloth_system.normal.clear();
-  state.cloth_system.rub.clear();  // what is held in a later round would feel the last step's
+  state.cloth_system.normal.clear(state.queue);
+  // What is held in a later round would feel the last step's.
+  state.cloth_system.rub.clear(state.queue);
   parallel_for(
-      "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
         hold.grip[i] = -1, slides[i] = 1.f;
         hold.free_block.copy(i, hold.block);
         if (inverse_mass[i] == 0.f) return;
@@ -223,7 +224,7 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
   const VecView reaction = s.residual.view();
   // The springs of a vertex reach others, whose constraints must not change meanwhile.
   parallel_for(
-      "cloth: reactions", c.vertices,
+      state.queue, "cloth: reactions", c.vertices,
       DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
   const HoldRevision revise{.hold = cloth_hold_of(state),
                             .position = c.position.view(),
@@ -239,8 +240,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
                             .dt = float(state.dt),
                             .round = round};
   return parallel_reduce(
-             "cloth: revise", c.vertices, 0, DRENCH_LAMBDA(int i) { return int(revise(i)); },
-             Larger{}) > 0;
+             state.queue, "cloth: revise", c.vertices, 0,
+             DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
 }
 
 }  // namespace
@@ -252,7 +253,8 @@ void settle_at_obstacles(State& state, const ConstVecView& given, int most_itera
   const VecView change = s.change.view();
   const VecView right = s.answer.view();
   parallel_for(
-      "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
+      state.queue, "cloth: given", state.cloth.padded,
+      DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
   for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
     solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
 }
@@ -268,7 +270,7 @@ void finish_at_obstacles(State& state, const ConstVecView& given) {
   const ClothMatrix matrix = cloth_matrix(state);
   const ClothHold hold = cloth_hold_of(state);
   parallel_for(
-      "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
         if (inverse_mass[i] == 0.f) return;
         Vec3<float> to = next[i], u = velocity[i];
         const int k = hold.grip[i];
@@ -295,7 +297,7 @@ void carry_held_vertices(State& state) {
   const int* held = c.held.data();
   const ClothHold hold = cloth_hold_of(state);
   parallel_for(
-      "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
         if (!held[i] || inverse_mass[i] == 0.f) return;
         Vec3<float> to = next[i], u = velocity[i];
         hold.guard(i, mass[i], x[i], to, u);

@@ -237,18 +237,19 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
                                          .direction_image = s.direction_image.view(),
                                          .control = control,
                                          .tolerance = tolerance * tolerance};
-  s.direction.clear(), s.direction_image.clear();
+  s.direction.clear(state.queue), s.direction_image.clear(state.queue);
   parallel_for(
-      "cloth: start", 1, DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
+      state.queue, "cloth: start", 1,
+      DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
   for_each_lane(
-      "cloth: residual", n, DRENCH_LAMBDA(auto i) {
+      state.queue, "cloth: residual", n, DRENCH_LAMBDA(auto i) {
         const auto r = matrix.moving(i, right.at(i)) - matrix.times(w, i);
         residual.put(i, r);
         scaled.put(i, matrix.scaled(i, r));
       });
   for (int k = 0;; ++k) {
     sum_lanes_then(
-        "cloth: image", n,
+        state.queue, "cloth: image", n,
         DRENCH_LAMBDA(auto i) {
           const auto z = scaled.at(i), image_of_z = matrix.times(scaled, i);
           image.put(i, image_of_z);
@@ -257,7 +258,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
         DRENCH_LAMBDA(double energy, double curvature) { iteration.decide(energy, curvature); });
     if (ended(s.control, k, most_iterations)) break;
     for_each_lane(
-        "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
+        state.queue, "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
   }
 }
 void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,

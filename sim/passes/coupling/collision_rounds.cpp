@@ -4,9 +4,9 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-void copy_vectors(const char* name, VecView to, ConstVecView from, int n) {
+void copy_vectors(Queue& queue, const char* name, VecView to, ConstVecView from, int n) {
   parallel_for(
-      name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
+      queue, name, n, DRENCH_LAMBDA(int i) { to.set(i, from[i]); });
 }
 
 }  // namespace
@@ -20,7 +20,7 @@ ContinuousCollision continuous_collision_of(State& state, float moved) {
   ClothState& c = state.cloth;
   const ConstVecView next = c.next.view(), start = c.start.view();
   const float moved2 = parallel_reduce(
-      "path test: cloth motion", c.vertices, 0.f,
+      state.queue, "path test: cloth motion", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
   const ClothWalls walls = cloth_walls_of(p);
@@ -72,7 +72,7 @@ GuardCount resolve_paths(State& state, const ContinuousCollision& test, const Te
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
   return parallel_reduce(
-      "path test", tested.count, GuardCount{},
+      state.queue, "path test", tested.count, GuardCount{},
       DRENCH_LAMBDA(int k) {
         const int i = tested[k];
         const bool still = held[i] || moved[i];
@@ -123,7 +123,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
   parallel_for(
-      "path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
+      state.queue, "path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
         const int i = tested[k], t = test.stopped[i];
         if (t < 0) return;
         Vec3<float> gain{0.f, 0.f, 0.f};
@@ -136,7 +136,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
         velocity.set(i, velocity[i] + gain * inverse_mass);
       });
   parallel_for(
-      "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
         if (!all && !stopped) return;
         if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
@@ -159,7 +159,7 @@ void move_unguarded_particles(State& state) {
   const ConstVecView predicted = c.predicted.view(), cloth_velocity = c.velocity.view();
   const bool solved = state.contact.near > 0;  // else nothing was predicted
   const float speed2 = parallel_reduce(
-      "guard: cloth speed", c.vertices, 0.f,
+      state.queue, "guard: cloth speed", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) {
         return maximum(length2(cloth_velocity[v]), solved ? length2(predicted[v]) : 0.f);
       },
@@ -179,7 +179,7 @@ void move_unguarded_particles(State& state) {
               support = state.parameters.support_radius;
   const float every_path = state.parameters.every_path ? 1.f : 0.f;
   const bool far_ones = any_lane(
-      "guard: move", f.count, DRENCH_LAMBDA(auto i) {
+      state.queue, "guard: move", f.count, DRENCH_LAMBDA(auto i) {
         const auto from = x.at(i);
         auto velocity = v.at(i);
         using T = decltype(from.x);
@@ -198,9 +198,10 @@ void move_unguarded_particles(State& state) {
       });
   if (far_ones) state.contact.cloth_reach = -1.f;  // see Tested
   parallel_for(
-      "guard: keys", state.contact.near, DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
-  stable_sort_keys(state.contact.key, state.contact.near, 1, state.contact.guarded,
-                   state.contact.guard_start, state.scratch);
+      state.queue, "guard: keys", state.contact.near,
+      DRENCH_LAMBDA(int k) { key[k] = moved[order[k]]; });
+  stable_sort_keys(state.queue, state.contact.key, state.contact.near, 1, state.contact.guarded,
+                   state.contact.guard_start);
   state.contact.guard_count = value_at(state.contact.guard_start, 1);
 }
 
@@ -209,7 +210,7 @@ void accept_paths(State& state, const Tested& tested) {
   const VecView x = state.fluid.position.view();
   const ConstVecView end = state.fluid.end.view();
   parallel_for(
-      "path test: accept", tested.count,
+      state.queue, "path test: accept", tested.count,
       DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
 }
 
@@ -223,10 +224,10 @@ float guard_substep(State& state, float dt, float moved) {
   moved = test.cloth_moved;
   const Tested tested = tested_of(state, moved);
   if (tested.count == 0) return moved;
-  f.held.clear_bytes(0);
-  f.stopped.clear_bytes(0xff);
-  c.held.clear_bytes(0);
-  c.stop_sum.clear_bytes(0);
+  f.held.clear_bytes(state.queue, 0);
+  f.stopped.clear_bytes(state.queue, 0xff);
+  c.held.clear_bytes(state.queue, 0);
+  c.stop_sum.clear_bytes(state.queue, 0);
   for (int round = 0;; ++round) {
     const GuardCount count = resolve_paths(state, test, tested, dt, round);
     state.guard_hits += count.hits;
@@ -237,7 +238,7 @@ float guard_substep(State& state, float dt, float moved) {
     hold_cloth(state, test, tested, which);
     test = continuous_collision_of(state, moved);
     if (which == Held::stopped) continue;
-    f.held.clear_bytes(1);
+    f.held.clear_bytes(state.queue, 1);
     resolve_paths(state, test, tested, dt, round + 1);
     break;
   }
@@ -253,12 +254,12 @@ void bring_far_particles_nearer(State& state) {
   const ConstVecView to = c.position.view();
   const ConstVecView from = c.start.view();
   const Bounds of_cloth = parallel_reduce(
-      "cloth: motions", c.vertices, Bounds{},
+      state.queue, "cloth: motions", c.vertices, Bounds{},
       DRENCH_LAMBDA(int v) { return bounds_of(to[v] - from[v]); }, JoinBounds{});
   const ConstVecView x = f.position.view(), start = f.start.view();
   float* far_by = f.far_by.data();
   for_each_lane(
-      "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {
+      state.queue, "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {
         const auto moved = x.at(i) - start.at(i);
         using T = decltype(moved.x);
         const auto most = [](T m, float low, float high) {
@@ -275,8 +276,8 @@ void bring_far_particles_nearer(State& state) {
 
 void move_coupled(State& state) {
   const float dt = float(state.dt / state.substeps);
-  copy_vectors("keep cloth starts", state.cloth.start.view(), state.cloth.position.view(),
-               state.cloth.vertices);
+  copy_vectors(state.queue, "keep cloth starts", state.cloth.start.view(),
+               state.cloth.position.view(), state.cloth.vertices);
   move_unguarded_particles(state);
   float moved = 0.f;
   for (int s = 0; s < state.substeps; ++s) {

@@ -22,7 +22,7 @@ void add_cloth_to_walls(State& state) {
   const float recovery = dt * 0.1f * p.sound_speed;
   const ClothDensity blank{p.wall_scale, 1.f / p.support_radius, p.spacing, 0.f, 0.f};
   parallel_for(
-      "sheets: rows", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: rows", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         gradient.set(row, {0.f, 0.f, 0.f});
         compliance[row] = 0.f;
@@ -52,7 +52,7 @@ void limit_recovery(State& state) {
   float* source = state.pressure.source.data();
   const float* inverse_diagonal = state.pressure.inverse_diagonal.data();
   parallel_for(
-      "sheets: recovery", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: recovery", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || length2(c.gradient[row]) == 0.f || inverse_diagonal[i] == 0.f) return;
         source[i] = minimum(source[i], c.recovery[row] / sqrtf(inverse_diagonal[i]));
@@ -70,7 +70,7 @@ void sum_loads(State& state, Base base) {
   const float* contact_weight = state.cloth.share.data();
   const bool add = base == Base::own;
   parallel_for(
-      "sheets: loads", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "sheets: loads", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         Vec3<float> sum = add ? own[v] : Vec3<float>{0.f, 0.f, 0.f};
         if (contact_weight[v] > 0.f) sum = sum + near.sum_on_vertex(impulse, v);
         right.set(v, sum);
@@ -82,7 +82,7 @@ template <class Matrix>
 void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of, float keep) {
   ClothControl* control = state.cloth_system.control.data();
   reduce_then(
-      "cloth: reference", state.cloth.vertices, 0.,
+      state.queue, "cloth: reference", state.cloth.vertices, 0.,
       DRENCH_LAMBDA(int i) {
         const Vec3<float> r = matrix.moving(i, of[i]);
         return dot_double(r, matrix.scaled(i, r));
@@ -98,7 +98,7 @@ void load_by_pressures(State& state) {
   const Float4* place = state.pressure.place.data();
   const float mass = state.parameters.particle_mass;
   parallel_for(
-      "sheets: pressures", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: pressures", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         change.set(row, i < 0 ? Vec3<float>{0.f, 0.f, 0.f} : c.gradient[row] * (mass * place[i].w));
       });
@@ -112,7 +112,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
   const int triangles = state.cloth.triangles, *start = near.start, gap = c.soft_begin - c.close;
   const float mass = state.parameters.particle_mass, *contact_weight = state.cloth.share.data();
   parallel_for(
-      "sheets: sizes by triangle", triangles, DRENCH_LAMBDA(int t) {
+      state.queue, "sheets: sizes by triangle", triangles, DRENCH_LAMBDA(int t) {
         float sum[3] = {0.f, 0.f, 0.f};
         for (int soft = 0; soft < 2; ++soft) {
           const int k = t + soft * triangles;
@@ -122,7 +122,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
         for (int e = 0; e < 3; ++e) impulse.set(3 * t + e, {sum[e], 0.f, 0.f});
       });
   parallel_for(
-      "sheets: sizes", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "sheets: sizes", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         const Vec3<float> none{0.f, 0.f, 0.f};
         to.set(v, contact_weight[v] > 0.f ? near.sum_on_vertex(impulse, v) : none);
       });
@@ -144,12 +144,12 @@ void add_cloth_to_diagonal(State& state) {
   const VecView answer = s.answer.view();
   const VecView right = s.right.view();
   sum_row_sizes(state, size, right);
-  s.answer.clear();
+  s.answer.clear(state.queue);
   add_to_reference(state, matrix, right, 0.f);
   solve_cloth_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
   float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
-      "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: diagonal", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || inverse[i] == 0.f) return;
         float sum = 0.f;
@@ -186,7 +186,7 @@ void settle_cloth(State& state) {
   if (state.contact.near > 0) {
     respond_cloth(state, last_sweeps, last_tolerance);
   } else {
-    s.right.clear();
+    s.right.clear(state.queue);
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
@@ -204,7 +204,7 @@ void subtract_cloth_rate(State& state) {
   float* product = state.pressure.product.data();
   const int* done = &state.pressure.control.data()->done;
   parallel_for(
-      "sheets: density rate", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: density rate", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || *done) return;
         product[i] -= dot(c.gradient[row], c.at_foot(row, change)) + c.compliance[row] * place[i].w;
@@ -215,7 +215,7 @@ void take_cloth_off_walls(State& state) {
   const ClothRows c = cloth_rows(state);
   Float4* wall = state.pressure.wall.data();
   parallel_for(
-      "sheets: walls", c.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheets: walls", c.rows, DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0) return;
         const Vec3<float> g = c.gradient[row];
@@ -237,7 +237,7 @@ void finish_cloth(State& state) {
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);
   for_each_lane(
-      "cloth: finish", c.vertices, DRENCH_LAMBDA(auto i) {
+      state.queue, "cloth: finish", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
         Vec3<T> velocity = v.at(i) + change.at(i) * T(inverse_dt), to = x.at(i) + velocity * T(dt);
         walls.stop(to, velocity);

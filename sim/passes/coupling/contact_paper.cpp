@@ -16,7 +16,7 @@ void find_nearest_centroids(State& state) {
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
   const float reach = 1.f / polygons.grid.inverse_edge.x;
   parallel_for(
-      "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "paper: nearest centroid", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> p = position[i];
         triangle[i] = -1, edge[i] = 0.f, fraction[i] = 0.f, distance[i] = 1e30f;
         normal.set(i, {0.f, 0.f, 0.f});
@@ -68,7 +68,7 @@ void add_paper_forces(State& state) {
               mass = p.particle_mass;
   const float viscosity = p.wall_viscosity * mass / (spacing * spacing * h * h * h);
   parallel_for(
-      "paper: forces", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "paper: forces", f.count, DRENCH_LAMBDA(int i) {
         impulse.set(i, {0.f, 0.f, 0.f});
         const int t = triangle[i];
         if (t < 0) return;
@@ -96,7 +96,7 @@ void gather_paper_reaction(State& state) {
   const VecView force = c.force.view();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
-      "paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "paper: reaction", c.vertices, DRENCH_LAMBDA(int v) {
         Vec3<float> sum{0.f, 0.f, 0.f};
         near.for_each_corner(v, [&](int t, int corner) {
           for (int k = near.start[t]; k < near.start[t + 1]; ++k) {

@@ -10,7 +10,7 @@ void sort_contacts(State& state, float reach) {
   const float contact_distance = contact_distance_of(state.parameters);
   int* key = state.contact.key.data();
   parallel_for(
-      "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "contact: keys", state.fluid.count, DRENCH_LAMBDA(int i) {
         const int t = triangle[i];
         if (t < 0) {
           key[i] = 2 * triangles;
@@ -18,8 +18,8 @@ void sort_contacts(State& state, float reach) {
         }
         key[i] = distance[i] - half_thickness[t] - contact_distance > reach ? triangles + t : t;
       });
-  stable_sort_keys(state.contact.key, state.fluid.count, 2 * triangles, state.contact.order,
-                   state.contact.start, state.scratch);
+  stable_sort_keys(state.queue, state.contact.key, state.fluid.count, 2 * triangles,
+                   state.contact.order, state.contact.start);
   state.contact.near = value_at(state.contact.start, 2 * triangles);
   state.contact.close = value_at(state.contact.start, triangles);
 }
@@ -32,7 +32,7 @@ void sum_by_triangle(State& state, Rows which, IdleCorners idle) {
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
   const bool skip = which == Rows::close && idle == IdleCorners::zero;
   parallel_for(
-      "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
+      state.queue, "contact: triangles", triangles, DRENCH_LAMBDA(int t) {
         if (skip && start[t] == start[t + 1]) return;
         Vec3<float> sum[3] = {};
         for (int soft = 0; soft <= last; ++soft) {
@@ -59,7 +59,7 @@ void start_contacts(State& state) {
   const VecView force = cloth.force.view();
   const bool owes = state.owes;
   parallel_for(
-      "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
+      state.queue, "contact: rows", (c.rows + 7) / 8 * 8, DRENCH_LAMBDA(int row) {
         const int index = c.index_in_list(row), i = index < 0 ? -1 : near.order[index];
         particle[row] = i;
         for (int k = 0; k < 3; ++k) {
@@ -71,14 +71,14 @@ void start_contacts(State& state) {
   const ConstVecView impulse = state.contact.impulse.view();
   if (owes) {
     sum_by_triangle(state, Rows::all);
-    state.fluid.owed.clear();
+    state.fluid.owed.clear(state.queue);
     state.owes = false;
   }
   float* contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
   const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
   parallel_for(
-      "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
         float weights = 0.f;
         near.for_each_corner(v, [&](int t, int e) {
           for (int row = near.start[t]; row < near.start[t + 1]; ++row) weights += c.weight[e][row];

@@ -49,22 +49,23 @@ void solve_contacts(State& state) {
   const float *inverse_mass = cloth.inverse_mass.data(), *contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt), inverse_particle_mass = 1.f / setup.mass;
   for_each_lane(
-      "contact: prepare", c.list.rows, DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
+      state.queue, "contact: prepare", c.list.rows,
+      DRENCH_LAMBDA(auto row) { setup.prepare(c, row); });
   for_each_lane(
-      "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
+      state.queue, "contact: soft", c.list.rows - c.list.soft_begin, DRENCH_LAMBDA(auto row) {
         update_contact(c, row + c.list.soft_begin, predicted, inverse_particle_mass, 1.f);
       });
   for (int iteration = 0; iteration < contact_iterations; ++iteration) {
     const float relaxation = iteration + 1 < contact_iterations ? over_relaxation : 1.f;
     for_each_lane(
-        "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
+        state.queue, "contact: particles", c.list.close, DRENCH_LAMBDA(auto row) {
           update_contact(c, row, predicted, inverse_particle_mass, relaxation);
         });
     sum_by_triangle(state, iteration == 0 ? Rows::all : Rows::close,
                     iteration > 1 ? IdleCorners::zero : IdleCorners::unset);
     // Reaction shared by barycentric weights (eqs 10, 11 mended), gathered in a fixed order.
     parallel_for(
-        "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
+        state.queue, "contact: vertices", cloth.vertices, DRENCH_LAMBDA(int v) {
           if (contact_weight[v] == 0.f) return;
           const Vec3<float> sum = near.sum_on_vertex(impulse, v);
           predicted.set(v, predicted[v] - sum * (setup.beta * inverse_mass[v]));
@@ -72,7 +73,7 @@ void solve_contacts(State& state) {
         });
   }
   parallel_for(
-      "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "contact: velocities", c.list.rows, DRENCH_LAMBDA(int row) {
         if (c.list.particle[row] >= 0) velocity.set(c.list.particle[row], c.velocity[row]);
       });
 }

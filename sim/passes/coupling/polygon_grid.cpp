@@ -5,9 +5,10 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-Bounds bounds_of_points(const char* name, ConstVecView points, int n) {
+Bounds bounds_of_points(Queue& queue, const char* name, ConstVecView points, int n) {
   return parallel_reduce(
-      name, n, Bounds{}, DRENCH_LAMBDA(int i) { return bounds_of(points[i]); }, JoinBounds{});
+      queue, name, n, Bounds{}, DRENCH_LAMBDA(int i) { return bounds_of(points[i]); },
+      JoinBounds{});
 }
 
 namespace {
@@ -21,18 +22,18 @@ int sort_images(State& state, const TriangleImages& images) {
   c.cell.resize(items);
   int* cell = c.cell.data();
   parallel_for(
-      "cloth: cells of images", items, DRENCH_LAMBDA(int k) {
+      state.queue, "cloth: cells of images", items, DRENCH_LAMBDA(int k) {
         const Vec3<float> m = centroid[k % triangles], at = m + images.shift(k, m);
         cell[k] = images.holds(at) ? grid.cell(at) : grid.cells();
       });
-  stable_sort_keys(c.cell, items, grid.cells(), c.order, c.cell_start, state.scratch);
+  stable_sort_keys(state.queue, c.cell, items, grid.cells(), c.order, c.cell_start);
   const int held = value_at(c.cell_start, grid.cells());
   for (VecColumn* v : {&c.sorted_low, &c.sorted_high, &c.sorted_shift}) v->resize(held + 8);
   c.sorted_triangle.resize(held + 8);
   int* order = c.order.data();
   const VecView shift = c.sorted_shift.view();
   parallel_for(
-      "cloth: images", items, DRENCH_LAMBDA(int k) {
+      state.queue, "cloth: images", items, DRENCH_LAMBDA(int k) {
         const int item = order[k];
         order[k] = item % triangles;
         if (k < held) shift.set(k, images.shift(item, centroid[item % triangles]));
@@ -48,7 +49,7 @@ void build_polygon_grid(State& state, float room) {
   const VecView centroid = c.centroid.view();
   const Corners corner = corners_of(c);
   const float largest = parallel_reduce(
-      "cloth: centroids", c.triangles, 0.f,
+      state.queue, "cloth: centroids", c.triangles, 0.f,
       DRENCH_LAMBDA(int t) {
         const Vec3<float> a = corner.at(x, 3 * t), b = corner.at(x, 3 * t + 1),
                           d = corner.at(x, 3 * t + 2);
@@ -58,7 +59,7 @@ void build_polygon_grid(State& state, float room) {
       },
       Larger{});
   c.largest_radius = std::sqrt(largest);
-  const Bounds bounds = bounds_of_points("cloth: bounds", x, c.vertices);
+  const Bounds bounds = bounds_of_points(state.queue, "cloth: bounds", x, c.vertices);
   c.low = bounds.low, c.high = bounds.high;
   const bool periodic = any_periodic(state.parameters);
   const TriangleImages images = triangle_images_of(state);
@@ -70,15 +71,16 @@ void build_polygon_grid(State& state, float room) {
     const GridShape grid = c.grid;
     int* cell = c.cell.data();
     parallel_for(
-        "cloth: cells", c.triangles, DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
-    stable_sort_keys(c.cell, c.triangles, grid.cells(), c.order, c.cell_start, state.scratch);
+        state.queue, "cloth: cells", c.triangles,
+        DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
+    stable_sort_keys(state.queue, c.cell, c.triangles, grid.cells(), c.order, c.cell_start);
   }
   const int* order = c.order.data();
   const ConstVecView shift = c.sorted_shift.view();
   const VecView low = c.sorted_low.view(), high = c.sorted_high.view();
   PreparedTriangle<float>* sorted = c.sorted_triangle.data();
   for_each_lane(
-      "cloth: sorted triangles", sorted_count, DRENCH_LAMBDA(auto k) {
+      state.queue, "cloth: sorted triangles", sorted_count, DRENCH_LAMBDA(auto k) {
         const auto t = load(order, k);
         const auto at = [&](int e) {
           auto p = corner.at(x, t + t + t + e);
@@ -117,7 +119,7 @@ void find_nearest_triangles(State& state, const ConstVecView& position, float re
   const NearestOutput out = nearest_output(state, reach);
   const int* before = f.memory_triangle.data();
   parallel_for(
-      "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
         out.triangle[i] = -1;
         if (out.far_by[i] > 0.f) return;
         Vec3<float> p = position[i];
@@ -189,7 +191,7 @@ void find_cloth_sides(State& state, const ConstVecView& position) {
   // ever (docs/decisions/0024-side-as-seen.md).
   const bool by_memory = !state.parameters.incompressible;
   parallel_for(
-      "sheet side", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "sheet side", f.count, DRENCH_LAMBDA(int i) {
         const int t = triangle[i];
         normal.set(i, {0.f, 0.f, 0.f});
         distance[i] = 1e30f, edge[i] = 0.f, cloth_fraction[i] = 0.f, shaded[i] = t >= 0;

@@ -46,7 +46,7 @@ DRENCH_HD void put_triangle(PreparedTriangle<float>* out, Lanes k,
 #endif
 
 /// Bounds of points 0..n-1.
-Bounds bounds_of_points(const char* name, ConstVecView points, int n);
+Bounds bounds_of_points(Queue& queue, const char* name, ConstVecView points, int n);
 
 /// Corners of triangles, each triangle in one piece.
 struct Corners {

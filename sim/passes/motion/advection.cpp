@@ -10,7 +10,7 @@ void move_particles(State& state) {
   const VecView x = f.position.view(), v = f.velocity.view();
   const Mover mover = mover_of(state.parameters, float(state.dt));
   for_each_lane(
-      "move particles", f.count, DRENCH_LAMBDA(auto i) {
+      state.queue, "move particles", f.count, DRENCH_LAMBDA(auto i) {
         auto velocity = v.at(i);
         x.put(i, mover(x.at(i), velocity));
         v.put(i, velocity);

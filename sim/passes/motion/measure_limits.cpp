@@ -33,7 +33,7 @@ Limits measure_limits(const State& state) {
   Limits limits;
   if (f.count > 0) {
     limits = parallel_reduce(
-        "limits: fluid", f.count, Limits{},
+        state.queue, "limits: fluid", f.count, Limits{},
         DRENCH_LAMBDA(int i) {
           const float speed = length(v[i]), push = accelerated ? length(a[i]) : 0.f;
           Limits one;
@@ -48,7 +48,7 @@ Limits measure_limits(const State& state) {
   }
   if (state.cloth.vertices > 0) {
     const Limits cloth = parallel_reduce(
-        "limits: cloth", state.cloth.vertices, Limits{},
+        state.queue, "limits: cloth", state.cloth.vertices, Limits{},
         DRENCH_LAMBDA(int i) {
           const float speed = length(cv[i]);
           Limits one;

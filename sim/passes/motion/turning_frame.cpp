@@ -8,7 +8,8 @@ void wrap_positions(State& state) {
   const Mover mover = mover_of(state.parameters, 0.f);
   const VecView x = state.fluid.position.view();
   parallel_for(
-      "wrap", state.fluid.count, DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
+      state.queue, "wrap", state.fluid.count,
+      DRENCH_LAMBDA(int i) { x.set(i, mover.wrapped(x[i])); });
 }
 
 void turn_frame(State& state) {
@@ -19,9 +20,10 @@ void turn_frame(State& state) {
   const VecView speed = state.cloth.velocity.view();
   const float* inverse_mass = state.cloth.inverse_mass.data();
   parallel_for(
-      "turning frame", state.fluid.count, DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });
+      state.queue, "turning frame", state.fluid.count,
+      DRENCH_LAMBDA(int i) { v.set(i, turn(x[i], v[i])); });
   parallel_for(
-      "turning frame: cloth", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "turning frame: cloth", state.cloth.vertices, DRENCH_LAMBDA(int i) {
         if (inverse_mass[i] > 0.f) speed.set(i, turn(cloth[i], speed[i]));
       });
 }

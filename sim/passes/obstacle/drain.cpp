@@ -9,7 +9,7 @@ void mark_drained(State& state, int first_key) {
   const ConstVecView x = state.fluid.position.view();
   int* cell = state.fluid.cell.data();
   parallel_for(
-      "fluid in sinks", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "fluid in sinks", state.fluid.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> q = x[i];
         for (int k = sinks.count - 1; k >= 0; --k) {
           const ObstacleView& sink = sinks.obstacle[k];

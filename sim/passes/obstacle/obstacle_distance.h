@@ -116,6 +116,26 @@ struct ObstacleView : ObstaclePlacement {
     const float first = field[0](own);
     return deform > 0.f ? first + mix * (field[1](own) - first) : first;
   }
+  /// Distances of the six points that stand `step` m off along the axes: how much more they are on
+  /// one side than on the other, and their sum. In a loop, because a distance is long.
+  struct Around {
+    Vec3<float> rise{0.f, 0.f, 0.f};
+    float sum = 0.f;
+  };
+  DRENCH_HD Around around_point(Vec3<float> own, float step, float mix) const {
+    Around all;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3<float> off{k == 0 ? step : 0.f, k == 1 ? step : 0.f, k == 2 ? step : 0.f};
+      float side[2];
+      for (int s = 0; s < 2; ++s) side[s] = distance(s == 0 ? own - off : own + off, mix);
+      all.sum = all.sum + side[0] + side[1];
+      const float rise = side[1] - side[0];
+      if (k == 0) all.rise.x = rise;
+      if (k == 1) all.rise.y = rise;
+      if (k == 2) all.rise.z = rise;
+    }
+    return all;
+  }
   DRENCH_HD Vec3<float> period_along(int k) const {
     return {period[k][0], period[k][1], period[k][2]};
   }
@@ -124,12 +144,7 @@ struct ObstacleView : ObstaclePlacement {
   DRENCH_HD_CALL Vec3<float> normal(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return {0.f, 1.f, 0.f};
     if (shape == ObstacleShape::box) return BoxDistance(own, half).normal;
-    if (shape == ObstacleShape::field) {
-      const float e = 0.5f * field[0].voxel;
-      own = {distance({own.x + e, own.y, own.z}, mix) - distance({own.x - e, own.y, own.z}, mix),
-             distance({own.x, own.y + e, own.z}, mix) - distance({own.x, own.y - e, own.z}, mix),
-             distance({own.x, own.y, own.z + e}, mix) - distance({own.x, own.y, own.z - e}, mix)};
-    }
+    if (shape == ObstacleShape::field) own = around_point(own, 0.5f * field[0].voxel, mix).rise;
     const float size = length(own);
     return size > 0.f ? own * (1.f / size) : Vec3<float>{0.f, 0.f, 0.f};
   }

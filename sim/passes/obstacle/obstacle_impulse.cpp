@@ -12,7 +12,7 @@ void add_obstacle_shares(State& state) {
   const float rest = p.rest_density;
   Float4* wall = state.pressure.wall.data();
   parallel_for(
-      "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
         for (int k = 0; k < obstacles.count; ++k) {
           const WallShare share = law.of(obstacles.obstacle[k], x[i]);
           if (share.value == 0.f) continue;
@@ -33,7 +33,7 @@ Impulse pressure_impulse(const State& state, int which) {
   const int* triangle = state.cloth.vertices > 0 ? state.fluid.triangle.data() : nullptr;
   const double factor = double(p.particle_mass) * p.rest_density / state.dt;
   return parallel_reduce(
-      "obstacle: impulse", state.fluid.count, Impulse{},
+      state.queue, "obstacle: impulse", state.fluid.count, Impulse{},
       DRENCH_LAMBDA(int i) {
         const Float4 at = place[i];
         const Vec3<float> x{at.x, at.y, at.z};
@@ -63,7 +63,7 @@ Impulse pressure_impulse_near_cloth(const State& state, int which) {
   const Float4* place = state.pressure.place.data();
   const double factor = double(p.particle_mass) * p.rest_density / state.dt;
   return parallel_reduce(
-      "obstacle: impulse near sheets", c.rows, Impulse{},
+      state.queue, "obstacle: impulse near sheets", c.rows, Impulse{},
       DRENCH_LAMBDA(int row) {
         const int i = c.particle[row];
         if (i < 0 || place[i].w == 0.f) return Impulse{};
@@ -91,7 +91,7 @@ Impulse tension_impulse(const State& state, int which) {
   const auto force = tension_force(state, nullptr, Straight{});
   const double factor = double(force.scale) * state.parameters.particle_mass;
   return parallel_reduce(
-      "obstacle: tension", state.fluid.count, Impulse{},
+      state.queue, "obstacle: tension", state.fluid.count, Impulse{},
       DRENCH_LAMBDA(int i) {
         Impulse impulse;
         const Mirrors mirrors = images.of(i);

@@ -39,12 +39,11 @@ struct PathStop {
   /// Moves a point out to the clearance. False if that fails: between two parts of the surface.
   DRENCH_HD bool push_out(const ObstacleView& o, Vec3<float>& own) const {
     const float mix = o.blend[1];
-    float d = o.distance(own, mix);
-    for (int k = 0; k < 8 && d < clearance; ++k) {
+    for (int k = 0;; ++k) {
+      const float d = o.distance(own, mix);
+      if (k == 8 || !(d < clearance)) return d >= 0.5f * clearance;
       own = own + o.normal(own, mix) * (out - d);
-      d = o.distance(own, mix);
     }
-    return d >= 0.5f * clearance;
   }
 
   /// Where a path may end. False: it may as it is.

@@ -55,17 +55,11 @@ struct ObstacleShare {
   DRENCH_HD WallShare field(const ObstacleView& o, Vec3<float> own) const {
     const float mix = o.blend[1], d = o.distance(own, mix), e = o.field[0].voxel;
     if (d >= reach()) return {0.f, {0.f, 0.f, 0.f}};
-    const float x0 = o.distance({own.x - e, own.y, own.z}, mix),
-                x1 = o.distance({own.x + e, own.y, own.z}, mix),
-                y0 = o.distance({own.x, own.y - e, own.z}, mix),
-                y1 = o.distance({own.x, own.y + e, own.z}, mix),
-                z0 = o.distance({own.x, own.y, own.z - e}, mix),
-                z1 = o.distance({own.x, own.y, own.z + e}, mix);
-    const Vec3<float> slope{x1 - x0, y1 - y0, z1 - z0};
-    const float size = length(slope);
+    const ObstacleView::Around around = o.around_point(own, e, mix);
+    const float size = length(around.rise);
     if (size == 0.f) return {0.f, {0.f, 0.f, 0.f}};
-    const float divergence = (x0 + x1 + y0 + y1 + z0 + z1 - 6.f * d) / (e * e);
-    return curved(d, slope * (1.f / size), 0.5f * divergence);
+    const float divergence = (around.sum - 6.f * d) / (e * e);
+    return curved(d, around.rise * (1.f / size), 0.5f * divergence);
   }
 
   /// Share of density that one obstacle, where it ends the step, replaces at x.

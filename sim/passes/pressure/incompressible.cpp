@@ -18,7 +18,7 @@ void correct_alone(State& state) {
   const Float4 *moment = s.scratch_a.data(), *cross = s.scratch_b.data();
   Float4 *own = s.correction.data(), *own_cross = s.correction_cross.data();
   parallel_for(
-      "neighbours: own correction", state.fluid.count,
+      state.queue, "neighbours: own correction", state.fluid.count,
       DRENCH_LAMBDA(int i) { invert_moments(moment[i], cross[i], own[i], own_cross[i]); });
 }
 
@@ -30,7 +30,7 @@ void correct_gradients(State& state) {
   const float h = p.support_radius;
   const float scale = p.particle_mass / p.rest_density / p.lattice_sum / (h * h * h * h * h);
   with_separation(p, [&](auto separation) {
-    for_each_neighbour("neighbours: moments", s.lists, state.fluid.count,
+    for_each_neighbour(state.queue, "neighbours: moments", s.lists, state.fluid.count,
                        GradientMoments<decltype(separation)>{.place = s.place.data(),
                                                              .wall = s.wall.data(),
                                                              .density = state.fluid.density.data(),
@@ -41,7 +41,7 @@ void correct_gradients(State& state) {
                                                              .separation = separation});
   });
   if (p.full) return correct_alone(state);
-  for_each_neighbour("neighbours: correction", s.lists, state.fluid.count,
+  for_each_neighbour(state.queue, "neighbours: correction", s.lists, state.fluid.count,
                      GradientCorrection{s.scratch_a.data(), s.scratch_b.data(), s.wall.data(),
                                         s.correction.data(), s.correction_cross.data()});
 }
@@ -50,7 +50,7 @@ void accelerate_by_pressure(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour(
-        "pressure: acceleration", s.lists, state.fluid.count,
+        state.queue, "pressure: acceleration", s.lists, state.fluid.count,
         PressureAcceleration<decltype(separation)>{.place = s.place.data(),
                                                    .correction = s.correction.data(),
                                                    .correction_cross = s.correction_cross.data(),
@@ -66,7 +66,7 @@ void density_rate(State& state) {
   PressureState& s = state.pressure;
   with_separation(state.parameters, [&](auto separation) {
     for_each_neighbour(
-        "pressure: density rate", s.lists, state.fluid.count,
+        state.queue, "pressure: density rate", s.lists, state.fluid.count,
         DensityRate<decltype(separation)>{.place = s.place.data(),
                                           .vector = s.scratch_a.data(),
                                           .correction = s.correction.data(),
@@ -96,9 +96,9 @@ void invert_diagonal(State& state) {
                                            .scale = gradient_scale(state.parameters),
                                            .separation = separation};
     if (state.contact.near > 0)
-      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count, pass);
+      for_each_neighbour(state.queue, "neighbours: diagonal", s.lists, state.fluid.count, pass);
     else
-      for_each_neighbour("neighbours: diagonal", s.lists, state.fluid.count,
+      for_each_neighbour(state.queue, "neighbours: diagonal", s.lists, state.fluid.count,
                          EvenInverseDiagonal<Separation>{pass, s.next.data()});
   });
 }
@@ -114,15 +114,15 @@ void find_kick(State& state, float lag) {
   Float4* velocity = s.scratch_b.data();
   const float inverse_dt = float(1 / state.dt), h = p.support_radius;
   parallel_for(
-      "kick: velocities", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "kick: velocities", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> u = v[i];
         const Float4 d = displacement[i];
         velocity[i] = {u.x + inverse_dt * d.x, u.y + inverse_dt * d.y, u.z + inverse_dt * d.z, 1.f};
       });
-  for_each_neighbour("kick: mean way", s.lists, f.count,
+  for_each_neighbour(state.queue, "kick: mean way", s.lists, f.count,
                      MeanDisplacement{s.scratch_b.data(), s.mean_displacement.data(), lag});
   with_separation(p, [&](auto separation) {
-    for_each_neighbour("kick", s.lists, f.count,
+    for_each_neighbour(state.queue, "kick", s.lists, f.count,
                        EarlierAcceleration<decltype(separation)>{
                            .place = s.place.data(),
                            .displacement = s.mean_displacement.data(),
@@ -144,13 +144,13 @@ void smooth_velocities(State& state) {
   const VecView v = state.fluid.velocity.view();
   Float4* vector = s.scratch_a.data();
   parallel_for(
-      "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "smoothing: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
   const float fraction =
       p.xsph + (smoothing_takes_viscosity(p, state.dt) ? smoothing_of_viscosity(p, state.dt) : 0.f);
   const float h = p.support_radius, volume = gradient_scale(p) / p.rest_density;  // over h^5
-  for_each_neighbour("smoothing", s.lists, state.fluid.count,
+  for_each_neighbour(state.queue, "smoothing", s.lists, state.fluid.count,
                      VelocitySmoothing{vector, v, fraction * volume * h * h});
 }
 
@@ -166,10 +166,11 @@ void start_without_mean(State& state) {
   SolveControl* control = state.pressure.control.data();
   const int n = state.fluid.count;
   reduce_then(
-      "full: mean pressure", n, 0.0, DRENCH_LAMBDA(int i) { return double(before[i]); }, Plus{},
+      state.queue, "full: mean pressure", n, 0.0,
+      DRENCH_LAMBDA(int i) { return double(before[i]); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
-      "full: first guess", n,
+      state.queue, "full: first guess", n,
       DRENCH_LAMBDA(int i) { place[i].w = before[i] = before[i] - control->mean; });
 }
 
@@ -182,21 +183,21 @@ void project_velocities(State& state, const Mover& move) {
   Float4* vector = s.scratch_a.data();
   float *source = s.source.data(), *product = s.product.data();
   parallel_for(
-      "full: velocities", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "full: velocities", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> u = v[i];
         vector[i] = {dt * u.x, dt * u.y, dt * u.z, 0.f};
       });
-  begin_solve(s);
+  begin_solve(state);
   density_rate(state);
   parallel_for(
-      "full: divergence", f.count, DRENCH_LAMBDA(int i) { source[i] = product[i]; });
+      state.queue, "full: divergence", f.count, DRENCH_LAMBDA(int i) { source[i] = product[i]; });
   start_without_mean(state);
   find_pressures(state, any_pressure);
   keep_pressures(state);
   find_kick(state, 0.5f * dt);
   const Float4* kick = s.scratch_b.data();
   parallel_for(
-      "full: project", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "full: project", f.count, DRENCH_LAMBDA(int i) {
         const Float4 d = vector[i], k = kick[i];
         Vec3<float> change = Vec3<float>{d.x, d.y, d.z} * inverse_dt;
         x.set(i, move(x[i], change));
@@ -216,27 +217,27 @@ void even_out(State& state, const Mover& move) {
   float *source = s.source.data(), *product = s.product.data(), *density = f.density.data();
   with_separation(p, [&](auto separation) {
     for_each_neighbour(
-        "full: relaxation", s.lists, f.count,
+        state.queue, "full: relaxation", s.lists, f.count,
         Relaxation<decltype(separation)>{s.place.data(), s.wall.data(), shift, separation});
   });
   parallel_for(
-      "full: relax", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "full: relax", f.count, DRENCH_LAMBDA(int i) {
         const Float4 d = vector[i], e = shift[i];
         Vec3<float> change = Vec3<float>{e.x, e.y, e.z} * inverse_dt;
         x.set(i, move(x[i], change));
         vector[i] = {d.x + e.x, d.y + e.y, d.z + e.z, 0.f};
         diagonal[i] = {1.f, 1.f, 1.f, 0.f}, cross[i] = {0.f, 0.f, 0.f, 0.f};
       });
-  begin_next_solve(s);
+  begin_next_solve(state);
   density_rate(state);
   parallel_for(
-      "full: density", f.count,
+      state.queue, "full: density", f.count,
       DRENCH_LAMBDA(int i) { source[i] = density[i] - rest + product[i]; });
   invert_diagonal(state);
   start_from_nothing(state);
   find_pressures(state, any_pressure);
   parallel_for(
-      "full: move", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "full: move", f.count, DRENCH_LAMBDA(int i) {
         const Float4 d = vector[i];
         Vec3<float> change = Vec3<float>{d.x, d.y, d.z} * inverse_dt;
         x.set(i, move(x[i], change));
@@ -264,7 +265,7 @@ void predict_with(State& state, const Move& move) {
   const bool keep = f.start.x.size() > 0;  // sheets stand where they stood
   const Vec3<float> period = periods_of(p);
   parallel_for(
-      "predict", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "predict", f.count, DRENCH_LAMBDA(int i) {
         Vec3<float> velocity = v[i] + kick;
         const Vec3<float> to = move(x[i], velocity);
         if (keep) start.set(i, image_beside(x[i], to, period));
@@ -290,7 +291,7 @@ void find_neighbours(State& state) {
   Float4 *place = s.place.data(), *wall = s.wall.data();
   const float rest = p.rest_density;
   parallel_for(
-      "neighbours: walls", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "neighbours: walls", f.count, DRENCH_LAMBDA(int i) {
         const WallShare share = walls.share(x[i]);
         place[i] = {x.x[i], x.y[i], x.z[i], 0.f};
         wall[i] = {rest * share.gradient.x, rest * share.gradient.y, rest * share.gradient.z,
@@ -306,10 +307,10 @@ void find_neighbours(State& state) {
     source[i] = density[i] - rest;
   };
   if (sheets) {
-    build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up,
+    build_neighbour_lists<WendlandC2>(state.queue, grid, f.count, x, h, s.lists, add_up,
                                       cloth_filter(state, f.start.view(), Shaded::near));
   } else {
-    build_neighbour_lists<WendlandC2>(grid, f.count, x, h, s.lists, state.scratch, add_up);
+    build_neighbour_lists<WendlandC2>(state.queue, grid, f.count, x, h, s.lists, add_up);
   }
   correct_gradients(state);
   invert_diagonal(state);
@@ -328,7 +329,7 @@ void project_with(State& state, const Move& move) {
   const Float4* displacement = state.pressure.scratch_a.data();
   const float inverse_dt = float(1 / state.dt);
   parallel_for(
-      "project", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "project", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> d{displacement[i].x, displacement[i].y, displacement[i].z};
         Vec3<float> change = d * inverse_dt;
         x.set(i, move(x[i], change));
@@ -353,7 +354,7 @@ void move_with_sheets(State& state) {
   finish_cloth(state);
   if (state.contact.near > 0) take_cloth_off_walls(state);
   parallel_for(
-      "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
+      state.queue, "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
         const Vec3<float> from = start[i];
         drift.set(i, x[i] - from - v[i] * dt);
         end.set(i, x[i]);
@@ -366,14 +367,14 @@ void measure_density(State& state) {
   FluidState& f = state.fluid;
   const Parameters& p = state.parameters;
   sort_by_cell(state);
-  f.density.clear_bytes(0);  // lost particles have none
+  f.density.clear_bytes(state.queue, 0);  // lost particles have none
   const ConstVecView x = f.position.view();
   const VecView sorted{state.pressure.before.data(), state.pressure.next.data(),
                        state.pressure.product.data()};
   const int* order = f.order.data();
   parallel_for(
-      "measure: sort", f.count, DRENCH_LAMBDA(int i) { sorted.set(i, x[order[i]]); });
-  for_each_pair("measure: density", {f.grid, f.cell_start.data()}, f.count,
+      state.queue, "measure: sort", f.count, DRENCH_LAMBDA(int i) { sorted.set(i, x[order[i]]); });
+  for_each_pair(state.queue, "measure: density", {f.grid, f.cell_start.data()}, f.count,
                 MeasuredDensity{
                     .position = sorted,
                     .order = order,

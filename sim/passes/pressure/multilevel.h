@@ -72,7 +72,7 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
   const Vec3<int> nb = h.blocks;
   const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
-      "levels: blocks", blocks, DRENCH_LAMBDA(int b) {
+      state.queue, "levels: blocks", blocks, DRENCH_LAMBDA(int b) {
         if (!*awake) return;
         const GridShape& g = finest.grid;
         const Vec3<int> size{1 << finest.shift.x, 1 << finest.shift.y, 1 << finest.shift.z};
@@ -97,7 +97,7 @@ void restrict_particles(State& state, float* nodes, const Value& value) {
       });
   const NodeLevel level = h.level[0];
   parallel_for(
-      "levels: nodes", level.count(), DRENCH_LAMBDA(int n) {
+      state.queue, "levels: nodes", level.count(), DRENCH_LAMBDA(int n) {
         if (!*awake) return;
         const Vec3<int> at = level.place(n);
         float sum = 0.f;

@@ -10,7 +10,7 @@ void restrict_nodes(State& state, int l, float* nodes) {
   const NodeLevel fine = h.level[l - 1], coarse = h.level[l];
   const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
-      "levels: down", coarse.count(), DRENCH_LAMBDA(int n) {
+      state.queue, "levels: down", coarse.count(), DRENCH_LAMBDA(int n) {
         if (!*awake) return;
         const Vec3<int> at = coarse.place(n);
         float sum = 0.f;
@@ -30,7 +30,7 @@ void prolong_nodes(State& state, int l, float* nodes) {
   const NodeLevel fine = h.level[l - 1], coarse = h.level[l];
   const int* awake = &state.pressure.control.data()->levels;
   parallel_for(
-      "levels: up", fine.count(), DRENCH_LAMBDA(int n) {
+      state.queue, "levels: up", fine.count(), DRENCH_LAMBDA(int n) {
         if (!*awake) return;
         const Vec3<int> at = fine.place(n);
         const NodeAxis::Parents x = coarse.x.parents(at.x), y = coarse.y.parents(at.y),
@@ -94,7 +94,7 @@ void choose_levels(State& state) {
   const bool sheets = state.contact.near > 0;
   const double most = double(small) * state.parameters.rest_density * state.fluid.count;
   reduce_then(
-      "levels: error", state.fluid.count, 0.0,
+      state.queue, "levels: error", state.fluid.count, 0.0,
       DRENCH_LAMBDA(int i) { return double(max0(source[i])); }, Plus{},
       DRENCH_LAMBDA(double sum) { control->levels = !sheets && sum <= most; });
 }
@@ -131,7 +131,7 @@ void prepare_levels(State& state) {
                          mean(level.x) * mean(level.y) * bend(level.z);
     constexpr float part = 0.3f;  // of a node's own step, as levels overlap
     parallel_for(
-        "levels: stiffness", level.count(), DRENCH_LAMBDA(int n) {
+        state.queue, "levels: stiffness", level.count(), DRENCH_LAMBDA(int n) {
           const int at = level.first + n;
           const float stiffness = smooth * inverse[at] + uneven[at];
           inverse[at] = stiffness > 0.f ? part / stiffness : 0.f;
@@ -149,7 +149,7 @@ void correct_on_levels(State& state, const FreeGradient& gradient) {
   for (int l = 1; l < h.levels; ++l) restrict_nodes(state, l, answer);
   const int all = h.level[h.levels - 1].first + h.level[h.levels - 1].count();
   parallel_for(
-      "levels: scale", all, DRENCH_LAMBDA(int n) { answer[n] *= inverse[n]; });
+      state.queue, "levels: scale", all, DRENCH_LAMBDA(int n) { answer[n] *= inverse[n]; });
   for (int l = h.levels - 1; l > 0; --l) prolong_nodes(state, l, answer);
 }
 
@@ -163,24 +163,24 @@ void remove_mean(State& state) {
   float* source = s.source.data();
   const int n = state.fluid.count;
   reduce_then(
-      "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); }, Plus{},
-      DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
+      state.queue, "solve: mean", n, 0.0, DRENCH_LAMBDA(int i) { return double(source[i]); },
+      Plus{}, DRENCH_LAMBDA(double sum) { control->mean = float(sum / n); });
   parallel_for(
-      "solve: source", n, DRENCH_LAMBDA(int i) { source[i] -= control->mean; });
+      state.queue, "solve: source", n, DRENCH_LAMBDA(int i) { source[i] -= control->mean; });
 }
 
 }  // namespace
 
-void begin_solve(PressureState& s) {
-  SolveControl* control = s.control.data();
+void begin_solve(State& state) {
+  SolveControl* control = state.pressure.control.data();
   parallel_for(
-      "solve: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+      state.queue, "solve: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
 }
 
-void begin_next_solve(PressureState& s) {
-  SolveControl* control = s.control.data();
+void begin_next_solve(State& state) {
+  SolveControl* control = state.pressure.control.data();
   parallel_for(
-      "solve: control", 1, DRENCH_LAMBDA(int) {
+      state.queue, "solve: control", 1, DRENCH_LAMBDA(int) {
         const SolveControl first = *control;
         *control = {};
         control->spent = first.iterations, control->left = first.residual;
@@ -193,7 +193,7 @@ void start_from_last_step(State& state) {
   float *term = state.fluid.pressure_term.data(), *before = state.pressure.before.data();
   const float dt2 = float(state.dt * state.dt);
   parallel_for(
-      "solve: warm start", state.fluid.count,
+      state.queue, "solve: warm start", state.fluid.count,
       DRENCH_LAMBDA(int i) { place[i].w = before[i] = dt2 * term[i]; });
 }
 
@@ -201,7 +201,7 @@ void start_from_nothing(State& state) {
   Float4* place = state.pressure.place.data();
   float* before = state.pressure.before.data();
   parallel_for(
-      "solve: cold start", state.fluid.count,
+      state.queue, "solve: cold start", state.fluid.count,
       DRENCH_LAMBDA(int i) { place[i].w = before[i] = 0.f; });
 }
 
@@ -211,7 +211,7 @@ void keep_pressures(State& state) {
   SolveControl* control = state.pressure.control.data();
   const float inverse_dt2 = float(1 / (state.dt * state.dt)), rest = state.parameters.rest_density;
   reduce_then(
-      "solve: end", state.fluid.count, Two<double>{0., 0.},
+      state.queue, "solve: end", state.fluid.count, Two<double>{0., 0.},
       DRENCH_LAMBDA(int i) {
         term[i] = place[i].w * inverse_dt2;
         const double square = double(term[i]) * term[i];
@@ -259,16 +259,17 @@ void find_pressures(State& state, float least) {
     }
     correct_on_levels(state, gradient);
     reduce_then(
-        "solve: step", n, SolveSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); }, Plus{},
+        state.queue, "solve: step", n, SolveSums{},
+        DRENCH_LAMBDA(int i) { return iteration.step(i); }, Plus{},
         DRENCH_LAMBDA(const SolveSums& sums) { iteration.decide(sums); });
     parallel_for(
-        "solve: extrapolate", n, DRENCH_LAMBDA(int i) { iteration.extrapolate(i); });
+        state.queue, "solve: extrapolate", n, DRENCH_LAMBDA(int i) { iteration.extrapolate(i); });
   }
 }
 
 void solve_pressure(State& state) {
   if (state.fluid.count == 0) return;  // the last ones have just left an open domain
-  begin_solve(state.pressure);
+  begin_solve(state);
   start_from_last_step(state);
   find_pressures(state, no_pull);
   keep_pressures(state);

@@ -89,9 +89,9 @@ struct PressureIteration {
 constexpr float no_pull = 0.f, any_pressure = -1e30f;  // least pressures
 
 /// Before the first solve of a step ...
-void begin_solve(PressureState& s);
+void begin_solve(State& state);
 /// ... and before another one.
-void begin_next_solve(PressureState& s);
+void begin_next_solve(State& state);
 
 /// First guess: the pressures of the last step, in FluidState::pressure_term, ...
 void start_from_last_step(State& state);

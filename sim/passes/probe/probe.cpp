@@ -37,8 +37,8 @@ double surface_height(const State& state, const ProbeQuery& query) {
                    .period = periods_of(p)};
   bool fine = false;
   while (true) {
-    const LineSamples s =
-        parallel_reduce("probe: height", state.fluid.count, LineSamples{}, line, AddLineSamples{});
+    const LineSamples s = parallel_reduce(state.queue, "probe: height", state.fluid.count,
+                                          LineSamples{}, line, AddLineSamples{});
     int k = 0;
     while (k < height_samples && s.density[k] < enough(line.from - float(k) * line.step)) ++k;
     if (k < height_samples && fine) {
@@ -97,12 +97,12 @@ template <int N, class F>
 Totals<N> sum_by_particle(const char* name, const State& state, const F& f) {
   const bool near = state.parameters.incompressible && state.contact.near > 0;
   const Totals<N> away =
-      parallel_reduce(name, state.fluid.count, Totals<N>{},
+      parallel_reduce(state.queue, name, state.fluid.count, Totals<N>{},
                       AwayFromCloth<N, F>{f, near ? state.fluid.triangle.data() : nullptr}, Plus{});
   if (!near) return away;
   const ClothRows rows = cloth_rows(state);
-  return away + parallel_reduce(name, rows.rows, Totals<N>{}, BesideClothOf<N, F>{f, rows.particle},
-                                Plus{});
+  return away + parallel_reduce(state.queue, name, rows.rows, Totals<N>{},
+                                BesideClothOf<N, F>{f, rows.particle}, Plus{});
 }
 
 SoftDisc soft_disc_of(const ProbeQuery& q, const Parameters& p) {
@@ -126,7 +126,7 @@ DiscPoints disc_points(const SoftDisc& disc, int layers, int rings, int spokes) 
 SensorBody cloth_at(const State& state, Vec3<float> centre) {
   const ClothState& c = state.cloth;
   if (!state.parameters.incompressible) return {};
-  return parallel_reduce("probe: sheet", c.triangles, SensorBody{},
+  return parallel_reduce(state.queue, "probe: sheet", c.triangles, SensorBody{},
                          ClothAt{.corners = corners_of(c),
                                  .position = c.position.view(),
                                  .half_thickness = c.half_thickness.data(),
@@ -152,7 +152,7 @@ SensorBody sensor_body(const State& state, const ProbeQuery& q) {
     return fabsf(b.distance) <= reach && fabsf(dot(b.facing, n)) > 0.9f;
   };
   const ObstacleViews obstacles = state.obstacles.views();
-  body = parallel_reduce("probe: obstacle", obstacles.count, SensorBody{},
+  body = parallel_reduce(state.queue, "probe: obstacle", obstacles.count, SensorBody{},
                          ObstacleAt{obstacles, centre, q.on}, NearerBody{});
   if (lies_on(body)) {
     body.facing = dot(body.facing, n) < 0.f ? -n : n;
@@ -171,7 +171,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
   const Parameters& p = state.parameters;
   const ClothState& c = state.cloth;
   if (body.kind == SensorBody::sheet) {
-    return parallel_reduce("probe: sheet's area", c.triangles, Totals<1>{},
+    return parallel_reduce(state.queue, "probe: sheet's area", c.triangles, Totals<1>{},
                            ClothExtent{.corners = corners_of(c),
                                        .position = c.position.view(),
                                        .sheet = c.sheet.data(),
@@ -185,7 +185,7 @@ double surface_extent(const State& state, const ProbeQuery& q, const SoftDisc& d
   if (obstacles.count == 0) return q.extent;
   const DiscPoints points = disc_points(disc, 1, 48, 96);
   const Vec3<float> none{0.f, 0.f, 0.f};
-  return parallel_reduce("probe: area", points.count(), Totals<1>{},
+  return parallel_reduce(state.queue, "probe: area", points.count(), Totals<1>{},
                          SurfaceExtent{points,
                                        {image_walls_of(p), obstacles, none, none, points.cell()},
                                        body,
@@ -229,7 +229,7 @@ double inner_pressure(const State& state, const ProbeQuery& q) {
     const DiscPoints points = disc_points(disc, 32, 16, 32);
     extent =
         parallel_reduce(
-            "probe: volume of a disc", points.count(), Totals<1>{},
+            state.queue, "probe: volume of a disc", points.count(), Totals<1>{},
             InnerExtent{points, {image_walls_of(p), obstacles, normal, sheet.foot, points.cell()}},
             Plus{})
             .value[0];
@@ -286,8 +286,9 @@ double pressure(State& state, const ProbeQuery& query) {
 
 /// Force of the fluid on a range of vertices, N: the impulses they were given in the step, over dt.
 std::vector<double> cloth_force(const State& state, const ProbeQuery& query) {
-  return to_vector(parallel_reduce("probe: cloth force", query.end - query.begin, Totals<3>{},
-                                   VertexForce{state.cloth.force.view(), query.begin}, Plus{}));
+  return to_vector(parallel_reduce(state.queue, "probe: cloth force", query.end - query.begin,
+                                   Totals<3>{}, VertexForce{state.cloth.force.view(), query.begin},
+                                   Plus{}));
 }
 
 std::vector<double> energy(const State& state, const ProbeQuery& query) {
@@ -297,7 +298,7 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const Vec3<float> gravity{p.gravity[0] + p.held[0], p.gravity[1] + p.held[1],
                             p.gravity[2] + p.held[2]};
   const Vec3<float> zero{query.place[0], query.place[1], query.place[2]};
-  const Totals<3> fluid = parallel_reduce("probe: fluid energy", f.count, Totals<3>{},
+  const Totals<3> fluid = parallel_reduce(state.queue, "probe: fluid energy", f.count, Totals<3>{},
                                           PointEnergy{.position = f.position.view(),
                                                       .velocity = f.velocity.view(),
                                                       .masses = nullptr,
@@ -308,7 +309,7 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
   const float behind =
       sheets_are_implicit(p) ? 0.f : float(0.5 * state.dt / std::max(1, state.substeps));
   const Totals<3> cloth =
-      parallel_reduce("probe: cloth energy", c.vertices, Totals<3>{},
+      parallel_reduce(state.queue, "probe: cloth energy", c.vertices, Totals<3>{},
                       VertexEnergy{.points = {.position = c.position.view(),
                                               .velocity = c.velocity.view(),
                                               .masses = c.mass.data(),
@@ -326,7 +327,7 @@ std::vector<double> energy(const State& state, const ProbeQuery& query) {
                                    .behind = behind},
                       Plus{});
   const Totals<3> springs = parallel_reduce(
-      "probe: spring energy", c.vertices, Totals<3>{},
+      state.queue, "probe: spring energy", c.vertices, Totals<3>{},
       SpringEnergy{c.position.view(), spring_ends_of(c), c.rest_length.data(), c.stiffness.data()},
       Plus{});
   return to_vector(fluid + cloth + springs);
@@ -338,7 +339,7 @@ std::vector<double> volume(State& state) {
   const int n = state.fluid.count;
   if (n > 0 && state.parameters.incompressible) measure_density(state);
   const Totals<4> sum =
-      parallel_reduce("probe: volume", n, Totals<4>{},
+      parallel_reduce(state.queue, "probe: volume", n, Totals<4>{},
                       PositionAndDensity{state.fluid.position.view(), state.fluid.density.data(),
                                          1.f / state.parameters.rest_density},
                       Plus{});
@@ -350,13 +351,14 @@ std::vector<double> volume(State& state) {
 
 /// Mean of the particles whose centres are in a ball, m/s.
 std::vector<double> mean_velocity(const State& state, const ProbeQuery& q) {
-  const Totals<4> sum = parallel_reduce("probe: velocity", state.fluid.count, Totals<4>{},
-                                        VelocityInBall{state.fluid.position.view(),
-                                                       state.fluid.velocity.view(),
-                                                       {q.place[0], q.place[1], q.place[2]},
-                                                       periods_of(state.parameters),
-                                                       q.radius * q.radius},
-                                        Plus{});
+  const Totals<4> sum =
+      parallel_reduce(state.queue, "probe: velocity", state.fluid.count, Totals<4>{},
+                      VelocityInBall{state.fluid.position.view(),
+                                     state.fluid.velocity.view(),
+                                     {q.place[0], q.place[1], q.place[2]},
+                                     periods_of(state.parameters),
+                                     q.radius * q.radius},
+                      Plus{});
   if (sum.value[3] == 0) return std::vector<double>(3, std::numeric_limits<double>::quiet_NaN());
   return {sum.value[0] / sum.value[3], sum.value[1] / sum.value[3], sum.value[2] / sum.value[3]};
 }
@@ -366,7 +368,7 @@ double front(const State& state, const ProbeQuery& q) {
   if (state.fluid.count == 0) return std::numeric_limits<double>::quiet_NaN();
   return 0.5 * state.parameters.spacing +
          parallel_reduce(
-             "probe: front", state.fluid.count, -1e30,
+             state.queue, "probe: front", state.fluid.count, -1e30,
              PositionAlong{state.fluid.position.view(), {q.normal[0], q.normal[1], q.normal[2]}},
              Larger{});
 }

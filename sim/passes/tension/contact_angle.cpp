@@ -14,7 +14,7 @@ void find_faces(State& state) {
   const Float4* surface = state.tension.normal.data();
   Float4* face = state.tension.wetting.data();
   parallel_for(
-      "contact angles: faces", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "contact angles: faces", state.fluid.count, DRENCH_LAMBDA(int i) {
         const Mirrors mirrors = images.of(i);
         Float4 largest{0.f, 0.f, 0.f, 0.f};
         for (int k = 0; k < mirrors.count; ++k) {
@@ -43,8 +43,8 @@ void apply_contact_angles(State& state) {
     const float strength = float(state.dt) * p.surface_tension / (p.rest_density * h);
     const FaceForce<Separation> force{s.place.data(), state.tension.wetting.data(), kick,
                                       scale * strength, separation};
-    for_each_neighbour("contact angles: force", s.lists, state.fluid.count, force);
-    for_each_neighbour("contact angles: velocities", s.lists, state.fluid.count,
+    for_each_neighbour(state.queue, "contact angles: force", s.lists, state.fluid.count, force);
+    for_each_neighbour(state.queue, "contact angles: velocities", s.lists, state.fluid.count,
                        SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
   });
 }

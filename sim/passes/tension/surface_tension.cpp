@@ -9,7 +9,7 @@ void make_unit(State& state) {
   Float4* normal = state.tension.normal.data();
   const float h = state.parameters.support_radius;
   parallel_for(
-      "tension: unit normals", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "tension: unit normals", state.fluid.count, DRENCH_LAMBDA(int i) {
         const Float4 n = normal[i];
         const float size = square_root(n.x * n.x + n.y * n.y + n.z * n.z);
         const float s = size > 0.f ? 1.f / size : 0.f;
@@ -23,7 +23,7 @@ void add_images(const char* name, const State& state, Float4* vector, const Term
   const MirrorImages images = mirror_images_of(state);
   if (!images.any) return;
   parallel_for(
-      name, state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, name, state.fluid.count, DRENCH_LAMBDA(int i) {
         const Mirrors mirrors = images.of(i);
         if (mirrors.count == 0) return;
         const Vec3<float> s = images.sum(i, mirrors, term).total();
@@ -42,7 +42,7 @@ void pull_on_walls(State& state, const TensionForce<Separation>& force) {
   Float4* kick = force.kick;
   const float mass = state.parameters.particle_mass;
   parallel_for(
-      "tension: force of walls", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "tension: force of walls", state.fluid.count, DRENCH_LAMBDA(int i) {
         const Mirrors mirrors = images.of(i);
         if (mirrors.count == 0) return;
         const ImageSums sums = images.sum(i, mirrors, force);
@@ -67,16 +67,16 @@ void apply_surface_tension(State& state) {
     using Separation = decltype(separation);
     const float scale = gradient_scale(p) / p.rest_density;
     const ColourGradient<Separation> colour{s.place.data(), gradient, scale, separation};
-    for_each_neighbour("tension: gradients", s.lists, n, colour);
+    for_each_neighbour(state.queue, "tension: gradients", s.lists, n, colour);
     add_images("tension: gradients beyond walls", state, gradient, colour);
     const SmoothNormal smooth{gradient, normal, scale * h * h};
-    for_each_neighbour("tension: normals", s.lists, n, smooth);
+    for_each_neighbour(state.queue, "tension: normals", s.lists, n, smooth);
     add_images("tension: normals beyond walls", state, normal, smooth);
     make_unit(state);
     const TensionForce<Separation> force = tension_force(state, kick, separation);
-    for_each_neighbour("tension: force", s.lists, n, force);
+    for_each_neighbour(state.queue, "tension: force", s.lists, n, force);
     pull_on_walls(state, force);
-    for_each_neighbour("tension: velocities", s.lists, n,
+    for_each_neighbour(state.queue, "tension: velocities", s.lists, n,
                        SmoothKick{kick, state.fluid.velocity.view(), scale * h * h});
   });
 }

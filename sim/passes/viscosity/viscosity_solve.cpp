@@ -38,7 +38,7 @@ void set_drag_near_cloth(State& state, const BodyDrag& law) {
   ViscosityState& s = state.viscosity;
   Float4 *rate = s.body_rate.data(), *cross = s.body_cross.data(), *source = s.body_source.data();
   parallel_for(
-      "drag: near sheets", gaps.rows.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "drag: near sheets", gaps.rows.rows, DRENCH_LAMBDA(int row) {
         const int i = gaps.rows.particle[row];
         rates.along[row] = rates.across[row] = 0.f;
         if (i < 0) return;
@@ -69,7 +69,7 @@ void find_body_drag(State& state) {
   ViscosityState& s = state.viscosity;
   Float4 *rate = s.body_rate.data(), *cross = s.body_cross.data(), *source = s.body_source.data();
   parallel_for(
-      "drag: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "drag: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
         if (triangle && triangle[i] >= 0) return;
         const WallDrag drag = law.of({place[i].x, place[i].y, place[i].z}, BesideCloth{});
         rate[i] = {drag.rate.x, drag.rate.y, drag.rate.z, 0.f};
@@ -90,7 +90,7 @@ Impulse drag_impulse(const State& state, int which) {
   const int* triangle = sheets ? state.fluid.triangle.data() : nullptr;
   const ObstacleViews obstacles = state.obstacles.views();
   const Impulse far = parallel_reduce(
-      "drag: impulse", state.fluid.count, Impulse{},
+      state.queue, "drag: impulse", state.fluid.count, Impulse{},
       DRENCH_LAMBDA(int i) {
         if (triangle && triangle[i] >= 0) return Impulse{};
         WallDrag drag{};
@@ -104,7 +104,7 @@ Impulse drag_impulse(const State& state, int which) {
   if (!sheets) return far;
   const ClothGaps gaps = cloth_gaps(state, state.cloth.next_velocity.view());  // swapped by now
   const Impulse near = parallel_reduce(
-      "drag: impulse near sheets", gaps.rows.rows, Impulse{},
+      state.queue, "drag: impulse near sheets", gaps.rows.rows, Impulse{},
       DRENCH_LAMBDA(int row) {
         const int i = gaps.rows.particle[row];
         if (i < 0) return Impulse{};
@@ -143,7 +143,7 @@ VertexLoads sum_drag_loads(State& state) {
 void invert_drag_blocks(State& state) {
   const ClothDragRows drag = cloth_drag_rows(state);
   parallel_for(
-      "sheet drag: shares", drag.rows.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheet drag: shares", drag.rows.rows, DRENCH_LAMBDA(int row) {
         drag.load.set(row, {drag.rates.along[row], drag.rates.across[row], 0.f});
       });
   const VertexLoads loads = sum_drag_loads(state);
@@ -151,7 +151,7 @@ void invert_drag_blocks(State& state) {
   const ConstraintProjection constraints = constraint_projection(state);
   const float mass = state.parameters.particle_mass, *inertia = state.cloth_system.inertia.data();
   parallel_for(
-      "sheet drag: blocks", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "sheet drag: blocks", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         const float d0 = 1.f / whole.field(0)[v], d1 = 1.f / whole.field(1)[v],
                     d2 = 1.f / whole.field(2)[v], l10 = whole.field(3)[v], l20 = whole.field(4)[v],
                     l21 = whole.field(5)[v], more = mass * loads.on(v).x;
@@ -192,7 +192,7 @@ void load_by_drag(State& state) {
                      more = state.cloth_system.answer.view();
   const float inverse_dt = float(1 / state.dt);
   parallel_for(
-      "sheet drag: loads", drag.rows.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheet drag: loads", drag.rows.rows, DRENCH_LAMBDA(int row) {
         const int i = drag.rows.particle[row];
         if (i < 0) return drag.load.set(row, {0.f, 0.f, 0.f});
         const Vec3<float> sheet = drag.rows.at_foot(row, velocity) +
@@ -205,12 +205,12 @@ void load_by_drag(State& state) {
 /// Before the fluid's own start, at whose velocities the solve begins.
 void start_cloth_drag(State& state) {
   invert_drag_blocks(state);
-  state.cloth_system.answer.clear();
+  state.cloth_system.answer.clear(state.queue);
   load_by_drag(state);
   const VertexLoads loads = sum_drag_loads(state);
   const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
-      "sheet drag: start", state.cloth.vertices, Two<double>{0, 0},
+      state.queue, "sheet drag: start", state.cloth.vertices, Two<double>{0, 0},
       DRENCH_LAMBDA(int v) { return iteration.start(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) { iteration.keep(sums); });
 }
@@ -223,7 +223,7 @@ void multiply_cloth_drag(State& state) {
   const ConstVecView of_vertex = state.cloth_system.direction.view();
   const ViscousControl* control = state.viscosity.control.data();
   parallel_for(
-      "sheet drag: rows", drag.rows.rows, DRENCH_LAMBDA(int row) {
+      state.queue, "sheet drag: rows", drag.rows.rows, DRENCH_LAMBDA(int row) {
         const int i = drag.rows.particle[row];
         if (i < 0 || control->done) return;
         const Vec3<float> d{direction[i].x, direction[i].y, direction[i].z},
@@ -235,7 +235,7 @@ void multiply_cloth_drag(State& state) {
   const VertexLoads loads = sum_drag_loads(state);
   const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
-      "sheet drag: curvature", state.cloth.vertices, 0.,
+      state.queue, "sheet drag: curvature", state.cloth.vertices, 0.,
       DRENCH_LAMBDA(int v) { return iteration.curvature(v, loads.on(v)); }, Plus{},
       DRENCH_LAMBDA(double sum) { iteration.control->sheet_curvature = sum; });
 }
@@ -243,7 +243,7 @@ void multiply_cloth_drag(State& state) {
 void step_cloth_drag(State& state) {
   const ClothDragIteration iteration = cloth_drag_iteration(state);
   reduce_then(
-      "sheet drag: step", state.cloth.vertices, Two<double>{0, 0},
+      state.queue, "sheet drag: step", state.cloth.vertices, Two<double>{0, 0},
       DRENCH_LAMBDA(int v) { return iteration.step(v); }, Plus{},
       DRENCH_LAMBDA(const Two<double>& sums) {
         if (!iteration.control->done) iteration.keep(sums);
@@ -253,7 +253,8 @@ void step_cloth_drag(State& state) {
 void turn_cloth_drag(State& state) {
   const ClothDragIteration iteration = cloth_drag_iteration(state);
   parallel_for(
-      "sheet drag: turn", state.cloth.vertices, DRENCH_LAMBDA(int v) { iteration.turn(v); });
+      state.queue, "sheet drag: turn", state.cloth.vertices,
+      DRENCH_LAMBDA(int v) { iteration.turn(v); });
 }
 
 /// What the fluid lost to the sheets is a load of their step like those of the pressures. What the
@@ -268,7 +269,7 @@ void give_back_cloth_drag(State& state) {
   const int* grip = state.parameters.obstacles > 0 ? s.grip.data() : nullptr;
   const ConstVecView rub = s.rub.view();
   parallel_for(
-      "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         right.set(v, right[v] + loads.on(v) * (mass * dt));
         change.set(v, change[v] + more[v] * dt);
         const bool rubs = grip && grip[v] >= 0;  // friction as settle_at_obstacles has found it
@@ -316,35 +317,38 @@ void solve_viscosity(State& state, const Separation& separation) {
   const ViscousProduct<Separation> product{pairs, s.direction.data(), s.product.data(),
                                            &s.control.data()->done};
   const NeighbourLists& lists = state.pressure.lists;
-  for_each_neighbour("viscosity: blocks", lists, n,
+  for_each_neighbour(state.queue, "viscosity: blocks", lists, n,
                      ViscousBlocks<Separation>{pairs, s.diagonal.data(), s.cross.data()});
   ViscousControl* control = s.control.data();
   parallel_for(
-      "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
+      state.queue, "viscosity: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   parallel_for(
-      "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
+      state.queue, "viscosity: guess", n, DRENCH_LAMBDA(int i) { iteration.guess(i); });
   const bool sheets = drags_cloth(state);
-  for_each_neighbour("viscosity: product", lists, n, product);
+  for_each_neighbour(state.queue, "viscosity: product", lists, n, product);
   if (sheets) start_cloth_drag(state);
   reduce_then(
-      "viscosity: start", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.start(i); },
-      Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
+      state.queue, "viscosity: start", n, ViscousSums{},
+      DRENCH_LAMBDA(int i) { return iteration.start(i); }, Plus{},
+      DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_start(sums); });
   for (int k = 0; !ended(s.control, k, state.parameters.most_viscous_iterations); ++k) {
-    for_each_neighbour("viscosity: product", lists, n, product);
+    for_each_neighbour(state.queue, "viscosity: product", lists, n, product);
     if (sheets) multiply_cloth_drag(state);
     reduce_then(
-        "viscosity: curvature", n, 0., DRENCH_LAMBDA(int i) { return iteration.curvature(i); },
-        Plus{}, DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
+        state.queue, "viscosity: curvature", n, 0.,
+        DRENCH_LAMBDA(int i) { return iteration.curvature(i); }, Plus{},
+        DRENCH_LAMBDA(double sum) { iteration.decide_step(sum); });
     if (sheets) step_cloth_drag(state);
     reduce_then(
-        "viscosity: step", n, ViscousSums{}, DRENCH_LAMBDA(int i) { return iteration.step(i); },
-        Plus{}, DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
+        state.queue, "viscosity: step", n, ViscousSums{},
+        DRENCH_LAMBDA(int i) { return iteration.step(i); }, Plus{},
+        DRENCH_LAMBDA(const ViscousSums& sums) { iteration.decide_turn(sums); });
     parallel_for(
-        "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
+        state.queue, "viscosity: turn", n, DRENCH_LAMBDA(int i) { iteration.turn(i); });
     if (sheets) turn_cloth_drag(state);
   }
   parallel_for(
-      "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
+      state.queue, "viscosity: end", n, DRENCH_LAMBDA(int i) { iteration.end(i); });
   if (sheets) give_back_cloth_drag(state);
 }
 
@@ -353,12 +357,12 @@ void step_viscosity(State& state, const Separation& separation) {
   const VecView v = state.fluid.velocity.view();
   Float4* vector = state.pressure.scratch_a.data();
   parallel_for(
-      "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
+      state.queue, "viscosity: velocities", state.fluid.count, DRENCH_LAMBDA(int i) {
         vector[i] = {v.x[i], v.y[i], v.z[i], 0.f};
       });
   const ViscousProduct<Separation> product{viscous_pairs_of(state, separation), vector, nullptr,
                                            nullptr};
-  for_each_neighbour("viscosity", state.pressure.lists, state.fluid.count,
+  for_each_neighbour(state.queue, "viscosity", state.pressure.lists, state.fluid.count,
                      ExplicitViscosity<Separation>{product, v});
 }
 

@@ -30,11 +30,14 @@ DensitySum<Kernel> density_pass(State& state) {
 
 void sum_density(State& state) {
   if (state.cloth.triangles == 0) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state));
+    for_each_pair(state.queue, "density", grid_of(state), state.fluid.count,
+                  density_pass<Spiky>(state));
   } else if (state.parameters.paper) {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Poly6>(state));
+    for_each_pair(state.queue, "density", grid_of(state), state.fluid.count,
+                  density_pass<Poly6>(state));
   } else {
-    for_each_pair("density", grid_of(state), state.fluid.count, density_pass<Spiky>(state),
+    for_each_pair(state.queue, "density", grid_of(state), state.fluid.count,
+                  density_pass<Spiky>(state),
                   cloth_filter(state, state.fluid.position.view(), Shaded::near));
   }
 }
@@ -55,10 +58,10 @@ void pressure_viscosity(State& state) {
                                .gravity = {p.gravity[0], p.gravity[1], p.gravity[2]},
                                .walls = halfspace_walls_of(p)};
   if (state.cloth.triangles > 0 && !p.paper) {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass,
+    for_each_pair(state.queue, "pressure and viscosity", grid_of(state), f.count, pass,
                   cloth_filter(state, state.fluid.position.view(), Shaded::hidden));
   } else {
-    for_each_pair("pressure and viscosity", grid_of(state), f.count, pass);
+    for_each_pair(state.queue, "pressure and viscosity", grid_of(state), f.count, pass);
   }
 }
 
@@ -68,7 +71,8 @@ void integrate_velocity(State& state) {
   const ConstVecView a = f.acceleration.view();
   const float dt = float(state.dt);
   parallel_for(
-      "integrate velocity", f.count, DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
+      state.queue, "integrate velocity", f.count,
+      DRENCH_LAMBDA(int i) { v.set(i, v[i] + a[i] * dt); });
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND
