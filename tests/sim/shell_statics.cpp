@@ -1,0 +1,192 @@
+#include "tests/sim/shell_statics.h"
+
+#include <numeric>
+
+namespace drench::sim_tests {
+
+using namespace sim::cpu;
+
+namespace {
+
+constexpr double forever = 1e30;
+using V = Vec3<double>;
+
+V of(const V3d& v) { return {v.x, v.y, v.z}; }
+V3d from(const V& v) { return {v.x, v.y, v.z}; }
+
+/// Curvatures of a patch less those of rest, and the normal they are along.
+struct Bent {
+  Curvature<V> kappa;
+  TurningNormal<double> normal;
+};
+
+template <class Place>
+Bent bent(const sim::BendingPatch& p, double area, const Place& place) {
+  Curvature<V> kappa{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  for (int k = 0; k < p.nodes; ++k) add_node(kappa, p.weight[size_t(k)], place(k));
+  const TurningNormal<double> normal(place(0), place(1), place(2), area);
+  return {beyond_rest(kappa, p.rest, normal.normal), normal};
+}
+
+}  // namespace
+
+ShellStatics::ShellStatics(const sim::ShellSurface& surface, const sim::ShellConstants& constants,
+                           const MembraneLaw<double>& law)
+    : x(surface.rest),
+      load(surface.rest.size(), V3d(0)),
+      surface_(surface),
+      rest_(sim::shell_rest(surface, constants)),
+      law_(law) {
+  for (const V3d& place : surface.rest) guide.push_back(place.x);
+}
+
+void ShellStatics::add_gravity(V3d gravity) {
+  for (size_t v = 0; v < load.size(); ++v) load[v] += gravity * rest_.mass[v];
+}
+
+V ShellStatics::place(const sim::BendingPatch& patch, int k) const {
+  return of(x[size_t(patch.node[size_t(k)])] + patch.shift[size_t(k)]);
+}
+
+double ShellStatics::energy() const {
+  double energy = 0;
+  for (size_t t = 0; t < rest_.triangle.size(); ++t) {
+    const auto& corner = surface_.triangle[t];
+    const auto& r = rest_.triangle[t];
+    const auto f =
+        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    energy += r.area * law_.at(green_strain(f), {0, 0, 0}, forever).energy;
+    const auto& p = rest_.patch[t];
+    if (p.nodes == 0) continue;
+    const auto b = bent(p, r.area, [&](int k) { return place(p, k); });
+    energy += bending_energy(r.area * p.share, rest_.bending, b.kappa);
+  }
+  for (size_t v = 0; v < x.size(); ++v) energy -= load[v].dot(x[v] - surface_.rest[v]);
+  return energy;
+}
+
+std::vector<V3d> ShellStatics::forces() const {
+  std::vector<V3d> force = load;
+  for (size_t t = 0; t < rest_.triangle.size(); ++t) {
+    const auto& corner = surface_.triangle[t];
+    const auto& r = rest_.triangle[t];
+    const auto f =
+        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    const auto stress = law_.at(green_strain(f), {0, 0, 0}, forever).stress;
+    for (int c = 0; c < 3; ++c) force[corner[c]] += from(membrane_force(r, f, stress, c));
+    const auto& p = rest_.patch[t];
+    if (p.nodes == 0) continue;
+    const auto b = bent(p, r.area, [&](int k) { return place(p, k); });
+    const auto m = moment(rest_.bending, b.kappa);
+    const double area = r.area * p.share;
+    for (int k = 0; k < p.nodes; ++k)
+      force[p.node[k]] += from(bending_force(area, m, p.weight[k]));
+    for (int c = 0; c < 3; ++c)
+      force[p.node[c]] += from(turning_force(area, m, p.rest, b.normal, c));
+  }
+  for (size_t v = 0; v < x.size(); ++v)
+    if (!surface_.held.empty() && surface_.held[v]) force[v] = V3d(0);
+  return force;
+}
+
+int ShellStatics::assemble(Tangent tangent) {
+  const int n = int(x.size());
+  if (!matrix_) {
+    std::vector<int> order(size_t(n), 0);
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return guide[a] < guide[b]; });
+    unknown_.assign(size_t(n), -1);
+    int next = 0;
+    for (const int v : order)
+      if (surface_.held.empty() || !surface_.held[v]) unknown_[v] = next, next += 3;
+    std::vector<int> first(size_t(next), 0);
+    std::iota(first.begin(), first.end(), 0);
+    const auto join = [&](int a, int b) {
+      if (unknown_[a] < 0 || unknown_[b] < 0) return;
+      for (int i = 0; i < 3; ++i)
+        first[unknown_[a] + i] = std::min(first[unknown_[a] + i], unknown_[b]);
+    };
+    for (size_t t = 0; t < rest_.patch.size(); ++t) {
+      for (const int a : surface_.triangle[t])
+        for (const int b : surface_.triangle[t]) join(a, b);
+      const auto& p = rest_.patch[t];
+      for (int i = 0; i < p.nodes; ++i)
+        for (int j = 0; j < p.nodes; ++j) join(p.node[i], p.node[j]);
+    }
+    matrix_ = std::make_unique<Skyline>(first);
+  }
+  matrix_->clear();
+  const auto add = [&](int a, int b, const Block3<double>& block) {
+    const int row = unknown_[a], column = unknown_[b];
+    if (row < 0 || column < 0 || column > row) return;
+    const V rows[3] = {block.x, block.y, block.z};
+    for (int i = 0; i < 3; ++i) {
+      const double entry[3] = {rows[i].x, rows[i].y, rows[i].z};
+      for (int j = 0; j < 3 && column + j <= row + i; ++j)
+        matrix_->at(row + i, column + j) += entry[j];
+    }
+  };
+  for (size_t t = 0; t < rest_.triangle.size(); ++t) {
+    const auto& corner = surface_.triangle[t];
+    const auto& r = rest_.triangle[t];
+    const auto f =
+        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    const auto answer = law_.at(green_strain(f), {0, 0, 0}, forever);
+    const auto stress =
+        tangent == Tangent::projected ? positive_part(answer.stress) : answer.stress;
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        add(corner[a], corner[b], membrane_block(r, f, stress, answer.moduli, a, b));
+    const auto& p = rest_.patch[t];
+    for (int i = 0; i < p.nodes; ++i) {
+      for (int j = 0; j < p.nodes; ++j) {
+        const double w =
+            bending_weight(r.area * p.share, rest_.bending, p.weight[i], p.weight[j]);
+        add(p.node[i], p.node[j], {{w, 0, 0}, {0, w, 0}, {0, 0, w}});
+      }
+    }
+  }
+  return matrix_->factor();
+}
+
+int ShellStatics::solve(double tolerance, int most_iterations) {
+  double largest = 0;
+  for (const V3d& f : load) largest = std::max(largest, f.length());
+  double now = energy();
+  for (int k = 0; k < most_iterations; ++k) {
+    const std::vector<V3d> f = forces();
+    double left = 0;
+    for (const V3d& force : f) left = std::max(left, force.length());
+    if (left <= tolerance * largest) return k;
+    if (assemble(Tangent::exact) > 0) assemble(Tangent::projected);
+    std::vector<double> right;
+    right.resize(3 * x.size());
+    size_t unknowns = 0;
+    for (size_t v = 0; v < x.size(); ++v) {
+      if (unknown_[v] < 0) continue;
+      for (int i = 0; i < 3; ++i) right[size_t(unknown_[v] + i)] = f[v][i];
+      unknowns += 3;
+    }
+    right.resize(unknowns);
+    const std::vector<double> step = matrix_->solve(right);
+    double slope = 0;
+    for (size_t i = 0; i < unknowns; ++i) slope += step[i] * right[i];
+    const std::vector<V3d> old = x;
+    double share = 1;
+    for (;; share /= 2) {
+      for (size_t v = 0; v < x.size(); ++v)
+        if (unknown_[v] >= 0)
+          x[v] = old[v] + V3d(step[unknown_[v]], step[unknown_[v] + 1], step[unknown_[v] + 2]) * share;
+      const double after = energy();
+      if (after <= now - 1e-4 * share * slope + 1e-14 * std::abs(now) || share < 1e-6) {
+        now = after;
+        break;
+      }
+    }
+  }
+  return -1;
+}
+
+int ShellStatics::negative_eigenvalues() { return assemble(Tangent::exact); }
+
+}  // namespace drench::sim_tests
