@@ -90,11 +90,6 @@ Frame frame_of(const ShellSurface& s, const std::array<int, 3>& t) {
   return f;
 }
 
-/// A linear function of the six points of a patch: corners and far corners of the neighbours.
-struct Weights6 {
-  Row corner{0, 0, 0}, flap{0, 0, 0};
-};
-
 /// Inverse of a symmetric positive definite matrix of n <= 3 rows, by Gauss and Jordan.
 std::array<Row, 3> inverse(std::array<Row, 3> a, int n) {
   std::array<Row, 3> b{Row{1, 0, 0}, Row{0, 1, 0}, Row{0, 0, 1}};
@@ -117,13 +112,25 @@ Row compliance_times(const Rigidity<double>& d, const Row& m) {
 
 enum class Side { free, joined, clamped };
 
-/// Patches of one triangle and the slopes of its quadratic surface.
+/// What a point adds to second derivatives, by its place.
+struct Point {
+  int vertex;
+  V3d offset;  // m, of the vertex as the triangle sees it across a seam
+  Row weight;
+};
+
+/// The quadratic surface of a triangle.
 struct Patch {
   Frame frame;
   std::array<Side, 3> side;
-  std::array<int, 3> flap{-1, -1, -1};         // vertex across a side
-  std::array<std::array<double, 3>, 3> reach;  // barycentric coordinates of the flap's place
-  std::array<Weights6, 3> slope;               // along the outward unit normal of each side
+  std::array<Point, 3> flap;     // the far corner across a side; its weight is dkappa / dd
+  std::array<Row, 3> reach;      // barycentric coordinates of its place
+  std::array<Row, 3> condition;  // C: d of a surface of unit second derivatives
+  std::vector<Point> kappa;
+
+  int conditions() const {
+    return int(std::count_if(side.begin(), side.end(), [](Side s) { return s != Side::free; }));
+  }
 };
 
 int corner_across(const ShellSurface& s, int triangle, int neighbour) {
@@ -141,6 +148,13 @@ bool is_held(const ShellSurface& s, const std::array<int, 3>& t) {
   return s.held[node_of(s, t[0])] && s.held[node_of(s, t[1])] && s.held[node_of(s, t[2])];
 }
 
+/// m, of the vertices of the neighbour across side k as the triangle sees them.
+V3d offset_across(const ShellSurface& s, int t, int k) {
+  const int n = s.neighbour[t][k];
+  return shift_of(s, s.triangle[t][k]) -
+         shift_of(s, s.triangle[n][(corner_across(s, t, n) + 1) % 3]);
+}
+
 /// Where the far corner of a neighbour lies when it is folded about side k into the plane of the
 /// triangle: by the lengths along and across the side, taken in the neighbour's own plane.
 V2d unfolded(const ShellSurface& s, const Frame& f, int k, const std::array<int, 3>& t,
@@ -155,7 +169,7 @@ V2d unfolded(const ShellSurface& s, const Frame& f, int k, const std::array<int,
 
 /// C kappa = d of the flaps that there are, d_k the offset of flap k from the plane of the
 /// triangle: kappa = D^-1 C^T (C D^-1 C^T + eps)^-1 d is of least energy among what fits.
-void fit_quadratic(Patch& p, const Rigidity<double>& bending, const std::array<Row, 3>& c) {
+void fit_quadratic(Patch& p, const Rigidity<double>& bending) {
   std::array<int, 3> with;
   int n = 0;
   for (int k = 0; k < 3; ++k)
@@ -163,47 +177,94 @@ void fit_quadratic(Patch& p, const Rigidity<double>& bending, const std::array<R
   std::array<Row, 3> gram{}, compliant{};
   double trace = 0;
   for (int i = 0; i < n; ++i) {
-    compliant[i] = compliance_times(bending, c[with[i]]);
-    for (int j = 0; j < n; ++j) gram[j][i] = dot(compliant[i], c[with[j]]);
+    compliant[i] = compliance_times(bending, p.condition[with[i]]);
+    for (int j = 0; j < n; ++j) gram[j][i] = dot(compliant[i], p.condition[with[j]]);
     trace += gram[i][i];
   }
   for (int i = 0; i < n; ++i) gram[i][i] += misfit * trace / n;
   const std::array<Row, 3> fit = inverse(gram, n);
-  for (int k = 0; k < 3; ++k) {
-    const V2d normal = p.frame.outward(k).normalized();
-    for (int v = 0; v < 3; ++v) p.slope[k].corner[v] = p.frame.gradient[v].dot(normal);
-    const Row rise = p.frame.bubble_slope(k, normal);
-    for (int j = 0; j < n; ++j) {
-      double of_flap = 0;
-      for (int i = 0; i < n; ++i) of_flap += dot(rise, compliant[i]) * fit[i][j];
-      p.slope[k].flap[with[j]] = of_flap;
-      for (int v = 0; v < 3; ++v) p.slope[k].corner[v] -= of_flap * p.reach[with[j]][v];
-    }
+  for (int j = 0; j < n; ++j) {
+    Row& weight = p.flap[with[j]].weight;
+    for (int i = 0; i < n; ++i)
+      for (int r = 0; r < 3; ++r) weight[r] += compliant[i][r] * fit[i][j];
   }
 }
 
 Patch patch_of(const ShellSurface& s, int t, const Rigidity<double>& bending) {
   Patch p;
   p.frame = frame_of(s, s.triangle[t]);
-  std::array<Row, 3> c{};
   for (int k = 0; k < 3; ++k) {
     const int n = s.neighbour[t][k];
     p.side[k] = n < 0 ? Side::free : is_held(s, s.triangle[n]) ? Side::clamped : Side::joined;
+    p.flap[k] = {-1, V3d(0), {0, 0, 0}};
     if (n < 0) continue;
     const int shared = corner_across(s, t, n);
-    p.flap[k] = s.triangle[n][(shared + 2) % 3];
+    p.flap[k].vertex = s.triangle[n][(shared + 2) % 3];
+    p.flap[k].offset = offset_across(s, t, k);
     const V2d place = unfolded(s, p.frame, k, s.triangle[n], shared);
     p.reach[k] = p.frame.barycentric(place);
-    c[k] = p.frame.bubble(place);
+    p.condition[k] = p.frame.bubble(place);
     if (p.side[k] != Side::clamped) continue;
     // the plane of the neighbour continues the surface: its slope, times its height, is d
     const V2d normal = p.frame.outward(k).normalized();
     const double height = normal.dot(place - p.frame.corner[k]);
-    c[k] = p.frame.bubble_slope(k, normal);
-    for (double& entry : c[k]) entry *= height;
+    p.condition[k] = p.frame.bubble_slope(k, normal);
+    for (double& entry : p.condition[k]) entry *= height;
   }
-  fit_quadratic(p, bending, c);
+  fit_quadratic(p, bending);
   return p;
+}
+
+Row sum(const Row& a, const Row& b, double w) {
+  return {a[0] + w * b[0], a[1] + w * b[1], a[2] + w * b[2]};
+}
+
+/// Second derivatives in axes that are turned by the angle of cosine c and sine s against theirs.
+Row turned(const Row& k, double c, double s) {
+  return {c * c * k[0] + s * s * k[1] + c * s * k[2], s * s * k[0] + c * c * k[1] - c * s * k[2],
+          2 * c * s * (k[1] - k[0]) + (c * c - s * s) * k[2]};
+}
+
+/// What the patch says by its own flaps.
+std::vector<Point> own_points(const ShellSurface& s, int t, const Patch& p) {
+  std::vector<Point> points;
+  for (int c = 0; c < 3; ++c) points.push_back({s.triangle[t][c], V3d(0), {0, 0, 0}});
+  for (int k = 0; k < 3; ++k) {
+    if (p.side[k] == Side::free) continue;
+    points.push_back(p.flap[k]);
+    for (int c = 0; c < 3; ++c)
+      points[c].weight = sum(points[c].weight, p.flap[k].weight, -p.reach[k][c]);
+  }
+  return points;
+}
+
+/// A patch at a free side lacks a condition: of the surfaces that fit, the one whose second
+/// derivatives are nearest to the mean of those of its neighbours that lack none.
+void follow_neighbours(const ShellSurface& s, std::vector<Patch>& patches, int t) {
+  Patch& p = patches[t];
+  if (p.conditions() == 3) return;
+  std::vector<int> whole;
+  for (int k = 0; k < 3; ++k)
+    if (p.side[k] == Side::joined && patches[s.neighbour[t][k]].conditions() == 3)
+      whole.push_back(k);
+  for (const int k : whole) {
+    const int n = s.neighbour[t][k], shared = corner_across(s, t, n);
+    const V2d here = p.frame.side(k).normalized(),
+              there = -patches[n].frame.side(shared).normalized();
+    const double cosine = here.dot(there), sine = there.x * here.y - there.y * here.x;
+    for (Point point : patches[n].kappa) {
+      // here = R(angle) there: this triangle's axes are turned by -angle against the neighbour's
+      const Row mean = turned(point.weight, cosine, -sine);
+      point.weight = mean;
+      for (int j = 0; j < 3; ++j) {
+        if (p.side[j] == Side::free) continue;
+        point.weight = sum(point.weight, p.flap[j].weight, -dot(p.condition[j], mean));
+      }
+      for (double& w : point.weight) w /= double(whole.size());
+      point.offset += p.flap[k].offset;
+      p.kappa.push_back(point);
+    }
+  }
 }
 
 /// The nodes of a patch of patches, each once.
@@ -242,25 +303,20 @@ void add_side(const ShellSurface& s, const std::vector<Patch>& patches, int t, i
   const double chord = scale / length;
   to.add(corner[(k + 1) % 3], V3d(0), along(side, chord));
   to.add(corner[k], V3d(0), along(side, -chord));
-  const int n = s.neighbour[t][k];
   const bool mean = p.side[k] == Side::joined;
   const auto add_slope = [&](int of, int shown, double w, V3d offset) {
-    const auto& v = s.triangle[of];
-    const Weights6& slope = patches[of].slope[shown];
-    for (int c = 0; c < 3; ++c) to.add(v[c], offset, along(across, w * slope.corner[c]));
-    for (int c = 0; c < 3; ++c) {
-      const int beyond = s.neighbour[of][c];
-      if (beyond < 0) continue;
-      const int back = corner_across(s, of, beyond);  // the flap as the triangle sees it
-      const V3d seen = offset + shift_of(s, v[c]) - shift_of(s, s.triangle[beyond][(back + 1) % 3]);
-      to.add(patches[of].flap[c], seen, along(across, w * slope.flap[c]));
-    }
+    const Frame& f = patches[of].frame;
+    const V2d normal = f.outward(shown).normalized();
+    const Row rise = f.bubble_slope(shown, normal);
+    for (int c = 0; c < 3; ++c)
+      to.add(s.triangle[of][c], offset, along(across, w * f.gradient[c].dot(normal)));
+    for (const Point& point : patches[of].kappa)
+      to.add(point.vertex, offset + point.offset, along(across, w * dot(rise, point.weight)));
   };
   add_slope(t, k, (mean ? 0.5 : 1) * scale, V3d(0));
   if (!mean) return;
-  const int shared = corner_across(s, t, n);
-  add_slope(n, shared, -0.5 * scale,
-            shift_of(s, corner[k]) - shift_of(s, s.triangle[n][(shared + 1) % 3]));
+  const int n = s.neighbour[t][k];
+  add_slope(n, corner_across(s, t, n), -0.5 * scale, offset_across(s, t, k));
 }
 
 /// Curvature at rest: what it has along the normal is kappa_0. What it has in the plane turns and
@@ -335,6 +391,9 @@ ShellRest shell_rest(const ShellSurface& surface, const ShellConstants& constant
     for (const int v : surface.triangle[t])
       rest.mass[node_of(surface, v)] += constants.areal_density * f.area / 3;
   }
+  for (int t = 0; t < int(surface.triangle.size()); ++t)
+    patches[t].kappa = own_points(surface, t, patches[t]);
+  for (int t = 0; t < int(surface.triangle.size()); ++t) follow_neighbours(surface, patches, t);
   for (int t = 0; t < int(surface.triangle.size()); ++t)
     rest.patch.push_back(bending_patch(surface, patches, t, constants.bending));
   return rest;

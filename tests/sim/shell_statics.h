@@ -28,7 +28,7 @@ class ShellStatics {
   double energy() const;
   std::vector<V3d> forces() const;  // N, loads as well; 0 where held
   /// Until no force exceeds `tolerance` of the largest load. @return iterations, or -1.
-  int solve(double tolerance = 1e-9, int most_iterations = 400);
+  int solve(double tolerance = 1e-5, int most_iterations = 400);
   /// Of the exact tangent: ways to fall from where it is.
   int negative_eigenvalues();
 

@@ -13,7 +13,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-constexpr int most_patch_nodes = 12;
+constexpr int most_patch_nodes = 15;  // 12 away from free sides
 
 /// On curvatures (xx, yy, 2 xy), N m. Positive definite.
 template <class T>
