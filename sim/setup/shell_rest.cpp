@@ -1,7 +1,5 @@
 #include "sim/setup/shell_rest.h"
 
-#include <Imath/ImathMatrix.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,9 +14,9 @@ using Imath::V2d;
 using Imath::V3d;
 using Row = std::array<double, 3>;  // of (xx, yy, 2 xy), or of three corners or sides
 
-constexpr double misfit = 1e-6;      // eps over the mean of the diagonal of C D^-1 C^T
-constexpr double stiffest = 1e4;     // of a patch, over an equilateral one
-constexpr double equilateral = 500;  // sum of its diagonal over D / side^2; 490 at nu = 0.3
+constexpr double misfit = 1e-6;     // eps over the mean of the diagonal of C D^-1 C^T
+constexpr double stiffest = 1e4;    // of a patch, over an equilateral one
+constexpr double equilateral = 20;  // sum of its diagonal over D / side^2
 
 double dot(const Row& a, const Row& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -127,10 +125,7 @@ struct Patch {
   std::array<Row, 3> reach;      // barycentric coordinates of its place
   std::array<Row, 3> condition;  // C: d of a surface of unit second derivatives
   std::vector<Point> kappa;
-
-  int conditions() const {
-    return int(std::count_if(side.begin(), side.end(), [](Side s) { return s != Side::free; }));
-  }
+  bool is_whole;  // determined by conditions, or by neighbours
 };
 
 int corner_across(const ShellSurface& s, int triangle, int neighbour) {
@@ -211,6 +206,7 @@ Patch patch_of(const ShellSurface& s, int t, const Rigidity<double>& bending) {
     p.condition[k] = p.frame.bubble_slope(k, normal);
     for (double& entry : p.condition[k]) entry *= height;
   }
+  p.is_whole = std::count(p.side.begin(), p.side.end(), Side::free) == 0;
   fit_quadratic(p, bending);
   return p;
 }
@@ -242,24 +238,21 @@ std::vector<Point> own_points(const ShellSurface& s, int t, const Patch& p) {
 /// derivatives are nearest to the mean of those of its neighbours that lack none.
 void follow_neighbours(const ShellSurface& s, std::vector<Patch>& patches, int t) {
   Patch& p = patches[t];
-  if (p.conditions() == 3) return;
   std::vector<int> whole;
   for (int k = 0; k < 3; ++k)
-    if (p.side[k] == Side::joined && patches[s.neighbour[t][k]].conditions() == 3)
-      whole.push_back(k);
+    if (p.side[k] == Side::joined && patches[s.neighbour[t][k]].is_whole) whole.push_back(k);
   for (const int k : whole) {
     const int n = s.neighbour[t][k], shared = corner_across(s, t, n);
     const V2d here = p.frame.side(k).normalized(),
               there = -patches[n].frame.side(shared).normalized();
     const double cosine = here.dot(there), sine = there.x * here.y - there.y * here.x;
     for (Point point : patches[n].kappa) {
-      // here = R(angle) there: this triangle's axes are turned by -angle against the neighbour's
+      // the side is turned by +angle, so this triangle's axes by -angle against the neighbour's
       const Row mean = turned(point.weight, cosine, -sine);
       point.weight = mean;
-      for (int j = 0; j < 3; ++j) {
-        if (p.side[j] == Side::free) continue;
-        point.weight = sum(point.weight, p.flap[j].weight, -dot(p.condition[j], mean));
-      }
+      for (int j = 0; j < 3; ++j)
+        if (p.side[j] != Side::free)
+          point.weight = sum(point.weight, p.flap[j].weight, -dot(p.condition[j], mean));
       for (double& w : point.weight) w /= double(whole.size());
       point.offset += p.flap[k].offset;
       p.kappa.push_back(point);
@@ -267,25 +260,40 @@ void follow_neighbours(const ShellSurface& s, std::vector<Patch>& patches, int t
   }
 }
 
+/// First those beside whole patches, then those beside these, as at corners of a sheet. What is
+/// left, as where a strip is one triangle wide, has the least energy that fits.
+void complete_patches(const ShellSurface& s, std::vector<Patch>& patches) {
+  for (int round = 0; round < 2; ++round) {
+    std::vector<int> completed;
+    for (int t = 0; t < int(patches.size()); ++t) {
+      if (patches[t].is_whole) continue;
+      const size_t own = patches[t].kappa.size();
+      follow_neighbours(s, patches, t);
+      if (patches[t].kappa.size() > own) completed.push_back(t);
+    }
+    for (const int t : completed) patches[t].is_whole = true;
+  }
+}
+
 /// The nodes of a patch of patches, each once.
 struct Gathered {
   const ShellSurface& surface;
   BendingPatch& patch;
-  std::array<V3d, most_patch_nodes>& place;  // m, at rest
+  std::vector<V3d>& place;  // m, at rest
 
   void add(int vertex, V3d offset, const Curvature<double>& w) {
     const int node = node_of(surface, vertex);
     const V3d shift = shift_of(surface, vertex) + offset;
-    const double near = 1e-6 * (shift.length() + 1e-9);
-    int k = 0;
-    while (k < patch.nodes && !(patch.node[k] == node && (patch.shift[k] - shift).length() <= near))
-      ++k;
-    if (k == patch.nodes) {
-      patch.node[k] = node, patch.shift[k] = shift, place[k] = surface.rest[vertex] + offset;
-      ++patch.nodes;
+    const double near = 1e-6 * shift.length();
+    const auto same = [&](const PatchNode& p) {
+      return p.index == node && (p.shift - shift).length() <= near;
+    };
+    auto at = std::find_if(patch.node.begin(), patch.node.end(), same);
+    if (at == patch.node.end()) {
+      at = patch.node.insert(at, {node, shift, {0, 0, 0}});
+      place.push_back(surface.rest[vertex] + offset);
     }
-    auto& to = patch.weight[k];
-    to.xx += w.xx, to.yy += w.yy, to.xy += w.xy;
+    at->weight.xx += w.xx, at->weight.yy += w.yy, at->weight.xy += w.xy;
   }
 };
 
@@ -321,17 +329,16 @@ void add_side(const ShellSurface& s, const std::vector<Patch>& patches, int t, i
 
 /// Curvature at rest: what it has along the normal is kappa_0. What it has in the plane turns and
 /// stretches with the triangle, by its own corners.
-void take_rest(const Frame& f, const std::array<V3d, most_patch_nodes>& place,
-               BendingPatch& patch) {
+void take_rest(const Frame& f, const std::vector<V3d>& place, BendingPatch& patch) {
   Curvature<V3d> kappa{V3d(0), V3d(0), V3d(0)};
-  for (int k = 0; k < patch.nodes; ++k) {
+  for (size_t k = 0; k < place.size(); ++k) {
     const V3d x = place[k] - f.origin;
-    const auto& w = patch.weight[k];
+    const auto& w = patch.node[k].weight;
     kappa = {kappa.xx + x * w.xx, kappa.yy + x * w.yy, kappa.xy + x * w.xy};
   }
   patch.rest = {f.normal.dot(kappa.xx), f.normal.dot(kappa.yy), f.normal.dot(kappa.xy)};
   for (int c = 0; c < 3; ++c) {
-    auto& w = patch.weight[c];
+    auto& w = patch.node[c].weight;
     w.xx -= f.gradient[c].dot(f.along(kappa.xx));
     w.yy -= f.gradient[c].dot(f.along(kappa.yy));
     w.xy -= f.gradient[c].dot(f.along(kappa.xy));
@@ -342,8 +349,8 @@ void take_rest(const Frame& f, const std::array<V3d, most_patch_nodes>& place,
 double share_of(const Frame& f, const BendingPatch& patch, const Rigidity<double>& bending) {
   double longest = 0, trace = 0;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, f.side(k).length2());
-  for (int k = 0; k < patch.nodes; ++k)
-    trace += bending_weight(f.area, bending, patch.weight[k], patch.weight[k]);
+  for (const PatchNode& n : patch.node)
+    trace += bending_weight(f.area, bending, n.weight, n.weight);
   const double most = stiffest * equilateral * std::max(bending.d11, bending.d22) / longest;
   return trace > most ? most / trace : 1;
 }
@@ -352,7 +359,7 @@ BendingPatch bending_patch(const ShellSurface& s, const std::vector<Patch>& patc
                            const Rigidity<double>& bending) {
   BendingPatch patch;
   if (is_held(s, s.triangle[t])) return patch;
-  std::array<V3d, most_patch_nodes> place;
+  std::vector<V3d> place;
   Gathered gathered{s, patch, place};
   for (const int v : s.triangle[t]) gathered.add(v, V3d(0), {0, 0, 0});
   for (int k = 0; k < 3; ++k) add_side(s, patches, t, k, gathered);
@@ -393,7 +400,7 @@ ShellRest shell_rest(const ShellSurface& surface, const ShellConstants& constant
   }
   for (int t = 0; t < int(surface.triangle.size()); ++t)
     patches[t].kappa = own_points(surface, t, patches[t]);
-  for (int t = 0; t < int(surface.triangle.size()); ++t) follow_neighbours(surface, patches, t);
+  complete_patches(surface, patches);
   for (int t = 0; t < int(surface.triangle.size()); ++t)
     rest.patch.push_back(bending_patch(surface, patches, t, constants.bending));
   return rest;
@@ -406,11 +413,11 @@ BendingMatrix bending_matrix(const ShellRest& rest, size_t nodes) {
   for (size_t t = 0; t < rest.patch.size(); ++t) {
     const BendingPatch& p = rest.patch[t];
     const double area = rest.triangle[t].area * p.share;
-    for (int i = 0; i < p.nodes; ++i) {
-      for (int j = 0; j < p.nodes; ++j) {
-        const double w = bending_weight(area, rest.bending, p.weight[i], p.weight[j]);
-        row[p.node[i]][p.node[j]] += w;
-        matrix.push[p.node[i]] -= p.shift[j] * w;
+    for (const PatchNode& i : p.node) {
+      for (const PatchNode& j : p.node) {
+        const double w = bending_weight(area, rest.bending, i.weight, j.weight);
+        row[i.index][j.index] += w;
+        matrix.push[i.index] -= j.shift * w;
       }
     }
   }

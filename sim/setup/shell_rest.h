@@ -52,12 +52,17 @@ cpu::Rigidity<double> rigidity_of_fabric(double warp, double weft, double bias, 
 /// Of a plate: D = E h^3 / (12 (1 - nu^2)).
 cpu::Rigidity<double> rigidity_of_plate(double bending, double poisson);
 
-/// Of one triangle. The first three nodes are its corners, a, b, c.
+/// What a node adds to the second derivatives of a patch.
+struct PatchNode {
+  int index;
+  Imath::V3d shift;               // m, added to the node's place
+  cpu::Curvature<double> weight;  // 1/m^2
+};
+
+/// Of one triangle. The first three nodes are its corners, a, b, c; with neighbours on all sides
+/// and theirs there are twelve. A triangle that is held as a whole has none and does not bend.
 struct BendingPatch {
-  int nodes = 0;  // 0: it is held as a whole and does not bend
-  std::array<int, cpu::most_patch_nodes> node{};
-  std::array<Imath::V3d, cpu::most_patch_nodes> shift{};  // m, added to the node's place
-  std::array<cpu::Curvature<double>, cpu::most_patch_nodes> weight{};  // 1/m^2
+  std::vector<PatchNode> node;
   cpu::Curvature<double> rest{};  // 1/m, kappa_0 along the normal
   double share = 1;               // of the rigidity: see shell_rest
 };

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
 #include <string>
 
@@ -21,9 +22,9 @@ constexpr SheetMesh all_meshes[] = {SheetMesh::diagonal, SheetMesh::union_jack,
 
 Curvature<V> curvature(const sim::BendingPatch& p, const std::vector<V3d>& x) {
   Curvature<V> kappa{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  for (int k = 0; k < p.nodes; ++k) {
-    const V3d at = x[size_t(p.node[k])] + p.shift[k];
-    add_node(kappa, p.weight[k], {at.x, at.y, at.z});
+  for (const sim::PatchNode& n : p.node) {
+    const V3d at = x[size_t(n.index)] + n.shift;
+    add_node(kappa, n.weight, {at.x, at.y, at.z});
   }
   return kappa;
 }
@@ -32,10 +33,10 @@ double energy(const sim::ShellRest& rest, const std::vector<V3d>& x) {
   double sum = 0;
   for (size_t t = 0; t < rest.patch.size(); ++t) {
     const auto& p = rest.patch[t];
-    if (p.nodes == 0) continue;
+    if (p.node.empty()) continue;
     V corner[3];
     for (int c = 0; c < 3; ++c) {
-      const V3d at = x[size_t(p.node[c])] + p.shift[c];
+      const V3d at = x[size_t(p.node[c].index)] + p.node[c].shift;
       corner[c] = {at.x, at.y, at.z};
     }
     const TurningNormal<double> n(corner[0], corner[1], corner[2], rest.triangle[t].area);
@@ -52,13 +53,16 @@ std::vector<V3d> forces(const sim::ShellRest& rest, const std::vector<V3d>& x) {
     const double area = rest.triangle[t].area;
     V corner[3];
     for (int c = 0; c < 3; ++c) {
-      const V3d at = x[size_t(p.node[c])] + p.shift[c];
+      const V3d at = x[size_t(p.node[c].index)] + p.node[c].shift;
       corner[c] = {at.x, at.y, at.z};
     }
     const TurningNormal<double> n(corner[0], corner[1], corner[2], area);
     const auto m = moment(rest.bending, beyond_rest(curvature(p, x), p.rest, n.normal));
-    const auto add = [&](int k, V force) { f[size_t(p.node[k])] += V3d(force.x, force.y, force.z); };
-    for (int k = 0; k < p.nodes; ++k) add(k, bending_force(area * p.share, m, p.weight[k]));
+    const auto add = [&](int k, V force) {
+      f[size_t(p.node[k].index)] += V3d(force.x, force.y, force.z);
+    };
+    for (int k = 0; k < int(p.node.size()); ++k)
+      add(k, bending_force(area * p.share, m, p.node[k].weight));
     for (int c = 0; c < 3; ++c) add(c, turning_force(area * p.share, m, p.rest, n, c));
   }
   return f;
@@ -75,23 +79,43 @@ std::vector<V3d> quadratic(const std::vector<V3d>& flat, double a, double b, dou
   return x;
 }
 
-// Away from free edges, where the moment across is made zero.
+/// A sheet rolled on a cylinder of radius 1 about the direction at `angle` to x.
+std::vector<V3d> rolled(const std::vector<V3d>& flat, double angle) {
+  std::vector<V3d> x = flat;
+  const V3d along(std::cos(angle), std::sin(angle), 0), across(-along.y, along.x, 0);
+  for (V3d& p : x) {
+    const double s = p.dot(along);
+    p = across * p.dot(across) + along * std::sin(s) + V3d(0, 0, 1 - std::cos(s));
+  }
+  return x;
+}
+
+// Up to the edges. 1e-6 of misfit counts by the condition of a patch.
 TEST(ShellBending, QuadraticSurfacesHaveTheirSecondDerivatives) {
   for (const SheetMesh mesh : all_meshes) {
     const auto surface = flat_sheet(mesh, {1, 1, 12});
     const auto rest = sim::shell_rest(surface, plate(1, 0.3));
     const auto x = quadratic(surface.rest, 1, -0.4, 0.7);
     for (size_t t = 0; t < rest.patch.size(); ++t) {
-      const auto& corner = surface.triangle[t];
-      const V3d centre = (x[corner[0]] + x[corner[1]] + x[corner[2]]) / 3;
-      if (std::abs(centre.x - 0.5) > 0.25 || std::abs(centre.y - 0.5) > 0.25) continue;
       const auto kappa = curvature(rest.patch[t], x);
-      EXPECT_NEAR(kappa.xx.z, 1, 1e-3);  // 1e-6 of misfit, over the condition of a patch
-      EXPECT_NEAR(kappa.yy.z, -0.4, 1e-3);
-      EXPECT_NEAR(kappa.xy.z, 1.4, 1e-3);
+      EXPECT_NEAR(kappa.xx.z, 1, 1e-3) << int(mesh) << " " << t;
+      EXPECT_NEAR(kappa.yy.z, -0.4, 1e-3) << int(mesh) << " " << t;
+      EXPECT_NEAR(kappa.xy.z, 1.4, 1e-3) << int(mesh) << " " << t;
       EXPECT_NEAR(length(kappa.xx) + length(kappa.yy), 1.4, 2e-3);
+      EXPECT_EQ(rest.patch[t].share, 1);
     }
   }
+}
+
+// Axes that turn from triangle to triangle change nothing of an isotropic sheet.
+TEST(ShellBending, EnergyDoesNotDependOnTheAxes) {
+  auto surface = flat_sheet(SheetMesh::unstructured, {1, 1, 8});
+  const auto straight = sim::shell_rest(surface, plate(1, 0.3));
+  for (const V3d& x : surface.rest)
+    surface.uv.push_back({float(x.x * x.x - 3 * x.x * x.y + x.y), 0.f});
+  const auto turned = sim::shell_rest(surface, plate(1, 0.3));
+  const auto x = rolled(surface.rest, 0.4);
+  EXPECT_NEAR(energy(turned, x), energy(straight, x), 1e-9);
 }
 
 /// Force on inner nodes of a constant moment over the moment, both per width.
@@ -110,17 +134,6 @@ double imbalance(SheetMesh mesh) {
 // The divergence theorem: slopes are of sides, so the parts of two neighbours cancel.
 TEST(ShellBending, ConstantMomentsAreInEquilibrium) {
   for (const SheetMesh mesh : all_meshes) EXPECT_LT(imbalance(mesh), 2e-3);
-}
-
-/// A sheet rolled on a cylinder of radius 1 about the direction at `angle` to x.
-std::vector<V3d> rolled(const std::vector<V3d>& flat, double angle) {
-  std::vector<V3d> x = flat;
-  const V3d along(std::cos(angle), std::sin(angle), 0), across(-along.y, along.x, 0);
-  for (V3d& p : x) {
-    const double s = p.dot(along);
-    p = across * p.dot(across) + along * std::sin(s) + V3d(0, 0, 1 - std::cos(s));
-  }
-  return x;
 }
 
 double interior_energy_error(SheetMesh mesh, int cells, double angle) {
@@ -248,8 +261,7 @@ TEST(ShellBending, TheMatrixHoldsTheEnergyOfFlatSheets) {
   EXPECT_NEAR(twice / 2, energy(rest, x), 1e-9);
 }
 
-/// A tube of `around` by 4 cells made of a flat sheet whose ends are joined by a shift of its
-/// length, or of none of them joined.
+/// A flat sheet whose last column of vertices is its first, a period on.
 sim::ShellSurface joined_sheet() {
   auto surface = flat_sheet(SheetMesh::diagonal, {1, 0.5, 8});
   const size_t vertices = surface.rest.size(), row = 5;
@@ -284,7 +296,7 @@ TEST(ShellBending, SheetsBendAcrossAPeriodicSeam) {
   std::vector<double> of_column(8, 0);
   for (size_t t = 0; t < rest.patch.size(); ++t) {
     const auto& p = rest.patch[t];
-    for (int k = 0; k < p.nodes; ++k) EXPECT_LT(p.node[k], int(x.size()));
+    for (const sim::PatchNode& n : p.node) EXPECT_LT(n.index, int(x.size()));
     of_column[t / 8] += bending_energy(rest.triangle[t].area, rest.bending, curvature(p, x));
   }
   for (int i = 0; i < 4; ++i)  // half a period on the energy is the same
@@ -315,10 +327,11 @@ TEST(ShellBending, SliversHaveBoundedStiffness) {
     }
   }
   const double cell = 1. / 8;
-  EXPECT_LT(stiffest, 4 * 1e4 * 500 / (cell * cell));
+  EXPECT_LT(stiffest, 4 * 1e4 * 20 / (cell * cell));
 }
 
-sim::ShellSurface hexagon_fan() {  // six far corners and corners on one circle cannot be: five are
+/// A triangle whose neighbours' far corners and own ones are those of a hexagon.
+sim::ShellSurface hexagon() {
   sim::ShellSurface s;
   const double c = 0.5, h = std::sqrt(3.) / 2;
   s.rest = {{1, 0, 0}, {-c, h, 0}, {-c, -h, 0}, {c, h, 0}, {-1, 0, 0}, {c, -h, 0}};
@@ -327,16 +340,13 @@ sim::ShellSurface hexagon_fan() {  // six far corners and corners on one circle 
   return s;
 }
 
-// The corners of a hexagon are on a circle: no quadratic that is zero at all but one. The patch
-// spends energy on the misfit.
+// They lie on a circle: a paraboloid is level at all six, so they do not tell its curvature.
 TEST(ShellBending, APatchOnAConicIsFinite) {
-  const auto surface = hexagon_fan();
+  const auto surface = hexagon();
   const auto rest = sim::shell_rest(surface, plate(1, 0.3));
   for (const auto& p : rest.patch) {
-    for (int k = 0; k < p.nodes; ++k) {
-      EXPECT_TRUE(std::isfinite(p.weight[k].xx));
-      EXPECT_LT(std::abs(p.weight[k].xx) + std::abs(p.weight[k].yy) + std::abs(p.weight[k].xy), 1e3);
-    }
+    for (const sim::PatchNode& n : p.node)
+      EXPECT_LT(std::abs(n.weight.xx) + std::abs(n.weight.yy) + std::abs(n.weight.xy), 1e3);
   }
   auto x = quadratic(surface.rest, 1, 1, 0);  // a paraboloid: all of them at one height
   EXPECT_LT(energy(rest, x), 1e-6);

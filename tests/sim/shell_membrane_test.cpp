@@ -61,7 +61,7 @@ Matrix9 hessian(const RestTriangle<double>& rest, const Corners& x, Stress kind)
       const V row[3] = {block.x, block.y, block.z};
       for (int i = 0; i < 3; ++i)
         h[3 * a + i][3 * b] = row[i].x, h[3 * a + i][3 * b + 1] = row[i].y,
-                      h[3 * a + i][3 * b + 2] = row[i].z;
+                         h[3 * a + i][3 * b + 2] = row[i].z;
     }
   }
   return h;
@@ -183,8 +183,8 @@ TEST(ShellMembrane, FloatsFollowDoubles) {
                                    {float(rest.gradient_x[0]), float(rest.gradient_x[1])},
                                    {float(rest.gradient_y[0]), float(rest.gradient_y[1])}};
   const auto f = surface_gradient(rest, V{0, 0, 0}, V{0.0106, 0, 0.001}, V{0.004, 0.0089, 0});
-  const auto g = surface_gradient<float>(single, {0, 0, 0}, {0.0106f, 0, 0.001f},
-                                         {0.004f, 0.0089f, 0});
+  const auto g =
+      surface_gradient<float>(single, {0, 0, 0}, {0.0106f, 0, 0.001f}, {0.004f, 0.0089f, 0});
   const auto a = law().at(green_strain(f), {0, 0, 0}, forever);
   const auto moduli = orthotropic(900.f, 500.f, 60.f, 0.3f);
   const MembraneLaw<float> same{moduli, strain_limit(1.05f, moduli.c11), 0.f};

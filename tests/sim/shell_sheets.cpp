@@ -109,7 +109,11 @@ sim::ShellSurface flat_sheet(SheetMesh mesh, const SheetSize& size) {
   if (mesh == SheetMesh::unstructured) {
     for (V3d& x : s.rest) {
       const double dx = jitter(), dy = jitter();
+      const double still = (size.still + 0.5) * cell;
       if (x.x < cell / 2) continue;
+      const bool inner =
+          x.x > still && x.y > still && x.x < size.length - still && x.y < size.width - still;
+      if (size.still > 0 && !inner) continue;
       if (x.x < size.length - cell / 2) x.x += dx;
       if (x.y > cell / 2 && x.y < size.width - cell / 2) x.y += dy;
     }
@@ -118,7 +122,5 @@ sim::ShellSurface flat_sheet(SheetMesh mesh, const SheetSize& size) {
   find_neighbours(s);
   return s;
 }
-
-std::vector<V3d> rest_places(const sim::ShellSurface& surface) { return surface.rest; }
 
 }  // namespace drench::sim_tests

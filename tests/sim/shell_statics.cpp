@@ -23,7 +23,7 @@ struct Bent {
 template <class Place>
 Bent bent(const sim::BendingPatch& p, double area, const Place& place) {
   Curvature<V> kappa{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  for (int k = 0; k < p.nodes; ++k) add_node(kappa, p.weight[size_t(k)], place(k));
+  for (int k = 0; k < int(p.node.size()); ++k) add_node(kappa, p.node[size_t(k)].weight, place(k));
   const TurningNormal<double> normal(place(0), place(1), place(2), area);
   return {beyond_rest(kappa, p.rest, normal.normal), normal};
 }
@@ -45,7 +45,7 @@ void ShellStatics::add_gravity(V3d gravity) {
 }
 
 V ShellStatics::place(const sim::BendingPatch& patch, int k) const {
-  return of(x[size_t(patch.node[size_t(k)])] + patch.shift[size_t(k)]);
+  return of(x[size_t(patch.node[size_t(k)].index)] + patch.node[size_t(k)].shift);
 }
 
 double ShellStatics::energy() const {
@@ -53,11 +53,10 @@ double ShellStatics::energy() const {
   for (size_t t = 0; t < rest_.triangle.size(); ++t) {
     const auto& corner = surface_.triangle[t];
     const auto& r = rest_.triangle[t];
-    const auto f =
-        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    const auto f = surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
     energy += r.area * law_.at(green_strain(f), {0, 0, 0}, forever).energy;
     const auto& p = rest_.patch[t];
-    if (p.nodes == 0) continue;
+    if (p.node.empty()) continue;
     const auto b = bent(p, r.area, [&](int k) { return place(p, k); });
     energy += bending_energy(r.area * p.share, rest_.bending, b.kappa);
   }
@@ -70,19 +69,17 @@ std::vector<V3d> ShellStatics::forces() const {
   for (size_t t = 0; t < rest_.triangle.size(); ++t) {
     const auto& corner = surface_.triangle[t];
     const auto& r = rest_.triangle[t];
-    const auto f =
-        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    const auto f = surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
     const auto stress = law_.at(green_strain(f), {0, 0, 0}, forever).stress;
     for (int c = 0; c < 3; ++c) force[corner[c]] += from(membrane_force(r, f, stress, c));
     const auto& p = rest_.patch[t];
-    if (p.nodes == 0) continue;
+    if (p.node.empty()) continue;
     const auto b = bent(p, r.area, [&](int k) { return place(p, k); });
     const auto m = moment(rest_.bending, b.kappa);
     const double area = r.area * p.share;
-    for (int k = 0; k < p.nodes; ++k)
-      force[p.node[k]] += from(bending_force(area, m, p.weight[k]));
+    for (const sim::PatchNode& n : p.node) force[n.index] += from(bending_force(area, m, n.weight));
     for (int c = 0; c < 3; ++c)
-      force[p.node[c]] += from(turning_force(area, m, p.rest, b.normal, c));
+      force[p.node[c].index] += from(turning_force(area, m, p.rest, b.normal, c));
   }
   for (size_t v = 0; v < x.size(); ++v)
     if (!surface_.held.empty() && surface_.held[v]) force[v] = V3d(0);
@@ -110,8 +107,8 @@ int ShellStatics::assemble(Tangent tangent) {
       for (const int a : surface_.triangle[t])
         for (const int b : surface_.triangle[t]) join(a, b);
       const auto& p = rest_.patch[t];
-      for (int i = 0; i < p.nodes; ++i)
-        for (int j = 0; j < p.nodes; ++j) join(p.node[i], p.node[j]);
+      for (const sim::PatchNode& a : p.node)
+        for (const sim::PatchNode& b : p.node) join(a.index, b.index);
     }
     matrix_ = std::make_unique<Skyline>(first);
   }
@@ -129,8 +126,7 @@ int ShellStatics::assemble(Tangent tangent) {
   for (size_t t = 0; t < rest_.triangle.size(); ++t) {
     const auto& corner = surface_.triangle[t];
     const auto& r = rest_.triangle[t];
-    const auto f =
-        surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
+    const auto f = surface_gradient(r, of(x[corner[0]]), of(x[corner[1]]), of(x[corner[2]]));
     const auto answer = law_.at(green_strain(f), {0, 0, 0}, forever);
     const auto stress =
         tangent == Tangent::projected ? positive_part(answer.stress) : answer.stress;
@@ -138,11 +134,10 @@ int ShellStatics::assemble(Tangent tangent) {
       for (int b = 0; b < 3; ++b)
         add(corner[a], corner[b], membrane_block(r, f, stress, answer.moduli, a, b));
     const auto& p = rest_.patch[t];
-    for (int i = 0; i < p.nodes; ++i) {
-      for (int j = 0; j < p.nodes; ++j) {
-        const double w =
-            bending_weight(r.area * p.share, rest_.bending, p.weight[i], p.weight[j]);
-        add(p.node[i], p.node[j], {{w, 0, 0}, {0, w, 0}, {0, 0, w}});
+    for (const sim::PatchNode& a : p.node) {
+      for (const sim::PatchNode& b : p.node) {
+        const double w = bending_weight(r.area * p.share, rest_.bending, a.weight, b.weight);
+        add(a.index, b.index, {{w, 0, 0}, {0, w, 0}, {0, 0, w}});
       }
     }
   }
@@ -176,7 +171,8 @@ int ShellStatics::solve(double tolerance, int most_iterations) {
     for (;; share /= 2) {
       for (size_t v = 0; v < x.size(); ++v)
         if (unknown_[v] >= 0)
-          x[v] = old[v] + V3d(step[unknown_[v]], step[unknown_[v] + 1], step[unknown_[v] + 2]) * share;
+          x[v] =
+              old[v] + V3d(step[unknown_[v]], step[unknown_[v] + 1], step[unknown_[v] + 2]) * share;
       const double after = energy();
       if (after <= now - 1e-4 * share * slope + 1e-14 * std::abs(now) || share < 1e-6) {
         now = after;

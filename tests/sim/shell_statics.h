@@ -10,7 +10,8 @@
 
 namespace drench::sim_tests {
 
-/// Whether compressed triangles push over sideways in the matrix, as they do, or not: positive_part.
+/// Whether compressed triangles push over sideways in the matrix, as they do, or not:
+/// positive_part.
 enum class Tangent { exact, projected };
 
 class ShellStatics {
@@ -22,6 +23,8 @@ class ShellStatics {
   std::vector<V3d> load;      // N
   std::vector<double> guide;  // nodes are numbered by rising guide; by default their x at rest
   const sim::ShellRest& rest() const { return rest_; }
+  /// Of the plane of the sheet, from now on.
+  void set_law(const sim::cpu::MembraneLaw<double>& law) { law_ = law; }
 
   /// Adds the weight of the masses.
   void add_gravity(V3d gravity);

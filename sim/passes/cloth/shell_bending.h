@@ -13,8 +13,6 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-constexpr int most_patch_nodes = 15;  // 12 away from free sides
-
 /// On curvatures (xx, yy, 2 xy), N m. Positive definite.
 template <class T>
 struct Rigidity {
