@@ -186,7 +186,7 @@ TEST(ShellBending, FabricsBendAsTheirThreeRigidities) {
 TEST(ShellBending, WarpFollowsTheTexture) {
   auto surface = flat_sheet(SheetMesh::unstructured, {1, 1, 6});
   for (const V3d& x : surface.rest)  // u along y, twice as dense
-    surface.uv.push_back({2 * x.y + 0.3 * x.x * 0, x.x});
+    surface.uv.push_back({float(2 * x.y), float(x.x)});
   const auto rest = sim::shell_rest(surface, plate(1, 0.3));
   for (size_t t = 0; t < rest.triangle.size(); ++t) {
     const auto& c = surface.triangle[t];
@@ -195,8 +195,8 @@ TEST(ShellBending, WarpFollowsTheTexture) {
       return V{x.x, x.y, x.z};
     };
     const auto f = surface_gradient(rest.triangle[t], at(0), at(1), at(2));
-    EXPECT_NEAR(f.warp.y, 1, 1e-12);
-    EXPECT_NEAR(f.weft.x, -1, 1e-12);
+    EXPECT_NEAR(f.warp.y, 1, 1e-6);
+    EXPECT_NEAR(f.weft.x, -1, 1e-6);
   }
 }
 

@@ -19,9 +19,8 @@ class ShellStatics {
   ShellStatics(const sim::ShellSurface& surface, const sim::ShellConstants& constants,
                const sim::cpu::MembraneLaw<double>& law);
 
-  std::vector<V3d> x;         // m, of the nodes
-  std::vector<V3d> load;      // N
-  std::vector<double> guide;  // nodes are numbered by rising guide; by default their x at rest
+  std::vector<V3d> x;     // m, of the nodes
+  std::vector<V3d> load;  // N
   const sim::ShellRest& rest() const { return rest_; }
   /// Of the plane of the sheet, from now on.
   void set_law(const sim::cpu::MembraneLaw<double>& law) { law_ = law; }
@@ -36,7 +35,12 @@ class ShellStatics {
   int negative_eigenvalues();
 
  private:
+  bool is_held(int node) const { return !surface_.held.empty() && surface_.held[size_t(node)]; }
+  void number_unknowns();  // by rising x at rest: rows are short in strips along x
+  sim::cpu::SurfaceGradient<double> gradient(size_t triangle) const;
+  void add_block(int a, int b, const sim::cpu::Block3<double>& block);
   int assemble(Tangent tangent);
+  std::vector<double> newton_step(const std::vector<V3d>& force);
   sim::cpu::Vec3<double> place(const sim::BendingPatch& patch, int k) const;
 
   sim::ShellSurface surface_;

@@ -1,6 +1,6 @@
 #pragma once
-// Direct solution of symmetric systems by L D L^T within their envelope: rows from their first entry
-// to the diagonal (Jennings 1966). The caller numbers unknowns so that the rows are short.
+// Direct solution of symmetric systems by L D L^T within their envelope: rows from their first
+// entry to the diagonal (Jennings 1966). The caller numbers unknowns so that the rows are short.
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,9 @@ class Skyline {
     for (auto& row : row_) std::fill(row.begin(), row.end(), 0.0);
   }
   /// Of the lower triangle: row >= column.
-  double& at(int row, int column) { return row_[size_t(row)][size_t(column - first_[size_t(row)])]; }
+  double& at(int row, int column) {
+    return row_[size_t(row)][size_t(column - first_[size_t(row)])];
+  }
 
   /// In place. @return how many pivots are not positive: as many eigenvalues are negative
   ///         (Sylvester's law of inertia).
