@@ -104,6 +104,11 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   verify->footer("Example: drench verify out/pour/preview");
   verify->callback([&arguments] { verify_command(arguments.folder, arguments.shot.format); });
 
+  CLI::App* fabrics = app.add_subcommand("fabrics", "constants of common fabrics, with sources");
+  add_common(*fabrics, arguments);
+  fabrics->footer("Example: drench fabrics");
+  fabrics->callback([&arguments] { fabrics_command(arguments.shot.format); });
+
   CLI::App* init = app.add_subcommand("init", "write a commented starting shot");
   init->add_option("NAME", arguments.name, "shot to write, with or without .toml")->required();
   init->add_flag("--reference", arguments.reference, "every key there is, with form and limits");

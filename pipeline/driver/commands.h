@@ -37,6 +37,9 @@ void clean_command(const ShotArguments& arguments);
 /// Hashes every file; never writes and takes no lock. @throws Error if one is missing or damaged: a
 /// run that verifies makes those again; or if one may not be read.
 void verify_command(const std::filesystem::path& folder, OutputFormat format);
+/// Prints the constants of common fabrics, in SI: a line a fabric, tabs between, names and units
+/// first.
+void fabrics_command(OutputFormat format);
 enum class InitialShot { commented, reference };
 /// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.
 void init_command(const std::filesystem::path& name, InitialShot kind);

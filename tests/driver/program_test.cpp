@@ -7,8 +7,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "pipeline/contract/files/mesh_file.h"
@@ -59,12 +61,25 @@ std::map<std::string, int> steps_run_by(const TinyShot& shot,
 
 TEST(Program, ShowsOneExampleInTheHelpOfEachCommand) {
   for (const char* command :
-       {"run", "simulate", "mesh", "render", "plan", "verify", "init", "clean"}) {
+       {"run", "simulate", "mesh", "render", "plan", "verify", "init", "clean", "fabrics"}) {
     const Ended ended = drench({command, "--help"});
     EXPECT_EQ(ended.code, done) << command;
     const std::string example = "Example: drench " + std::string(command);
     EXPECT_TRUE(has(ended.out, example)) << ended.out;
   }
+}
+
+TEST(Program, ListsFabricsByLines) {
+  const Ended ended = drench({"fabrics"});
+  EXPECT_EQ(ended.code, done) << ended.err;
+  std::istringstream lines(ended.out);
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count)
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\t'), 15) << line;
+  EXPECT_EQ(count, 9);
+  EXPECT_TRUE(has(ended.out, "fabric\tareal_density [kg/m2]\t")) << ended.out;
+  const json all = json::parse(drench({"fabrics", "--json"}).out);
+  EXPECT_EQ(all.at("fabrics").at("denim").at("areal_density"), 0.324);
 }
 
 TEST(Program, RefusesBadCommandLinesWithExitCode1) {
