@@ -9,7 +9,7 @@ namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '7'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '8'};
 
 template <class Archive, class Values>
 void transfer_values(Archive& archive, Values& values) {
@@ -26,11 +26,11 @@ void transfer(Archive& archive, C& c) {
   archive(c.emitted), archive(c.shut);
   auto& s = c.state;
   cpu::State columns;
-  columns.parameters.incompressible = true;  // which keeps more
+  columns.parameters.incompressible = columns.shell.any = true;  // which keep more
   cpu::for_each_kept_column(
       columns, [&](const auto&, const auto&, auto member) { transfer_values(archive, s.*member); });
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
-  archive(s.removed);
+  archive(s.removed), archive(s.shell_dt);
   archive(c.probes);
 }
 

@@ -36,6 +36,8 @@ enum class ColumnGroup : int {
   polygons,
   cloth_system,
   cloth_obstacles,  // which vertices obstacles hold
+  shell_history,    // what the next step needs of the last
+  shell_system,
   lists,
   projection,  // walls, corrections, diagonal
   solve,
@@ -80,6 +82,8 @@ inline constexpr std::array column_group_names{
     std::string_view("polygon grid"),
     std::string_view("implicit step of cloth"),
     std::string_view("cloth at obstacles"),
+    std::string_view("last step of shells"),
+    std::string_view("implicit step of shells"),
     std::string_view("neighbour lists"),
     std::string_view("rows of the pressure solve"),
     std::string_view("unknowns of the pressure solve"),

@@ -238,6 +238,41 @@ void for_each_system_column(S& state, const Visit& visit) {
   visit({"drag_factor", "kg", Group::cloth_drag}, s.drag_factor, none);
 }
 
+template <class S, class Visit>
+void for_each_shell_column(S& state, const Visit& visit) {
+  using enum Extent;
+  using Group = ColumnGroup;
+  using H = HostState;
+  auto& s = state.shell;
+  const Use kept = s.any ? Use::kept : Use::rebuilt;
+  visit({"landed", "m", Group::shell_history, vertices, kept}, s.landed, &H::shell_landed);
+  visit({"rounding", "m", Group::shell_history, vertices, kept}, s.rounding, &H::shell_rounding);
+  visit({"left", "m/s", Group::shell_history, vertices, kept}, s.left, &H::shell_left);
+  visit({"shell.acceleration", "m/s^2", Group::shell_history, vertices, kept}, s.acceleration,
+        &H::shell_acceleration);
+  visit({"internal", "N", Group::shell_history, vertices, kept}, s.internal, &H::shell_internal);
+  visit({"area", "m^2", Group::cloth_fixed}, s.area, none);
+  visit({"shell.gradient", "1/m", Group::cloth_fixed}, s.gradient, none);
+  visit({"shell.corner", "1", Group::cloth_fixed}, s.corner, none);
+  visit({"shell.sheet", "1", Group::cloth_fixed}, s.sheet, none);
+  visit({"edge_shift", "m", Group::cloth_fixed}, s.edge_shift, none);
+  visit({"law", "", Group::cloth_fixed}, s.law, none);
+  visit({"ring_start", "1", Group::cloth_fixed}, s.ring_start, none);
+  visit({"row_start", "1", Group::cloth_fixed}, s.row_start, none);
+  visit({"shell.end", "1", Group::cloth_fixed}, s.end, none);
+  visit({"offset", "1", Group::cloth_fixed}, s.offset, none);
+  visit({"bend", "N/m", Group::cloth_fixed}, s.bend, none);
+  visit({"fan_slot", "1", Group::cloth_fixed}, s.fan_slot, none);
+  visit({"push", "N", Group::cloth_fixed}, s.push, none);
+  visit({"shell.path", "m/s", Group::shell_system}, s.path, none);
+  visit({"element", "", Group::shell_system}, s.element, none);
+  visit({"block", "kg", Group::shell_system}, s.block, none);
+  visit({"shell.tension", "kg", Group::shell_system}, s.tension, none);
+  visit({"diagonal", "kg", Group::shell_system}, s.diagonal, none);
+  visit({"shell.base", "kg m", Group::shell_system}, s.base, none);
+  visit({"shell.force", "N", Group::shell_system}, s.force, none);
+}
+
 template <class Solids, class Visit>
 void for_each_solid_column(Solids& solids, ColumnGroup group, const Visit& visit) {
   visit({"view", "", group}, solids.view, none);
@@ -255,6 +290,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_contact_column(state, visit);
   for_each_cloth_column(state, visit);
   for_each_system_column(state, visit);
+  for_each_shell_column(state, visit);
   for_each_solid_column(state.obstacles, ColumnGroup::obstacles, visit);
   for_each_solid_column(state.sinks, ColumnGroup::sinks, visit);
   visit({"stopped", "kg m/s", ColumnGroup::stopped}, state.obstacles.stopped, none);

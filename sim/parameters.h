@@ -41,6 +41,7 @@ struct Parameters {
   // cloth
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
+  bool shells = false;           // any sheet is one
   bool paper = false;            // coupling scheme
   bool every_path = false;       // is tested, also of what cannot meet a sheet: for tests
   // air, which moves as WindNow says; 0: none
@@ -82,7 +83,7 @@ constexpr float cloth_wall_margin = 0.25f;
 /// Whether sheets make implicit steps (sim/passes/cloth/cloth_implicit.h), or explicit substeps:
 /// these have nothing that holds a vertex at an obstacle.
 inline bool sheets_are_implicit(const Parameters& p) {
-  return p.fluid ? p.incompressible : p.obstacles > 0;
+  return p.fluid ? p.incompressible : p.obstacles > 0 || p.shells;
 }
 
 /// Bounds that rule the next step, from the state at the end of a step.

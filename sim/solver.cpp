@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
+#include "sim/passes/cloth/shell_columns.h"
 #include "sim/passes/motion/measure_limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
@@ -92,6 +93,7 @@ class BackendSolver : public Solver {
     state_.guard_hits = host.guard_hits;
     state_.guard_holds = host.guard_holds;
     state_.removed = host.removed;
+    state_.shell.dt = host.shell_dt;
     state_.removed.resize(size_t(state_.parameters.sinks) + 1);
   }
 
@@ -103,6 +105,7 @@ class BackendSolver : public Solver {
     host.guard_hits = state_.guard_hits;
     host.guard_holds = state_.guard_holds;
     host.removed = state_.removed;
+    host.shell_dt = state_.shell.dt;
     return host;
   }
 
@@ -331,6 +334,7 @@ class BackendSolver : public Solver {
       allocate_cloth_system(), find_loose_sheets(t);
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
+    load_shell(state_, t);
   }
 
   /// A sheet's vertices follow each other.

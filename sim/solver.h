@@ -14,6 +14,7 @@
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
 #include "sim/probe_query.h"
+#include "sim/shell_topology.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim {
@@ -33,7 +34,10 @@ struct HostState {
   HostVec owed;                      // kg m/s
   std::vector<float> pressure_term;  // m^5/(kg s^2), of the incompressible solver's last step
   HostVec cloth_position, cloth_velocity;
-  Limits limits;  // of the step before
+  // of shells, else empty: see ShellState
+  HostVec shell_landed, shell_rounding, shell_left, shell_acceleration, shell_internal;
+  double shell_dt = 0;  // s, of the step that left these
+  Limits limits;        // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
   std::vector<uint64_t> removed;  // particles since the start: by each sink; last: left the domain
 };
@@ -54,6 +58,7 @@ struct ClothTopology {
   // its vertex a corner of a triangle, the other end of a spring stands, m; of each sheet the
   // periods it spans.
   HostVec corner_shift, spring_shift, rest_period;
+  ShellTopology shell;
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
 };

@@ -145,6 +145,41 @@ struct ClothSystem {
   Column<ClothControl> control;
 };
 
+/// Sheets that are shells (passes/cloth/shell_system.h). Columns are empty without any.
+struct ShellState {
+  bool any = false;
+  // kept from step to step
+  VecColumn landed;    // m, where the last step left a vertex: what has moved it since stopped it
+  VecColumn rounding;  // m, what that place lacks
+  VecColumn left;      // m/s, the velocity that it was left with
+  VecColumn acceleration;  // m/s^2, over that step
+  VecColumn internal;      // N, of the sheet on the vertex, at the start of it
+  double dt = 0;           // s, of it; 0: there is none
+  // fixed; triangles by fields of `triangles`, padded to a multiple of eight
+  int triangles = 0;
+  Column<float> area, gradient;  // m^2; 4 fields, 1/m
+  Column<int> corner, sheet;     // 3 fields, 1 field
+  VecColumn edge_shift;          // m, 2 fields: of corners 1 and 2 against 0; only across seams
+  Column<float> law;             // 7 fields of `sheets`: ShellLaw
+  int sheets = 0;
+  // rows, by slices of eight vertices (sliced ELLPACK)
+  Column<int> ring_start, row_start;  // first slot of a slice's blocks, of its entries
+  Column<int> end, offset;  // of an entry: the other vertex; of a slot: end - row where that is the
+                            // same in all of the slice, else 0
+  Column<float> bend;       // N/m, of an entry
+  Column<int> fan_slot;     // 2 a fan entry: slots of the triangle's next corner and the one after
+  VecColumn push;           // N, of bending across seams
+  int ring_slots = 0;       // of all slices
+  // rebuilt every step
+  VecColumn path;          // m/s, of the straight path
+  Column<float> element;   // 36 fields of `triangles`: ElementFields
+  Column<float> block;     // kg, 9 fields of ring entries, by rows
+  Column<float> tension;   // kg, of ring entries: see TensionMatrix
+  Column<float> diagonal;  // kg, 6 fields of vertices: xx xy xz yy yz zz
+  VecColumn base;          // kg m, the sheet's own part of ClothSystem::base
+  VecColumn force;         // N, as `internal`, at the start of this step
+};
+
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
@@ -294,6 +329,7 @@ struct State {
   TensionState tension;
   ClothState cloth;
   ClothSystem cloth_system;
+  ShellState shell;
   ContactState contact;
   ObstacleState obstacles, sinks;
   WindNow wind;

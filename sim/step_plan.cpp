@@ -35,6 +35,7 @@ void sort_all_contacts(State& state) { sort_contacts(state, 1e30f); }
 void settle_cloth_alone(State& state) {
   state.contact.near = 0;
   if (state.parameters.air_density > 0) wind_on_cloth(state);
+  if (state.shell.any) linearise_shell(state);
   linearise_cloth(state);
   settle_cloth(state);
   finish_cloth(state);
@@ -88,6 +89,7 @@ bool coupled_exactly(const Parameters& p, bool cloth) {
   return coupled(p, cloth) && !p.incompressible;
 }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
+bool strong_shells(const Parameters& p, bool cloth) { return strong(p, cloth) && p.shells; }
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
 }
@@ -125,6 +127,7 @@ const Pass all_passes[] = {
     {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
     {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
+    {"linearise_shell", strong_shells, sheets, shell_system | shell_history, linearise_shell},
     {"linearise_cloth", strong, sheets | cloth_load | cloth_air, cloth_system, linearise_cloth},
     {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
      find_neighbours, cloth_rows},
@@ -166,11 +169,12 @@ const Pass all_passes[] = {
     {"move_particles", fluid_alone, moving, moving, move_particles},
     {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
     {"settle_cloth", implicit_alone, sheets,
-     cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped,
+     cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped | shell_system |
+         shell_history,
      settle_cloth_alone},
     {"move_with_sheets", strong, moving | near_list | sheets | start | drift | cloth_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
-         sorting | cloth_load | stopped,
+         sorting | cloth_load | stopped | shell_history,
      move_with_sheets},
     {"move_coupled", coupled_exactly, moving | near_list | sheets,
      moving | cloth | cloth_substep | near_cloth | memory | path | start | cloth_air | contact |

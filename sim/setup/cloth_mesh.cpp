@@ -138,18 +138,26 @@ void build_from_file(const Cloth& cloth, Sheet& sheet) {
   say_what_was_mended(mesh, welded, sheet);
 }
 
+/// Every triangle gives a third of its mass to each corner.
+void weigh_thirds(const Cloth& cloth, Sheet& sheet) {
+  for (const auto& t : sheet.triangle) {
+    const V3d e = sheet.position[t.y] - sheet.position[t.x],
+              f = sheet.position[t.z] - sheet.position[t.x];
+    for (int k = 0; k < 3; ++k)
+      sheet.mass[size_t(sheet.node[t[k]])] += cloth.areal_density * e.cross(f).length() / 6;
+  }
+}
+
 /// Edges of triangles are adjacent springs, the two vertices opposite an edge a diagonal one.
 void fill_mesh(const Cloth& cloth, Sheet& sheet, SpringMap& springs) {
   struct Tip {
     uint32_t vertex, beside;  // one end of the edge, the same node from both sides
   };
   std::map<Edge, std::vector<Tip>> opposite;
+  weigh_thirds(cloth, sheet);
   for (const auto& t : sheet.triangle) {
-    const V3d e = sheet.position[t.y] - sheet.position[t.x],
-              f = sheet.position[t.z] - sheet.position[t.x];
     for (int k = 0; k < 3; ++k) {
       const uint32_t a = t[k], b = t[(k + 1) % 3];
-      sheet.mass[size_t(sheet.node[a])] += cloth.areal_density * e.cross(f).length() / 6;
       springs.add(a, b, 0.5 * cloth.adjacent_stiffness);
       const auto na = uint32_t(sheet.node[a]), nb = uint32_t(sheet.node[b]);
       opposite[ordered(na, nb)].push_back({t[(k + 2) % 3], na < nb ? a : b});
@@ -249,7 +257,11 @@ Sheet build_sheet(const Cloth& cloth, const Seams& seams) {
   join_at_seams(sheet, seams);
   sheet.mass.assign(sheet.point.size(), 0.0);
   SpringMap springs{sheet, {}};
-  grid ? fill_grid(cloth, sheet, springs) : fill_mesh(cloth, sheet, springs);
+  if (cloth.model == ClothModel::shell) {
+    weigh_thirds(cloth, sheet);
+  } else {
+    grid ? fill_grid(cloth, sheet, springs) : fill_mesh(cloth, sheet, springs);
+  }
   for (const auto& [ends, k] : springs.stiffness) {
     const auto& [edge, image] = ends;
     const Imath::V3i periods(image[0], image[1], image[2]);

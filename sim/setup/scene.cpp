@@ -12,6 +12,7 @@
 #include "sim/neighbours/periodic.h"
 #include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/coupling/geometry.h"
+#include "sim/setup/cloth_shell.h"
 #include "sim/setup/cloth_start.h"
 #include "sim/setup/probe_report.h"
 
@@ -207,6 +208,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.surface_tension = float(shot.fluid.surface_tension);
   set_wetting(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
+  for (const Cloth& c : shot.cloth) p.shells |= c.model == ClothModel::shell;
   p.fixed_dt = shot.time_step;
   return p;
 }
@@ -469,6 +471,8 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     scene.first_vertex.push_back(scene.cloth.vertices());
     scene.first_triangle.push_back(scene.cloth.triangles());
     append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, shot, scene);
+    if (scene.parameters.shells)
+      append_shell(scene.sheet.back(), shot.cloth[s], scene.frame, scene.cloth);
     dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back(), shot.cloth[s]));
   }
   scene.first_vertex.push_back(scene.cloth.vertices());
@@ -477,6 +481,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
                    [](const Sheet& sheet) { return sheet.joined(); })) {
     ClothTopology& t = scene.cloth;
     t.corner_shift = t.spring_shift = t.rest_period = {};
+    t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
   }
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =

@@ -151,8 +151,11 @@ struct ClothPin {  // vertices held where they start; exactly one of the two for
   std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
 };
 
+enum class ClothModel { springs, shell };
+
 struct Cloth {
   std::string name = "cloth";
+  ClothModel model = ClothModel::springs;
   // A grid (mesh_file empty): corner + i/nu u + j/nv v, with both diagonals as springs.
   V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
   V2i cells{64, 64};
@@ -168,8 +171,15 @@ struct Cloth {
   double spring_damping = 0.1;      // fraction of critical, along each spring; momentum is kept
   double retardation_time = 0;      // s, viscosity over stiffness of each spring (Kelvin-Voigt)
   double thickness = 0.001;         // m
-  Slip slip = Slip::automatic;      // of fluid along it
-  double contact_angle_deg = 90;    // of the fluid's surface at it, within the fluid
+  // of a shell; what the file does not give is of the fabric (fabrics.h)
+  std::string fabric = "cotton";
+  double young_warp = 12000, young_weft = 8000, shear_modulus = 67.4;    // N/m
+  double poisson = 0.2;                                                  // geometric mean of both
+  double bend_warp = 1.96e-5, bend_weft = 1.37e-5, bend_bias = 1.27e-5;  // N m
+  double stretch_limit = 1.05;    // length over rest length where it stiffens
+  double damping_time = 0.005;    // s, viscosity over stiffness in its plane
+  Slip slip = Slip::automatic;    // of fluid along it
+  double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid
   std::string material = "cotton";
   Matte matte = Matte::none;
 };

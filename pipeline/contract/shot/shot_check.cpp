@@ -378,7 +378,15 @@ class Checker : CheckBase {
                                        "1e-5 of the mesh's diagonal",
                                        path, cloth.weld));
     }
-    if (!(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
+    if (cloth.model == ClothModel::shell && shot_.fluid.present() && !is_incompressible(shot_)) {
+      fail(path + ".model",
+           fmt::format("{}.model is \"shell\", whose steps are implicit, but the fluid is weakly "
+                       "compressible and takes its sheets along in explicit ones. Use "
+                       "fluid.solver = \"incompressible\", or model = \"springs\"",
+                       path));
+    }
+    if (cloth.model == ClothModel::springs &&
+        !(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
       fail(
           path + ".adjacent_stiffness",
           fmt::format("{0}.adjacent_stiffness and {0}.diagonal_stiffness are both 0; nothing would "

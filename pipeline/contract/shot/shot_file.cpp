@@ -1,4 +1,5 @@
 #include "pipeline/contract/shot/shot_file.h"
+#include "pipeline/contract/shot/fabric_keys.h"
 
 #include <fmt/format.h>
 
@@ -236,7 +237,7 @@ class Reader {
     for (const bool types : {true, false}) {
       for (auto&& [key, node] : table) {
         const std::string name(key.str());
-        if ((name == "type") != types) continue;
+        if ((name == section.type_key) != types) continue;
         const Section* const child =
             shot_table::find_section(fmt::format("{}.{}", section.name, name));
         if (const Parameter* p = shot_table::find_parameter(section.name, name)) {
@@ -280,14 +281,15 @@ class Reader {
                        site.key));
     }
     if (!shot_table::applies(p, section, object)) {
-      const Parameter& type = *shot_table::find_parameter(section.name, "type");
+      const Parameter& type = *shot_table::find_parameter(section.name, section.type_key);
       std::vector<std::string_view> owners;
       for (size_t i = 0; i < type.choices.size(); ++i) {
         if (p.types >> i & 1u) owners.push_back(type.choices[i]);
       }
-      fail(site.where, fmt::format("{} belongs to a {} of type {}; this one is a {}. Remove it",
-                                   site.key, section.name, fmt::join(owners, " or "),
-                                   type.choices[size_t(section.type_of(object))]));
+      fail(site.where,
+           fmt::format("{} belongs to a {} of {} {}; this one is a {}. Remove it", site.key,
+                       section.name, section.type_key, fmt::join(owners, " or "),
+                       type.choices[size_t(section.type_of(object))]));
     }
     draft_.sources.where[site.key] = site.where;
     if (mode_ == Mode::override_values) draft_.overridden.insert(site.key);
@@ -503,6 +505,7 @@ Shot parse_shot(const std::string& text, const fs::path& file, const ShotOptions
       log_warning("shot", label + ": " + text);
   }
   resolve_pins(draft);
+  take_fabrics(draft.shot, draft.sources);
   check_file_names(draft.shot, label, options.quality);
   check_shot(draft.shot, draft.sources);
   return draft.shot;

@@ -53,6 +53,12 @@ Section typed(Section section) {
   return named<Object>(section);
 }
 
+Section modelled(Section section) {
+  section.type_of = [](void* object) { return int(static_cast<Cloth*>(object)->model); };
+  section.type_key = "model";
+  return named<Cloth>(section);
+}
+
 Section emitters(Section section) {
   section.type_of = [](void* object) { return int(static_cast<FluidEmitter*>(object)->type); };
   return section;
@@ -96,7 +102,7 @@ const std::vector<Section>& sections() {
                               "Drops with centres drawn evenly in a box and kept apart."),
       repeated<&Fluid::volume>("fluid.volume", "fluid",
                                "A closed mesh full of fluid at the start."),
-      named<Cloth>(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
+      modelled(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
       repeated<&Cloth::pin>("cloth.pin", "cloth",
                             "Vertices held where they start: a list or a box."),
       typed<Obstacle>(repeated<&Shot::obstacle>(

@@ -72,6 +72,7 @@ struct Section {
   void (*append)(void* owner) = nullptr;                  // repeated only
   const std::string* (*name_of)(void* object) = nullptr;  // objects with names
   int (*type_of)(void* object) = nullptr;                 // objects with a type
+  std::string_view type_key = "type";                     // the key of it
 };
 
 const std::vector<Section>& sections();  // a parent stands before its children

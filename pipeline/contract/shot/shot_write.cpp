@@ -65,12 +65,13 @@ std::string default_text(const Parameter& parameter) {
 
 std::string types_text(const Parameter& parameter) {
   if (parameter.types == ~0u) return "";
-  const Parameter& type = *shot_table::find_parameter(parameter.section, "type");
+  const std::string_view key = shot_table::find_section(parameter.section)->type_key;
+  const Parameter& type = *shot_table::find_parameter(parameter.section, key);
   std::vector<std::string_view> names;
   for (size_t i = 0; i < type.choices.size(); ++i) {
     if (parameter.types >> i & 1u) names.push_back(type.choices[i]);
   }
-  return fmt::format("; type {} only", fmt::join(names, ", "));
+  return fmt::format("; {} {} only", key, fmt::join(names, ", "));
 }
 
 bool has_limits(const Parameter& parameter) {

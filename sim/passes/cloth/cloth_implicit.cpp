@@ -80,6 +80,10 @@ void linearise_cloth(State& state) {
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const AirDrag air = air_drag_of(state);
   const ConstVecView air_push = c.air_push.view();
+  const bool shells = state.shell.any;
+  const ConstVecView shell_base = state.shell.base.view();
+  const float* shell_diagonal = state.shell.diagonal.data();
+  const int padded = c.padded;
   ClothControl* control = s.control.data();
   parallel_for(
       state.queue, "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
@@ -112,11 +116,16 @@ void linearise_cloth(State& state) {
           b[0] = b[0] + d.x, b[1] = b[1] + m.x, b[2] = b[2] + m.z;
           b[3] = b[3] + d.y, b[4] = b[4] + m.y, b[5] = b[5] + d.z;
         }
+        Vec3<T> inner = none;
+        if (shells) {
+          inner = shell_base.at(i);
+          for (int k = 0; k < 6; ++k) b[k] = b[k] + load(shell_diagonal + k * padded, i);
+        }
         store(inertia, i, heavy);
         block.put(i, b, maximum(heavy, T(1e-20f)));
         const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
         free.put(i, Vec3<T>{moves, moves, moves});
-        base.put(i, force * T(dt * dt) - held * T(dt));
+        base.put(i, force * T(dt * dt) - held * T(dt) + inner);
         change.put(i, none);
       });
 }
@@ -124,7 +133,7 @@ void linearise_cloth(State& state) {
 void hold_at_walls(State& state) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
-  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView x = c.position.view(), v = path_velocity_of(state);
   const ConstVecView base = s.base.view(), right = s.right.view();
   const VecView free = s.free.view(), change = s.change.view();
   const float dt = float(state.dt);
@@ -189,7 +198,7 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
 void hold_at_obstacles(State& state) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
-  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const ConstVecView x = c.position.view(), v = path_velocity_of(state);
   const ConstVecView base = s.base.view(), right = s.right.view();
   const VecView change = s.change.view();
   const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
@@ -229,6 +238,7 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
   const HoldRevision revise{.hold = cloth_hold_of(state),
                             .position = c.position.view(),
                             .velocity = c.velocity.view(),
+                            .path = path_velocity_of(state),
                             .change = change,
                             .given = given,
                             .right = s.answer.view(),

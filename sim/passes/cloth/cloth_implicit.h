@@ -12,6 +12,7 @@
 
 #include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_springs.h"
+#include "sim/passes/cloth/shell_system.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -42,9 +43,10 @@ inline ConstraintProjection constraint_projection(const State& state) {
   return {s.free.view(), s.normal.view(), s.slides.data(), state.parameters.obstacles > 0};
 }
 
-/// The matrix A, by slots of springs, on free directions alone.
+/// The matrix A, by slots of springs and rows of shells, on free directions alone.
 struct ClothMatrix {
   SpringEnds ends;
+  ShellMatrix shell;
   const float *tension, *inertia;
   ConstVecView axis;
   ConstraintProjection constraints;
@@ -67,13 +69,14 @@ struct ClothMatrix {
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
       y = y + d * load(tension, at) + e * dot(e, d);
     }
-    return y;
+    return shell.any ? y + shell.times(view, i) : y;
   }
 };
 
 inline ClothMatrix cloth_matrix(const State& state) {
   const ClothSystem& s = state.cloth_system;
   return {.ends = spring_ends_of(state.cloth),
+          .shell = shell_matrix_of(state),
           .tension = s.tension.data(),
           .inertia = s.inertia.data(),
           .axis = s.axis.view(),

@@ -142,8 +142,8 @@ void hold_at_obstacles(State& state);
 /// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
 struct HoldRevision {
   ClothHold hold;
-  ConstVecView position;
-  VecView velocity, change;
+  ConstVecView position, velocity, path;
+  VecView change;
   ConstVecView given;
   VecView right, reaction, rub;
   float* slides;
@@ -152,7 +152,7 @@ struct HoldRevision {
   int round;
 
   DRENCH_HD bool free_too_near(int i) const {
-    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    const Vec3<float> straight = position[i] + path[i] * dt;
     Vec3<float> w = change[i];
     if (!hold.hold(i, position[i], straight, straight + w, w)) return false;
     change.set(i, w);
@@ -167,7 +167,7 @@ struct HoldRevision {
   }
   /// The obstacle takes the vertex with it.
   DRENCH_HD bool stick(int i, const ObstacleView& o, Vec3<float> n) const {
-    const Vec3<float> x = position[i], straight = x + velocity[i] * dt, w = change[i];
+    const Vec3<float> x = position[i], straight = x + path[i] * dt, w = change[i];
     const Vec3<float> in = hold.home(x), carried = o.to_frame(1, o.to_own(0, x + in)) - in;
     const Vec3<float> off = along(hold.free[i], carried - straight - w);
     slides[i] = 0.f;
@@ -190,7 +190,7 @@ struct HoldRevision {
     const float normal = dot(n, all), most = o.friction * normal;
     if (normal < 0.f) return let_go(i);
     if (o.friction == 0.f) return round == 0;
-    const Vec3<float> straight = position[i] + velocity[i] * dt;
+    const Vec3<float> straight = position[i] + path[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);
     if (round == 0) {  // hold what is slow enough for friction to stop it
       const Vec3<float> slip = across(velocity[i] - solid, n);

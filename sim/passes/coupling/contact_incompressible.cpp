@@ -10,7 +10,7 @@ void add_cloth_to_walls(State& state) {
   float *allowed = state.contact.recovery.data(), *compliance = state.contact.compliance.data(),
         *gaps = state.contact.gap.data(), *left_open = state.contact.open.data();
   const ConstVecView x = f.position.view(), start = f.start.view(), normal = f.normal.view(),
-                     cloth_velocity = state.cloth.velocity.view();
+                     cloth_velocity = path_velocity_of(state);
   const float *distance = f.cloth_distance.data(), *edge = f.edge.data(),
               *half_thickness = state.cloth.half_thickness.data();
   const int* triangle = f.triangle.data();
@@ -139,8 +139,11 @@ void add_cloth_to_diagonal(State& state) {
   ClothSystem& s = state.cloth_system;
   const ClothRows c = cloth_rows(state);
   const RowSize size{c, constraint_projection(state)};
-  const TensionMatrix matrix{spring_ends_of(state.cloth), s.tension.data(), s.inertia.data(),
-                             state.cloth.inverse_mass.data()};
+  const TensionMatrix matrix{.ends = spring_ends_of(state.cloth),
+                             .shell = shell_tension_of(state),
+                             .tension = s.tension.data(),
+                             .inertia = s.inertia.data(),
+                             .inverse_mass = state.cloth.inverse_mass.data()};
   const VecView answer = s.answer.view();
   const VecView right = s.right.view();
   sum_row_sizes(state, size, right);
@@ -236,10 +239,13 @@ void finish_cloth(State& state) {
   const bool near = state.contact.near > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);
+  const bool shells = state.shell.any;
+  const ConstVecView path = path_velocity_of(state), rounding = state.shell.rounding.view();
   for_each_lane(
       state.queue, "cloth: finish", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
         Vec3<T> velocity = v.at(i) + change.at(i) * T(inverse_dt), to = x.at(i) + velocity * T(dt);
+        if (shells) to = x.at(i) + (path.at(i) * T(dt) + change.at(i) + rounding.at(i));
         walls.stop(to, velocity);
         const auto free = load(inverse_mass, i) > T(0.f);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
@@ -254,6 +260,7 @@ void finish_cloth(State& state) {
         predicted.put(i, velocity);
       });
   if (state.parameters.obstacles > 0) finish_at_obstacles(state, near ? right : base);
+  if (shells) keep_shell_step(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

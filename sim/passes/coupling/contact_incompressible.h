@@ -76,6 +76,7 @@ enum class Base { none, own };
 /// component alike.
 struct TensionMatrix {
   SpringEnds ends;
+  ShellTension shell;
   const float *tension, *inertia, *inverse_mass;
 
   template <class Index, class T>
@@ -89,12 +90,14 @@ struct TensionMatrix {
     Vec3<T> y = x * load(inertia, i);
     for (int s = 0; s < ends.slots; ++s)
       y = y + (x - ends.at_end(view, i, s)) * load(tension, i + s * ends.stride);
+    if (shell.any) y = y + shell.times(view, i);
     return moving(i, y);
   }
   template <class Index, class T>
   DRENCH_HD Vec3<T> scaled(Index i, Vec3<T> r) const {
     T sum = load(inertia, i);
     for (int s = 0; s < ends.slots; ++s) sum = sum + load(tension, i + s * ends.stride);
+    if (shell.any) sum = sum + shell.diagonal(i, sum);
     return moving(i, r * (T(1.f) / maximum(sum, T(1e-20f))));
   }
 };

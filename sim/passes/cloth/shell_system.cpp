@@ -1,0 +1,286 @@
+#include "sim/passes/cloth/shell_system.h"
+
+#include <algorithm>
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+/// Fields of a triangle: -dt^2 times the blocks of corners 0 1, 0 2 and 1 2 by rows, the forces on
+/// corners 1 and 2, and tensions of the sides 0 1, 0 2, 1 2.
+enum ElementFields { blocks = 0, forces = 27, tensions = 33, element_fields = 36 };
+
+/// What places the corners of triangles: positions with what they round off.
+struct ShellCorners {
+  ConstVecView position, rounding, edge_shift;
+  const int* corner;
+  int stride;  // from one corner to the next, of triangles
+  bool joined;
+
+  template <class Index>
+  DRENCH_HD auto vertex(Index t, int c) const {
+    return load(corner + c * stride, t);
+  }
+  /// From corner 0 to corner c.
+  template <class Index>
+  DRENCH_HD auto edge(Index t, int c) const {
+    const auto from = vertex(t, 0), to = vertex(t, c);
+    auto e = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from));
+    if (joined) e = e + edge_shift.at(t + (c - 1) * stride);
+    return e;
+  }
+};
+
+struct ShellElements {
+  ShellCorners corners;
+  const float *area, *gradient, *law;
+  const int* sheet;
+  float* element;
+  int sheets;
+  float dt;
+
+  template <class T, class Index>
+  DRENCH_HD MembraneLaw<T> law_of(Index sheet_of) const {
+    const auto field = [&](int k) { return load(law + k * sheets, sheet_of); };
+    return {.moduli = {field(0), field(1), field(2), field(3), T(0.f), T(0.f)},
+            .limit = {field(4), field(5)},
+            .damping_time = field(6)};
+  }
+
+  template <class Index>
+  DRENCH_HD void operator()(Index t) const {
+    using T = decltype(load(area, t));
+    const int stride = corners.stride;
+    const auto put = [&](int field, T value) { store(element + field * stride, t, value); };
+    RestTriangle<T> rest;
+    rest.area = load(area, t);
+    for (int k = 0; k < 2; ++k) {
+      rest.gradient_x[k] = load(gradient + k * stride, t);
+      rest.gradient_y[k] = load(gradient + (2 + k) * stride, t);
+    }
+    const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
+    const SurfaceGradient<T> f =
+        surface_gradient(rest, none, corners.edge(t, 1), corners.edge(t, 2));
+    const Symmetric2<T> strain = green_strain(f);
+    const auto response = law_of<T>(load(sheet, t)).at(strain, {T(0.f), T(0.f), T(0.f)}, T(dt));
+    const Symmetric2<T> pull = positive_part(response.stress);
+    const T scale(-dt * dt);
+    for (int pair = 0; pair < 3; ++pair) {
+      const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
+      const Block3<T> k = membrane_block(rest, f, pull, response.moduli, a, b);
+      const Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
+      for (int r = 0; r < 3; ++r) {
+        put(blocks + 9 * pair + 3 * r, row[r].x), put(blocks + 9 * pair + 3 * r + 1, row[r].y);
+        put(blocks + 9 * pair + 3 * r + 2, row[r].z);
+      }
+    }
+    for (int c = 1; c < 3; ++c) {
+      const Vec3<T> force = membrane_force(rest, f, response.stress, c);
+      put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
+      put(forces + 3 * c - 1, force.z);
+    }
+    put_tensions(rest, pull, put);
+  }
+
+  /// Springs of no direction whose energy is nowhere above that of the stress in the triangle: its
+  /// own three, w = -A grad L_a . S grad L_b, of which at most one is negative. The two others make
+  /// up for that one, in the proportion of what they have.
+  template <class T, class Put>
+  DRENCH_HD void put_tensions(const RestTriangle<T>& rest, const Symmetric2<T>& pull,
+                              const Put& put) const {
+    T w[3];
+    for (int pair = 0; pair < 3; ++pair) {
+      const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
+      const T ax = rest.along_warp(a), ay = rest.along_weft(a), bx = rest.along_warp(b),
+              by = rest.along_weft(b);
+      w[pair] = T(-dt * dt) * rest.area *
+                (ax * (pull.xx * bx + pull.xy * by) + ay * (pull.xy * bx + pull.yy * by));
+    }
+    // c (a + b)^2 <= c (1 + s) a^2 + c (1 + 1/s) b^2 with s = sqrt(w_b / w_a) of the two others
+    const T lack[3] = {max0(-w[0]), max0(-w[1]), max0(-w[2])};
+    const T root[3] = {square_root(max0(w[0])), square_root(max0(w[1])), square_root(max0(w[2]))};
+    for (int k = 0; k < 3; ++k) {
+      const int p = (k + 1) % 3, q = (k + 2) % 3;
+      const T small(1e-30f);
+      const T by_q = lack[q] * (T(1.f) + root[p] / maximum(root[k], small)),
+              by_p = lack[p] * (T(1.f) + root[q] / maximum(root[k], small));
+      put(tensions + k, max0(max0(w[k]) - by_p - by_q));
+    }
+  }
+};
+
+/// The straight paths, where nothing has stopped a vertex since the last step.
+void find_paths(State& state) {
+  const ShellState& s = state.shell;
+  const ConstVecView x = state.cloth.position.view(), v = state.cloth.velocity.view(),
+                     landed = s.landed.view(), left = s.left.view();
+  const VecView rounding = state.shell.rounding.view(),
+                acceleration = state.shell.acceleration.view(), path = state.shell.path.view();
+  const float half = 0.5f * float(std::min(state.dt, s.dt));
+  parallel_for(
+      state.queue, "shell: paths", state.cloth.padded, DRENCH_LAMBDA(int i) {
+        const Vec3<float> none{0.f, 0.f, 0.f};
+        const bool here = length2(x[i] - landed[i]) == 0.f, so = length2(v[i] - left[i]) == 0.f;
+        if (!here) rounding.set(i, none);
+        if (!here || !so) acceleration.set(i, none);
+        path.set(i, v[i] - acceleration[i] * half);
+      });
+}
+
+/// Gathers what triangles give to a vertex.
+struct ShellVertices {
+  ShellMatrix matrix;
+  ConstVecView position, rounding, path, push, internal;
+  const int *fan_start, *fan_entry, *fan_slot;
+  const float* element;
+  int triangles, vertices;
+  float *block, *tension, *diagonal;
+  VecView base, force;
+  float dt, history;  // history: dt / (2 dt of the step before), at most 1/2; 0 without one
+  bool joined;
+
+  DRENCH_HD float field(int k, int t) const { return element[k * triangles + t]; }
+
+  /// Adds -dt^2 K_ab to the block of an entry, corners a and b.
+  DRENCH_HD void add_block(int t, int a, int b, int at) const {
+    const int low = a < b ? a : b, pair = low == 1 ? 2 : (a < b ? b : a) - 1;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        block[(3 * r + c) * matrix.stride + at] +=
+            field(blocks + 9 * pair + (a < b ? 3 * r + c : 3 * c + r), t);
+    tension[at] += field(tensions + pair, t);
+  }
+  DRENCH_HD Vec3<float> force_on(int t, int c) const {
+    const auto on = [&](int k) {
+      return Vec3<float>{field(forces + 3 * k, t), field(forces + 3 * k + 1, t),
+                         field(forces + 3 * k + 2, t)};
+    };
+    return c > 0 ? on(c - 1) : -(on(0) + on(1));
+  }
+
+  /// Blocks of the row, and the membrane's force.
+  DRENCH_HD Vec3<float> gather(int i) const {
+    const int slice = ShellRows::slice(i);
+    for (int s = matrix.rows.ring_start[slice]; s < matrix.rows.ring_start[slice + 1]; ++s) {
+      const int at = ShellRows::entry(s, i);
+      for (int k = 0; k < 9; ++k) block[k * matrix.stride + at] = 0.f;
+      tension[at] = 0.f;
+    }
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    if (i >= vertices) return sum;
+    for (int e = fan_start[i]; e < fan_start[i + 1]; ++e) {
+      const int t = fan_entry[e] / 3, c = fan_entry[e] % 3;
+      if (fan_slot[2 * e] < 0) continue;
+      add_block(t, c, (c + 1) % 3, ShellRows::entry(fan_slot[2 * e], i));
+      add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
+      sum = sum + force_on(t, c);
+    }
+    return sum;
+  }
+
+  DRENCH_HD void operator()(int i) const {
+    Vec3<float> sum = gather(i);
+    float d[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
+    const ShellRows& rows = matrix.rows;
+    const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
+    const int first = rows.row_start[slice], last = rows.row_start[slice + 1];
+    const int inner = first + rows.ring_start[slice + 1] - ring;
+    float stiff = 0.f;
+    for (int slot = first; slot < last; ++slot) {
+      const int at = ShellRows::entry(slot, i), j = rows.end[at];
+      const float b = matrix.bend[at];
+      sum = sum + ((position[j] - position[i]) + (rounding[j] - rounding[i])) * b;
+      stiff += b * matrix.dt2;
+      if (slot >= inner) continue;
+      const int to = ShellRows::entry(ring + slot - first, i), stride = matrix.stride;
+      for (int k = 0; k < 9; k += 4) block[k * stride + to] += b * matrix.dt2;
+      const auto entry = [&](int k) { return block[k * stride + to]; };
+      stiff -= b * matrix.dt2;
+      d[0] += entry(0), d[3] += entry(4), d[5] += entry(8);
+      d[1] += 0.5f * (entry(1) + entry(3)), d[2] += 0.5f * (entry(2) + entry(6)),
+          d[4] += 0.5f * (entry(5) + entry(7));
+    }
+    if (joined && i < vertices) sum = sum + push[i];
+    d[0] += stiff, d[3] += stiff, d[5] += stiff;
+    for (int k = 0; k < 6; ++k) diagonal[k * 8 * ((vertices + 7) / 8) + i] = d[k];
+    force.set(i, sum);
+    const Vec3<float> before = internal[i];
+    base.set(i, (sum - (sum - before) * history) * (dt * dt) - matrix.times(path, i) * dt);
+  }
+};
+
+}  // namespace
+
+void linearise_shell(State& state) {
+  ShellState& s = state.shell;
+  const ClothState& c = state.cloth;
+  find_paths(state);
+  const ShellElements elements{.corners = {.position = c.position.view(),
+                                           .rounding = s.rounding.view(),
+                                           .edge_shift = s.edge_shift.view(),
+                                           .corner = s.corner.data(),
+                                           .stride = s.triangles,
+                                           .joined = c.joined},
+                               .area = s.area.data(),
+                               .gradient = s.gradient.data(),
+                               .law = s.law.data(),
+                               .sheet = s.sheet.data(),
+                               .element = s.element.data(),
+                               .sheets = s.sheets,
+                               .dt = float(state.dt)};
+  for_each_lane(
+      state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
+  const ShellVertices vertices{
+      .matrix = shell_matrix_of(state),
+      .position = c.position.view(),
+      .rounding = s.rounding.view(),
+      .path = s.path.view(),
+      .push = s.push.view(),
+      .internal = s.internal.view(),
+      .fan_start = c.fan_start.data(),
+      .fan_entry = c.fan_entry.data(),
+      .fan_slot = s.fan_slot.data(),
+      .element = s.element.data(),
+      .triangles = s.triangles,
+      .vertices = c.vertices,
+      .block = s.block.data(),
+      .tension = s.tension.data(),
+      .diagonal = s.diagonal.data(),
+      .base = s.base.view(),
+      .force = s.force.view(),
+      .dt = float(state.dt),
+      .history = s.dt > 0 ? 0.5f * float(std::min(1., state.dt / s.dt)) : 0.f,
+      .joined = c.joined};
+  parallel_for(
+      state.queue, "shell: rows", c.padded, DRENCH_LAMBDA(int i) { vertices(i); });
+}
+
+void keep_shell_step(State& state) {
+  ShellState& s = state.shell;
+  const ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
+                     next_velocity = c.next_velocity.view(), path = s.path.view(),
+                     change = state.cloth_system.change.view(), force = s.force.view();
+  const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
+                acceleration = s.acceleration.view(), internal = s.internal.view();
+  const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
+  const float dt = float(state.dt), inverse_dt = 1.f / dt;
+  parallel_for(
+      state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
+        landed.set(i, next[i]), left.set(i, next_velocity[i]), internal.set(i, force[i]);
+        const bool shell = fan_slot[2 * fan_start[i]] >= 0;
+        acceleration.set(
+            i, shell ? (next_velocity[i] - v[i]) * inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
+        // What x + way + rounding loses by being rounded, if that is where the vertex ends.
+        const auto lost = [](float x, float way, float to) { return way - (to - x); };
+        const Vec3<float> way = path[i] * dt + change[i] + rounding[i];
+        const Vec3<float> rest{lost(x.x[i], way.x, next.x[i]), lost(x.y[i], way.y, next.y[i]),
+                               lost(x.z[i], way.z, next.z[i])};
+        const float most = 1e-6f * (fabsf(next.x[i]) + fabsf(next.y[i]) + fabsf(next.z[i]));
+        const bool whole = fabsf(rest.x) + fabsf(rest.y) + fabsf(rest.z) <= most;
+        rounding.set(i, whole ? rest : Vec3<float>{0.f, 0.f, 0.f});
+      });
+  s.dt = state.dt;
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,133 @@
+#pragma once
+// The step of sheets that are shells, in the sheets' one system A w = b (cloth_implicit.h). Here
+// w = dt (v_1 - v_0), and a vertex ends at x_0 + dt p + w, its straight path p being
+//   p = v_0 - dt/2 a_0,                          a_0 the acceleration over the step before.
+// Forces inside the sheet count with f_1 - (f_0 - f_-1) dt / (2 dt_-1). Together this is the linear
+// two-step method rho = z^2 - z, sigma = z^2 - z/2 + 1/2: of second order, A-stable, damping a mode
+// of angle phi = omega dt a step by phi^4/4 and the stiffest by sqrt(2) a step, where implicit
+// Euler takes phi^2/2 (Hairer and Wanner 1996, V.1, for what A-stable linear methods can be). The
+// fluid's impulses and what walls give count in full at once, so that momentum is kept step by
+// step; a vertex that something stopped starts anew, by implicit Euler.
+//
+// f_1 is linearised once, about x_0: the membrane's part of A are 3 x 3 blocks of vertices that
+// share a triangle (shell_membrane.h, stress projected), bending's a number for every pair of
+// vertices (shell_bending.h). Positions carry what they round off: a stiff sheet feels a tenth of a
+// micrometre.
+
+#include "sim/passes/cloth/shell_membrane.h"
+#include "sim/passes/coupling/polygon_grid.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// Entries of the rows of eight vertices follow each other slot by slot.
+struct ShellRows {
+  const int *ring_start, *row_start, *end, *offset;
+
+  static DRENCH_HD int slice(int i) { return i >> 3; }
+  static DRENCH_HD int entry(int slot, int i) { return 8 * slot + (i & 7); }
+  DRENCH_HD Vec3<float> at_end(const ConstVecView& view, int i, int slot) const {
+    return view[end[entry(slot, i)]];
+  }
+  DRENCH_HD float at_end(const float* column, int i, int slot) const {
+    return column[end[entry(slot, i)]];
+  }
+#if !defined(__CUDACC__)
+  static DRENCH_HD int slice(Lanes i) { return i.base >> 3; }
+  static DRENCH_HD Lanes entry(int slot, Lanes) { return {8 * slot}; }
+  DRENCH_HD Vec3<Pack> at_end(const ConstVecView& view, Lanes i, int slot) const {
+    if (offset[slot] != 0) return view.at(Lanes{i.base + offset[slot]});
+    return view.at(load(end, Lanes{8 * slot}));
+  }
+#endif
+};
+
+/// The sheets' own part of A, as far as they are shells. Its rows sum to zero: a shift of the whole
+/// meets no resistance.
+struct ShellMatrix {
+  ShellRows rows;
+  const float *block, *bend;
+  int stride;  // from one field of the blocks to the next
+  float dt2;   // s^2
+  bool any;
+
+  template <class Index>
+  DRENCH_HD auto times(const ConstVecView& view, Index i) const {
+    const auto x = view.at(i);
+    using T = decltype(x.x);
+    Vec3<T> y{T(0.f), T(0.f), T(0.f)}, across = y;
+    const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
+    const int first = rows.row_start[slice], last = rows.row_start[slice + 1];
+    const int inner = first + rows.ring_start[slice + 1] - ring;
+    for (int slot = first; slot < inner; ++slot) {
+      const Vec3<T> d = x - rows.at_end(view, i, slot);
+      const auto at = ShellRows::entry(ring + slot - first, i);
+      const auto entry = [&](int k) { return load(block + k * stride, at); };
+      y.x = y.x + entry(0) * d.x + entry(1) * d.y + entry(2) * d.z;
+      y.y = y.y + entry(3) * d.x + entry(4) * d.y + entry(5) * d.z;
+      y.z = y.z + entry(6) * d.x + entry(7) * d.y + entry(8) * d.z;
+    }
+    for (int slot = inner; slot < last; ++slot)
+      across = across + (x - rows.at_end(view, i, slot)) * load(bend, ShellRows::entry(slot, i));
+    return y + across * T(dt2);
+  }
+};
+
+inline ShellRows shell_rows_of(const ShellState& s) {
+  return {s.ring_start.data(), s.row_start.data(), s.end.data(), s.offset.data()};
+}
+
+inline ShellMatrix shell_matrix_of(const State& state) {
+  const ShellState& s = state.shell;
+  return {.rows = shell_rows_of(s),
+          .block = s.block.data(),
+          .bend = s.bend.data(),
+          .stride = 8 * s.ring_slots,
+          .dt2 = float(state.dt * state.dt),
+          .any = s.any};
+}
+
+/// The part of A that tension gives without its direction, nowhere above A: a matrix of springs of
+/// no direction whose inverse has no negative entry.
+struct ShellTension {
+  ShellRows rows;
+  const float* tension;
+  bool any;
+
+  template <class Index>
+  DRENCH_HD auto times(const ConstVecView& view, Index i) const {
+    const auto x = view.at(i);
+    auto y = x - x;
+    const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
+    for (int k = 0; k < rows.ring_start[slice + 1] - ring; ++k) {
+      y = y + (x - rows.at_end(view, i, rows.row_start[slice] + k)) *
+                  load(tension, ShellRows::entry(ring + k, i));
+    }
+    return y;
+  }
+  /// @param like  says of which kind the sum is
+  template <class Index, class T>
+  DRENCH_HD T diagonal(Index i, T like) const {
+    T sum = like - like;
+    const int slice = ShellRows::slice(i);
+    for (int k = rows.ring_start[slice]; k < rows.ring_start[slice + 1]; ++k)
+      sum = sum + load(tension, ShellRows::entry(k, i));
+    return sum;
+  }
+};
+
+inline ShellTension shell_tension_of(const State& state) {
+  return {shell_rows_of(state.shell), state.shell.tension.data(), state.shell.any};
+}
+
+/// The velocity of the vertices' straight paths.
+inline ConstVecView path_velocity_of(const State& state) {
+  return state.shell.any ? state.shell.path.view() : state.cloth.velocity.view();
+}
+
+/// The straight paths, the blocks, and the sheet's own part of the right side.
+void linearise_shell(State& state);
+
+/// Notes what the next step needs of this one, whose end is in ClothState::next.
+void keep_shell_step(State& state);
+
+}  // namespace drench::sim::DRENCH_BACKEND
