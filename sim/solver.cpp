@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
-#include "sim/passes/motion/limits.h"
+#include "sim/passes/motion/measure_limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
 #include "sim/passes/probe/probe.h"

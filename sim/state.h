@@ -10,7 +10,7 @@
 #include "sim/neighbours/neighbours.h"
 #include "sim/parameters.h"
 #include "sim/passes/coupling/geometry.h"
-#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/setup/wall_table.h"
 #include "sim/wind_now.h"
 
@@ -266,7 +266,7 @@ struct PressureState {
 struct TensionState {
   Column<Float4> normal;  // unit, outwards; w: 0 inside
   Column<Float4>
-      wetting;  // unit normal of a wall; w: its surface (passes/tension/wetting.h). Or empty
+      wetting;  // unit normal of a wall; w: its surface (passes/tension/contact_angle.h). Or empty
 };
 
 /// Obstacles and their images as the step has them (obstacle_placement.h) and the level sets they

@@ -5,15 +5,15 @@
 #include "sim/passes/air/wind_on_fluid.h"
 #include "sim/passes/coupling/cloth_filter.h"
 #include "sim/passes/coupling/cloth_side.h"
-#include "sim/passes/coupling/contact_exact.h"
+#include "sim/passes/coupling/collision_rounds.h"
 #include "sim/passes/coupling/contact_paper.h"
-#include "sim/passes/coupling/move.h"
+#include "sim/passes/coupling/contact_wcsph.h"
 #include "sim/passes/motion/turning_frame.h"
 #include "sim/passes/obstacle/obstacle_guard.h"
 #include "sim/passes/pressure/closed_domain.h"
 #include "sim/passes/pressure/incompressible.h"
+#include "sim/passes/tension/contact_angle.h"
 #include "sim/passes/tension/surface_tension.h"
-#include "sim/passes/tension/wetting.h"
 #include "sim/passes/viscosity/body_drag.h"
 #include "sim/passes/viscosity/viscosity_solve.h"
 #include "sim/passes/wcsph/wcsph.h"
@@ -155,7 +155,7 @@ const Pass all_passes[] = {
     {"paper_forces", paper, near_cloth | moving, acceleration | impulse, add_paper_forces},
     {"turn_frame", turning_compressible, moving | cloth, velocity, turn_frame, cloth},
     {"integrate_velocity", compressible, acceleration, velocity, integrate_velocity},
-    {"sort_contacts", coupled_exactly, near_cloth, contact | sorting, sort_exact_contacts},
+    {"sort_contacts", coupled_exactly, near_cloth, contact | sorting, sort_wcsph_contacts},
     {"start_contacts", coupled_exactly, near_list | memory, rows | loads | memory | cloth_load,
      start_contacts},
     {"cloth_predict", coupled_exactly, sheets | cloth_load, cloth_substep | cloth_air,

@@ -6,6 +6,7 @@
 
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
+#include "sim/stable_step.h"
 
 namespace drench::sim {
 

@@ -12,8 +12,8 @@
 
 #include <vector>
 
-#include "surfacing/extract.h"
 #include "surfacing/field.h"
+#include "surfacing/marching_cubes.h"
 
 namespace drench::surfacing {
 

@@ -1,7 +1,7 @@
 #pragma once
 // Columns of the particles on the vertices of the mesh: source, age, wetness.
 
-#include "surfacing/extract.h"
+#include "surfacing/marching_cubes.h"
 
 namespace drench::surfacing {
 

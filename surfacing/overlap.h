@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "surfacing/contact.h"
+#include "surfacing/cloth_contact.h"
 
 namespace drench::surfacing {
 

@@ -2,7 +2,7 @@
 // Slivers, triangles with a small angle, are taken out of the mesh beside cloth, where vertices
 // were moved together.
 
-#include "surfacing/contact.h"
+#include "surfacing/cloth_contact.h"
 
 namespace drench::surfacing {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "surfacing/extract.h"
+#include "surfacing/marching_cubes.h"
 
 namespace drench::surfacing {
 

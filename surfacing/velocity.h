@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "surfacing/extract.h"
+#include "surfacing/marching_cubes.h"
 
 namespace drench::surfacing {
 

@@ -8,6 +8,9 @@
 
 #include "render/display/view_transform.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "pipeline/contract/error.h"
 #include "render/color/color.h"
 #include "render/display/ocio_view.h"
@@ -28,7 +31,7 @@ float shoulder(float x) {
 
 /// NaN is black.
 uint8_t code_of(float display) {
-  return display > 0 ? uint8_t(std::min(display, 1.f) * 255 + 0.5f) : uint8_t(0);
+  return display > 0 ? uint8_t(std::floor(std::min(display, 1.f) * 255 + 0.5f)) : uint8_t(0);
 }
 
 std::vector<uint8_t> built_in_view(const Film& film) {

@@ -14,9 +14,9 @@
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/bsdf_metal.h"
 #include "render/bsdf/bsdf_rough.h"
-#include "render/integrator/guide.h"
 #include "render/integrator/manifold.h"
 #include "render/integrator/path_film.h"
+#include "render/integrator/refracted_light_guide.h"
 #include "render/scene/fabric.h"
 
 namespace drench::render {

@@ -8,7 +8,7 @@
 
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/geometry/shells.h"
-#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/setup/scene_report.h"
 
 namespace drench::sim {

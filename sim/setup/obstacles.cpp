@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
-#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/setup/scene.h"
 #include "sim/setup/scene_report.h"
 

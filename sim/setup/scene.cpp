@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/error.h"
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/coupling/geometry.h"
 #include "sim/setup/cloth_start.h"
 #include "sim/setup/probe_report.h"

@@ -10,6 +10,7 @@
 #include "sim/setup/inlet_report.h"
 #include "sim/setup/room.h"
 #include "sim/setup/scene.h"
+#include "sim/stable_step.h"
 
 namespace drench::sim {
 

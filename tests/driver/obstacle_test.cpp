@@ -12,7 +12,7 @@
 #include "pipeline/contract/geometry/obstacle.h"
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/keys.h"
-#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/simulator.h"
 #include "tests/contract/box_mesh.h"
 #include "tests/contract/sphere_mesh.h"

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "render/bsdf/bsdf_cloth.h"
-#include "render/integrator/guide.h"
+#include "render/integrator/refracted_light_guide.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_cache.h"
 #include "tests/render/chi_square.h"

@@ -1,4 +1,4 @@
-// Contact angles of the incompressible fluid (sim/passes/tension/wetting.h).
+// Contact angles of the incompressible fluid (sim/passes/tension/contact_angle.h).
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "sim/backend/parallel.h"
-#include "sim/passes/coupling/move.h"
+#include "sim/passes/coupling/collision_rounds.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {

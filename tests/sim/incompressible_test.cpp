@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "sim/passes/pressure/measure_density.h"
+#include "sim/stable_step.h"
 #include "tests/sim/listed.h"
 #include "tests/sim/same_state.h"
 

@@ -1,6 +1,6 @@
 // SPH kernels and wall functions against integrals done here and the closed forms of the data.
 
-#include "sim/neighbours/kernels.h"
+#include "sim/neighbours/sph_kernels.h"
 
 #include <gtest/gtest.h>
 

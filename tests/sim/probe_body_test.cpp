@@ -271,7 +271,7 @@ std::vector<sim::ProbeQuery> all_bodies(int obstacles) {
 
 // A dam breaks over a box beside a ball: what the momentum of the fluid lacks of gravity's impulse
 // is the sum over all bodies, however many touch one particle. What is stopped at walls by the last
-// tenth of a spacing (move.h) is not in it.
+// tenth of a spacing (collision_rounds.h) is not in it.
 class BookKeeping : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Sheet, BookKeeping, testing::Bool());
 TEST_P(BookKeeping, CountsEachForceOnceOnOneBody) {

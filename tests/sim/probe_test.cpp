@@ -126,8 +126,8 @@ class WallForces : public testing::TestWithParam<FluidSolver> {};
 
 // A viscous block falls into a narrow tank and sloshes: what its momentum lacks of gravity's
 // impulse the walls got, step by step. When it hits the floor and walls, some particles are stopped
-// by the last tenth of a spacing (move.h), which is no force of the solver's: of the incompressible
-// solver's impulse that is 0.5 %.
+// by the last tenth of a spacing (collision_rounds.h), which is no force of the solver's: of the
+// incompressible solver's impulse that is 0.5 %.
 TEST_P(WallForces, AreWhatTheMomentumOfTheFluidLacks) {
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -g, 0);

@@ -33,7 +33,7 @@ const std::vector<Rule> folder_rules = {
       "sim/passes/obstacle/drain.h"}},
     {"sim/setup",
      {"sim/setup", "sim/", "sim/neighbours", "pipeline/contract", "sim/backend/backend.h",
-      "sim/passes/coupling/geometry.h", "sim/passes/obstacle/obstacle_view.h"}},
+      "sim/passes/coupling/geometry.h", "sim/passes/obstacle/obstacle_distance.h"}},
     {"sim/passes",
      {"sim/passes", "sim/", "sim/neighbours", "sim/backend",
       "pipeline/contract/geometry/level_set.h"}},

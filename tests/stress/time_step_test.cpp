@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/error.h"
 #include "sim/simulator.h"
+#include "sim/stable_step.h"
 #include "tests/stress/report.h"
 #include "tests/stress/scenes.h"
 

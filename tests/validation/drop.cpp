@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "sim/neighbours/kernels.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "tests/sim/support.h"
 
 namespace drench::validation {

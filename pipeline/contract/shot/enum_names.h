@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <source_location>
 #include <string_view>
 #include <utility>
 
@@ -16,7 +15,7 @@ template <auto V>
 consteval std::string_view enumerator_name() {
   // GCC and Clang spell it "... [with auto V = drench::Slip::free; ...]", a number in parentheses
   // where there is no such enumerator.
-  std::string_view text = std::source_location::current().function_name();
+  std::string_view text = __PRETTY_FUNCTION__;
   text.remove_prefix(text.find("V = ") + 4);
   text = text.substr(0, text.find_first_of(";]"));
   return text.front() == '(' ? std::string_view() : text.substr(text.rfind(':') + 1);

@@ -134,6 +134,20 @@ inline constexpr std::string_view matte_text =
     "a "
     "hole with alpha 0, or as a shadow_catcher, nothing but what the other objects do to its light";
 
+inline constexpr std::string_view contact_angle_text =
+    "at which the fluid's surface meets it, measured within the fluid, where there is "
+    "fluid.surface_tension: below 90 it wets, above it beads";
+
+/// Rows of the whole shot and of the domain.
+std::vector<Parameter> shot_rows();
+/// Rows of the fluid and of what it starts as.
+std::vector<Parameter> fluid_rows();
+/// Rows of cloth and of its coupling with fluid.
+std::vector<Parameter> cloth_rows();
+/// Rows of obstacles.
+std::vector<Parameter> obstacle_rows();
+/// Rows of probes.
+std::vector<Parameter> probe_rows();
 /// Rows of emitters, volumes, sinks and wind: where fluid comes from and goes to, and what drives
 /// it.
 std::vector<Parameter> source_rows();

@@ -158,7 +158,7 @@ std::vector<Parameter> material_rows() {
   };
 }
 
-std::vector<Parameter> film_rows() {
+std::vector<Parameter> render_rows() {
   return {
       row<&Ground::present>("ground", "present", "", none, mesh | render,
                             "a horizontal plane that is drawn; true when [ground] is written"),
@@ -257,7 +257,7 @@ std::vector<Parameter> view_rows() {
 std::vector<Parameter> picture_rows() {
   std::vector<Parameter> all;
   for (const auto& part :
-       {camera_rows(), light_rows(), material_rows(), film_rows(), layer_rows(), view_rows()})
+       {camera_rows(), light_rows(), material_rows(), render_rows(), layer_rows(), view_rows()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

@@ -5,10 +5,10 @@
 //   dt C + dt^2 K + dt B,
 // K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
-// pressures give (cloth_pressure.h). Solved by conjugate gradients scaled by the 3 x 3 blocks of
-// the vertices. B is the drag of the air (wind_on_cloth.h), whose force joins f. Pinned vertices
-// stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h) holds up
-// have the w that takes them there.
+// pressures give (contact_incompressible.h). Solved by conjugate gradients scaled by the 3 x 3
+// blocks of the vertices. B is the drag of the air (wind_on_cloth.h), whose force joins f. Pinned
+// vertices stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h)
+// holds up have the w that takes them there.
 
 #include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_springs.h"

@@ -1,7 +1,7 @@
 #pragma once
 // From the foot point to a side, a normal and a signed distance (exact coupling).
 
-#include "sim/neighbours/kernels.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/coupling/geometry.h"
 #include "sim/passes/coupling/nearest.h"
 

@@ -1,8 +1,8 @@
 #pragma once
 // The coupling as published, kept for comparison; docs/design.md lists what is wrong with it.
 
-#include "sim/neighbours/kernels.h"
-#include "sim/passes/coupling/contact_exact.h"
+#include "sim/neighbours/sph_kernels.h"
+#include "sim/passes/coupling/contact_rows.h"
 #include "sim/passes/coupling/polygon_grid.h"
 
 namespace drench::sim::DRENCH_BACKEND {

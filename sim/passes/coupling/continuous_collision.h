@@ -211,7 +211,7 @@ struct ContinuousCollision {
 
   /// Puts the end of the path back on the particle's side of the triangle it met and takes the
   /// normal part of the relative velocity, once a step and shared by the reduced mass of all
-  /// contacts on the vertices (as in contact_exact.h, or many hits would throw light cloth back);
+  /// contacts on the vertices (as in contact_wcsph.h, or many hits would throw light cloth back);
   /// the cloth's part is owed to it until the next step.
   DRENCH_HD void bounce(int i, Vec3<float> from, Vec3<float>& to, const Hit& hit) const {
     const MovingTriangle m = moving(hit.image);

@@ -1,7 +1,7 @@
 #pragma once
 // What obstacles received of pressure and surface tension in the step that was made, on demand.
 
-#include "sim/passes/coupling/cloth_pressure.h"
+#include "sim/passes/coupling/contact_incompressible.h"
 #include "sim/passes/tension/surface_tension.h"
 
 namespace drench::sim::DRENCH_BACKEND {

@@ -10,7 +10,7 @@
 // (docs/benchmarks.md). A box takes the half-spaces of its three nearest faces, moved in alike, as
 // a product, which is exact on faces and, by symmetry, on edges and corners.
 
-#include "sim/passes/obstacle/obstacle_view.h"
+#include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/passes/pressure/image_walls.h"
 #include "sim/state.h"
 

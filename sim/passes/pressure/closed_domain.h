@@ -6,7 +6,7 @@
 // solve, which velocities do not feel, makes the density even. With free surfaces the same makes
 // waves of the packing (docs/decisions/0005-closed-domain.md).
 
-#include "sim/passes/coupling/move.h"
+#include "sim/passes/coupling/collision_rounds.h"
 #include "sim/passes/pressure/pressure_kick.h"
 #include "sim/passes/pressure/pressure_solve.h"
 

@@ -15,8 +15,8 @@
 // Beside walls, sheets and obstacles and at free surfaces, where half of the neighbours are
 // missing, L is that of the particles farther in, or 1.
 
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/state.h"
 
 namespace drench::sim::DRENCH_BACKEND {

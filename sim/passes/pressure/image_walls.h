@@ -8,7 +8,7 @@
 // density error (docs/decisions/0006-mirror-walls.md).
 
 #include "sim/backend/vec3.h"
-#include "sim/neighbours/kernels.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {

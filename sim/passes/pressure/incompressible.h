@@ -6,7 +6,7 @@
 // of the whole step (docs/decisions/0001-one-solve-a-step.md).
 
 #include "sim/passes/coupling/cloth_filter.h"
-#include "sim/passes/coupling/move.h"
+#include "sim/passes/coupling/collision_rounds.h"
 #include "sim/passes/obstacle/obstacle_share.h"
 #include "sim/passes/pressure/image_walls.h"
 #include "sim/passes/pressure/pressure_solve.h"

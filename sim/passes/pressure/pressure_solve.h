@@ -7,7 +7,7 @@
 // starts the conjugation anew (docs/decisions/0002-accelerated-projected-gradients.md).
 
 #include "sim/backend/parallel.h"
-#include "sim/passes/coupling/cloth_pressure.h"
+#include "sim/passes/coupling/contact_incompressible.h"
 #include "sim/passes/pressure/multilevel.h"
 
 namespace drench::sim::DRENCH_BACKEND {

@@ -262,7 +262,7 @@ double held_pressure(const Parameters& p, const float (&position)[3]) {
 
 /// Force of the fluid on a domain wall, N: what the step took from the fluid's momentum through the
 /// wall's pressure and viscosity, over dt. A particle that the pressure fails to stop and the last
-/// tenth of a spacing does (move.h) is not in it.
+/// tenth of a spacing does (collision_rounds.h) is not in it.
 std::vector<double> wall_force(const State& state, const ProbeQuery& query) {
   const Parameters& p = state.parameters;
   Totals<3> sum = sum_by_particle<3>("probe: wall force", state,

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "sim/backend/parallel.h"
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"
 

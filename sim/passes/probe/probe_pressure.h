@@ -4,14 +4,15 @@
 // pushed the particles.
 //
 // Walls, obstacles and sheets each replace a fraction of a particle's density and leave the rest to
-// the others (image_walls.h, obstacle_share.h, cloth_pressure.h): S = 1 - prod (1 - S_b). The part
-// of body b in grad S is grad S_b times what the others leave. The parts sum to the whole, so that
-// every push is counted once, on the body that gave it, whatever else touches the fluid there.
+// the others (image_walls.h, obstacle_share.h, contact_incompressible.h): S = 1 - prod (1 - S_b).
+// The part of body b in grad S is grad S_b times what the others leave. The parts sum to the whole,
+// so that every push is counted once, on the body that gave it, whatever else touches the fluid
+// there.
 
 #include "sim/backend/parallel.h"
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
-#include "sim/passes/coupling/cloth_pressure.h"
+#include "sim/neighbours/sph_kernels.h"
+#include "sim/passes/coupling/contact_incompressible.h"
 #include "sim/passes/wcsph/density.h"
 #include "sim/probe_query.h"
 #include "sim/state.h"

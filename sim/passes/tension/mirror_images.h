@@ -5,9 +5,9 @@
 // of obstacles where they end the step, and that of the nearest sheet where its velocity takes it.
 // No image is nearer than its particle, so that the neighbour lists hold all that are in reach.
 
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
-#include "sim/passes/coupling/contact_exact.h"
+#include "sim/neighbours/sph_kernels.h"
+#include "sim/passes/coupling/contact_wcsph.h"
 #include "sim/passes/motion/domain_walls.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -84,7 +84,7 @@ struct ClothMirrors {
   const float *distance, *edge, *half_thickness;
   float dt;  // s
 
-  /// The gap as the pressure has it (cloth_pressure.h). Nothing is nearer than `least`.
+  /// The gap as the pressure has it (contact_incompressible.h). Nothing is nearer than `least`.
   DRENCH_HD void add(Mirrors& mirrors, int i, Vec3<float> x, float h, float least) const {
     const int t = near.triangle[i];
     if (t < 0 || edge[i] <= 0.f) return;

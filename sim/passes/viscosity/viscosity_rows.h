@@ -13,8 +13,8 @@
 // a closed form in d, which stands on the diagonal, and times v_wall on the right-hand side.
 // Obstacles and sheets: body_drag.h.
 
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/periodic.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/motion/domain_walls.h"
 #include "sim/state.h"
 

@@ -1,7 +1,8 @@
 #pragma once
-#include "sim/neighbours/kernels.h"
 #include "sim/neighbours/pairs.h"
+#include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/motion/domain_walls.h"
+#include "sim/passes/wcsph/equation_of_state.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -36,9 +37,8 @@ DRENCH_HD float wall_density_fraction(const HalfspaceWalls& walls, Vec3<float> p
   return 1.f - open;
 }
 
-// Density by summation and pressure from the equation of state:
+// Density by summation and pressure from the equation of state (equation_of_state.h):
 //   rho_i = sum_j m W(r_ij, h)            Mueller, Charypar, Gross 2003, section 3.1
-//   p_i   = c^2 (rho_i - rho_0), never negative (a free surface must not pull)
 // Mueller et al. sum density with poly6 and take the pressure force from spiky. The two do not
 // belong to one energy, and a column that should come to rest boils: spiky serves for both
 // (docs/decisions/0026-one-kernel-for-density-and-pressure.md), poly6 the paper coupling alone. A
@@ -75,10 +75,10 @@ struct DensitySum {
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
     const float fraction = wall_density_fraction(walls, position[i], 1.f / support_radius) +
                            (cloth_share ? cloth_share[i] : 0.f);
-    const float rho = scale * sum.w + rest_density * fraction, inverse = 1.f / rho;
+    const float rho = scale * sum.w + rest_density * fraction;
     density[i] = rho;
-    inverse_density[i] = inverse;
-    pressure_term[i] = sound_speed2 * max0(rho - rest_density) * inverse * inverse;
+    inverse_density[i] = 1.f / rho;
+    pressure_term[i] = pressure_term_of(rho, rest_density, sound_speed2);
   }
 };
 

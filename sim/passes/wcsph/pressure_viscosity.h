@@ -18,7 +18,7 @@ struct PressureViscosity {
   const float *pressure_term, *inverse_density;  // p / rho^2, 1 / rho
   VecView acceleration;
   float support_radius;     // m
-  float scale;              // m spiky_gradient_factor(h), m^-1 kg...: see kernels.h
+  float scale;              // m spiky_gradient_factor(h), m^-1 kg...: see sph_kernels.h
   float dynamic_viscosity;  // Pa s, fluid on fluid
   float wall_viscosity;     // Pa s, fluid on walls
   float rest_density;       // kg/m^3

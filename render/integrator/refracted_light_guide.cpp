@@ -1,4 +1,4 @@
-#include "render/integrator/guide.h"
+#include "render/integrator/refracted_light_guide.h"
 
 namespace drench::render {
 

@@ -1,4 +1,4 @@
-#include "sim/passes/motion/limits.h"
+#include "sim/passes/motion/measure_limits.h"
 
 #include "sim/backend/parallel.h"
 

@@ -1,4 +1,4 @@
-#include "surfacing/contact.h"
+#include "surfacing/cloth_contact.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>

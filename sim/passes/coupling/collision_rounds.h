@@ -1,19 +1,12 @@
 #pragma once
-// The end of a step: particles and cloth move to their new positions.
+// The end of a coupled step: particles and cloth move together, and where a path meets a triangle
+// both are stopped, in rounds, until none does (continuous_collision.h).
 
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/coupling/continuous_collision.h"
+#include "sim/passes/motion/advection.h"
 
 namespace drench::sim::DRENCH_BACKEND {
-
-/// Fluid alone: a step of symplectic Euler within the domain's walls.
-void move_particles(State& state);
-
-/// Cloth takes on what a substep has left in ClothState::next and next_velocity.
-void finish_substep(ClothState& c);
-
-/// Cloth alone: explicit substeps over a step.
-void move_cloth(State& state);
 
 /// What a particle's path has beside dt times its velocity.
 struct Drift {

@@ -1,4 +1,4 @@
-#include "sim/passes/coupling/cloth_pressure.h"
+#include "sim/passes/coupling/contact_incompressible.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 

@@ -9,7 +9,7 @@
 // pressures of their own.
 
 #include "sim/passes/cloth/cloth_obstacles.h"
-#include "sim/passes/coupling/contact_exact.h"
+#include "sim/passes/coupling/contact_rows.h"
 #include "sim/passes/obstacle/obstacle_share.h"
 #include "sim/passes/pressure/pressure_rows.h"
 

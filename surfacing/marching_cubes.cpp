@@ -1,4 +1,4 @@
-#include "surfacing/extract.h"
+#include "surfacing/marching_cubes.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>

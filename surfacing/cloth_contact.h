@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "surfacing/cloth_solid.h"
-#include "surfacing/extract.h"
+#include "surfacing/marching_cubes.h"
 #include "surfacing/smooth.h"
 
 namespace drench::surfacing {
