@@ -61,15 +61,15 @@ void for_each_fluid_column(S& state, const Visit& visit) {
   visit({"order", "1", Group::cells, particles}, f.order, none);
   visit({"swap_float", "1", Group::sorting, particles}, state.swap_float, none);
   visit({"triangle", "1", Group::near_cloth, particles}, f.triangle, none);
-  visit({"far_by", "m", Group::near_cloth, particles, Use::sorted}, f.far_by, none);
+  visit({"beyond_support", "m", Group::near_cloth, particles, Use::sorted}, f.beyond_support, none);
   visit({"weight_b", "1", Group::near_cloth, particles}, f.weight_b, none);
   visit({"weight_c", "1", Group::near_cloth, particles}, f.weight_c, none);
   visit({"normal", "1", Group::near_cloth, particles}, f.normal, none);
-  visit({"sheet_distance", "m", Group::near_cloth, particles}, f.sheet_distance, none);
+  visit({"cloth_distance", "m", Group::near_cloth, particles}, f.cloth_distance, none);
   visit({"plane", "m", Group::near_cloth, particles}, f.plane, none);
   visit({"edge", "1", Group::near_cloth, particles}, f.edge, none);
   visit({"shaded", "1", Group::near_cloth, particles}, f.shaded, none);
-  visit({"cloth_share", "1", Group::near_cloth, particles}, f.cloth_share, none);
+  visit({"cloth_density", "1", Group::near_cloth, particles}, f.cloth_density, none);
   visit({"impulse", "kg m/s", Group::impulse, particles}, f.impulse, none);
   visit({"start", "m", Group::start, particles, by_prediction}, f.start, none);
   visit({"end", "m", Group::path, particles}, f.end, none);

@@ -40,7 +40,7 @@ struct StepReport {
   int sheets_cut_short = 0;     // steps in which the sheets' solve did not reach its tolerance
   int viscous_unconverged = 0;  // steps in which these did not reach their tolerance
   double worst_viscous_residual = 0;  // RMS that one left over the RMS of the velocity
-  uint64_t guard_hits = 0;            // particles that the path test held back
+  uint64_t guard_hits = 0;            // particles that continuous collision held back
   uint64_t memory = 0;                // bytes of the state on its device, room to grow included
   std::vector<std::pair<std::string, uint64_t>> drained;  // particles that each sink took
   uint64_t emitted = 0;                                   // particles that emitters added

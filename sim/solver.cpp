@@ -87,7 +87,7 @@ class BackendSolver : public Solver {
       upload(column, values.size() == n ? values : repeated(column, n, info.initial));
       if (info.extent == Extent::vertices) column.resize(state_.cloth.padded);
     });
-    state_.fluid.far_by.clear_bytes(state_.queue, 0);
+    state_.fluid.beyond_support.clear_bytes(state_.queue, 0);
     state_.owes = true;
     state_.guard_hits = host.guard_hits;
     state_.guard_holds = host.guard_holds;

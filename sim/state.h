@@ -35,7 +35,7 @@ struct FluidState {
   Column<int> id;
   Column<int> memory_triangle;  // triangle whose side is remembered, -1 none   (exact coupling)
   Column<int> memory_side;      // +1 or -1
-  VecColumn owed;               // kg m/s that the path test took and cloth has not received yet
+  VecColumn owed;  // kg m/s that continuous collision took and cloth has not received yet
   // rebuilt every step
   VecColumn acceleration;                                 // m/s^2
   Column<float> density, pressure_term, inverse_density;  // kg/m^3, p / rho^2, m^3/kg
@@ -43,24 +43,25 @@ struct FluidState {
   Column<int> cell_start;
   GridShape grid{};
   // coupling
-  Column<int> triangle;  // nearest triangle within the support radius, -1 none
-  Column<float> far_by;  // m, how much nearer a sheet must come to be within the support; a lower
-                         // bound. Negative where it is within
+  Column<int> triangle;          // nearest triangle within the support radius, -1 none
+  Column<float> beyond_support;  // m, how much nearer a sheet must come to be within the support; a
+                                 // lower bound. Negative where it is within
   Column<float> weight_b, weight_c;  // barycentric weights of its foot point
   VecColumn normal;                  // unit, from the sheet to the particle's side; 0 where none
-  Column<float> sheet_distance;      // m along normal; 1e30 where there is no sheet
-  Column<float> plane;  // m, sheet_distance - normal . position: > -normal . x in front. 1e29
+  Column<float> cloth_distance;      // m along normal; 1e30 where there is no sheet
+  Column<float> plane;  // m, cloth_distance - normal . position: > -normal . x in front. 1e29
                         // beyond a free edge, where all is in front; 1e30 without a sheet in reach
   Column<float> edge;   // 0 beyond a free edge .. 1 half a spacing inside it
   Column<int>
       shaded;  // 1 where a sheet may hide neighbours; after the density pass: where one does
-  Column<float> cloth_share;  // share of density that the sheet replaces
-  VecColumn impulse;          // kg m/s, of the sheet it is near      (published coupling)
-  VecColumn end;              // m, where its path ends or, incompressible, would end
-  VecColumn start;            // m, position at the start of the step
-  VecColumn drift;            // m, of a path beside dt times the velocity (incompressible)
-  Column<int> moved;          // 1: cannot meet a sheet, has made its whole step
-  Column<int> held, stopped;  // by the path test for this substep; triangle it stopped, -1 none
+  Column<float> cloth_density;  // share of density that the sheet replaces
+  VecColumn impulse;            // kg m/s, of the sheet it is near      (published coupling)
+  VecColumn end;                // m, where its path ends or, incompressible, would end
+  VecColumn start;              // m, position at the start of the step
+  VecColumn drift;              // m, of a path beside dt times the velocity (incompressible)
+  Column<int> moved;            // 1: cannot meet a sheet, has made its whole step
+  Column<int> held,
+      stopped;  // by continuous collision for this substep; triangle it stopped, -1 none
 };
 
 struct VertexRange {
@@ -112,7 +113,7 @@ struct ClothState {
   Column<float> air_share;     // see ClothTopology
   VecColumn air_push;          // N
   VecColumn force;             // N from the fluid, constant over the step
-  Column<int> held;            // by the path test for this substep
+  Column<int> held;            // by continuous collision for this substep
   Column<long long> stop_sum;  // 4 a vertex: see ContinuousCollision
 };
 
@@ -305,7 +306,7 @@ struct State {
   std::function<void()>
       after_substep;  // of an observer: called when all of a coupled substep is in place
   std::vector<uint64_t> removed;  // particles since the start, see HostState
-  uint64_t guard_hits = 0;        // particles held back by the path test, since the start
+  uint64_t guard_hits = 0;        // particles held back by continuous collision, since the start
   uint64_t guard_holds = 0;       // substeps in which vertices had to be stopped
 };
 

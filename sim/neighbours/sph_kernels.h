@@ -113,7 +113,7 @@ struct WendlandC2 {
     return q < 0.f ? 1.f - beyond : beyond;
   }
   /// pi times the integral of r W (r - q)^2 from q on, W continued so that moment(-q) =
-  /// moment(q) + 2 q: what a ball misses of the half-space (passes/obstacle/obstacle_share.h).
+  /// moment(q) + 2 q: what a ball misses of the half-space (passes/obstacle/obstacle_density.h).
   /// Times h^4.
   static DRENCH_HD float moment(float q) {
     const float t = max0(1.f - fabsf(q)), t2 = t * t;

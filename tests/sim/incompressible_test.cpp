@@ -87,8 +87,9 @@ std::vector<double> brute_density(const sim::Parameters& p, const std::vector<V3
       const double u = std::max(0.0, 1 - (x[i] - other).length() / h);
       sum += 10.5 / M_PI * std::pow(u, 4) * (5 - 4 * u);
     }
-    density[i] = p.particle_mass / p.lattice_sum / (h * h * h) * sum +
-                 p.rest_density * walls.share({float(x[i].x), float(x[i].y), float(x[i].z)}).value;
+    density[i] =
+        p.particle_mass / p.lattice_sum / (h * h * h) * sum +
+        p.rest_density * walls.density({float(x[i].x), float(x[i].y), float(x[i].z)}).value;
   }
   return density;
 }

@@ -13,10 +13,10 @@ namespace drench::sim_tests {
 namespace {
 
 using sim::cpu::Vec3;
-using sim::cpu::WallShare;
+using sim::cpu::WallDensity;
 using sim::cpu::WendlandC2;
 
-sim::cpu::ObstacleShare law() {  // in supports: h = 1
+sim::cpu::ObstacleDensity law() {  // in supports: h = 1
   return {1.f, 1.f, 1.f / 2.15f};
 }
 
@@ -42,7 +42,7 @@ double ball_share(double gap, double radius) {
 
 // S of a sphere is the kernel's integral over its image, a concentric ball. Without the curvature
 // it would be the half-space: 29 % more at 3 spacings, 17 % at 5, 8 % at 10, half a spacing off.
-TEST(ObstacleShare, OfASphereIsTheIntegralOverItsImage) {
+TEST(ObstacleDensity, OfASphereIsTheIntegralOverItsImage) {
   const double a = 1 / 2.15;
   for (const double spacings : {3., 5., 10.}) {
     const double radius = spacings * a;
@@ -60,7 +60,7 @@ TEST(ObstacleShare, OfASphereIsTheIntegralOverItsImage) {
 }
 
 // A cavity is the complement of a ball.
-TEST(ObstacleShare, OfACavityIsTheRestOfTheKernel) {
+TEST(ObstacleDensity, OfACavityIsTheRestOfTheKernel) {
   const double a = 1 / 2.15, radius = 6 * a;
   for (const double d : {0.25, 0.5, 1.0}) {
     const double distance = d * a, gap = 2 * distance - 0.5 * a;
@@ -73,7 +73,7 @@ TEST(ObstacleShare, OfACavityIsTheRestOfTheKernel) {
 }
 
 // Of a box: the half-space on a face, a quarter or eighth of space on an edge or corner.
-TEST(ObstacleShare, OfABoxIsExactOnFacesEdgesAndCorners) {
+TEST(ObstacleDensity, OfABoxIsExactOnFacesEdgesAndCorners) {
   const float half[3] = {3, 4, 5}, a = 1 / 2.15f;
   for (const float d : {0.25f, 0.5f, 1.f}) {
     EXPECT_NEAR(law().box({3 + d * a, 0, 0}, half).value, WendlandC2::halfspace((2 * d - 0.5f) * a),
@@ -97,7 +97,7 @@ TEST(ObstacleShare, OfABoxIsExactOnFacesEdgesAndCorners) {
 template <class Share>
 void expect_gradient(const Share& of, Vec3<float> x, double tolerance) {
   const float e = 2e-3f;
-  const WallShare at = of(x);
+  const WallDensity at = of(x);
   const double numeric[3] = {
       (of({x.x + e, x.y, x.z}).value - of({x.x - e, x.y, x.z}).value) / (2. * e),
       (of({x.x, x.y + e, x.z}).value - of({x.x, x.y - e, x.z}).value) / (2. * e),
@@ -107,7 +107,7 @@ void expect_gradient(const Share& of, Vec3<float> x, double tolerance) {
   EXPECT_NEAR(at.gradient.z, numeric[2], tolerance);
 }
 
-TEST(ObstacleShare, GradientIsThatOfTheShare) {
+TEST(ObstacleDensity, GradientIsThatOfTheShare) {
   sim::cpu::ObstacleView sphere{}, box{}, plane{};
   sphere.shape = sim::ObstacleShape::sphere, sphere.half[0] = 2;
   box.shape = sim::ObstacleShape::box, box.half[0] = 2, box.half[1] = 1, box.half[2] = 3;
@@ -140,7 +140,7 @@ TEST(ObstacleShare, GradientIsThatOfTheShare) {
 }
 
 // A plane is a domain wall: density and gradient to rounding, wall by wall and in edges.
-TEST(ObstacleShare, OfAPlaneIsThatOfADomainWall) {
+TEST(ObstacleDensity, OfAPlaneIsThatOfADomainWall) {
   Shot walled = tank_shot(8), open = tank_shot(8);
   open.domain.axis[1] = open.domain.axis[0] = Axis::open;
   const V3d low = open.domain.min, high = open.domain.max;

@@ -209,7 +209,7 @@ TEST(PeriodicLists, HoldWhatABruteForceSearchOfNearestImagesFinds) {
     EXPECT_TRUE(std::includes(found.begin(), found.end(), expected.begin(), expected.end())) << i;
     EXPECT_LE(found.size(), expected.size() + 1) << i;  // one on the border may be either
     const V3d p = place(i);
-    const sim::cpu::WallShare wall = walls.share({float(p.x), float(p.y), float(p.z)});
+    const sim::cpu::WallDensity wall = walls.density({float(p.x), float(p.y), float(p.z)});
     const double scale =
         scene.parameters.particle_mass / scene.parameters.lattice_sum / (h * h * h);
     const double rho = scale * sum + 1000 * wall.value;

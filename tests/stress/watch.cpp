@@ -17,7 +17,7 @@ double half_space(double q) {
 }
 
 /// Share of the walls, which are mirrors: sim/passes/pressure/image_walls.h has the derivation.
-double wall_share(const sim::Parameters& p, const V3d& x) {
+double wall_density(const sim::Parameters& p, const V3d& x) {
   double open = 1;
   for (int k = 0; k < 3; ++k) {
     if (!p.wall[k]) continue;
@@ -166,7 +166,7 @@ std::vector<double> densities(const sim::Scene& scene, const sim::HostState& sta
         if (screens.hides(t, x, y)) return;
       sum += wendland(1 - r / h);
     });
-    density[i] = unit * sum + wall_share(p, x);
+    density[i] = unit * sum + wall_density(p, x);
   }
   return density;
 }

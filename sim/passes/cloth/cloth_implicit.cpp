@@ -297,7 +297,7 @@ void carry_held_vertices(State& state) {
   const int* held = c.held.data();
   const ClothHold hold = cloth_hold_of(state);
   parallel_for(
-      state.queue, "path test: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
+      state.queue, "collision: obstacles carry", c.vertices, DRENCH_LAMBDA(int i) {
         if (!held[i] || inverse_mass[i] == 0.f) return;
         Vec3<float> to = next[i], u = velocity[i];
         hold.guard(i, mass[i], x[i], to, u);

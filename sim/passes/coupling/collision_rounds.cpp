@@ -20,7 +20,7 @@ ContinuousCollision continuous_collision_of(State& state, float moved) {
   ClothState& c = state.cloth;
   const ConstVecView next = c.next.view(), start = c.start.view();
   const float moved2 = parallel_reduce(
-      state.queue, "path test: cloth motion", c.vertices, 0.f,
+      state.queue, "collision: cloth motion", c.vertices, 0.f,
       DRENCH_LAMBDA(int v) { return length2(next[v] - start[v]); }, Larger{});
   const Parameters& p = state.parameters;
   const ClothWalls walls = cloth_walls_of(p);
@@ -39,7 +39,7 @@ ContinuousCollision continuous_collision_of(State& state, float moved) {
       .stopped = f.stopped.data(),
       .nearest = f.triangle.data(),
       .edge = f.edge.data(),
-      .distance = f.sheet_distance.data(),
+      .distance = f.cloth_distance.data(),
       .cloth_mass = c.mass.data(),
       .inverse_mass = c.inverse_mass.data(),
       .contact_weight = c.share.data(),
@@ -72,7 +72,7 @@ GuardCount resolve_paths(State& state, const ContinuousCollision& test, const Te
   const int *triangle = f.triangle.data(), *moved = f.moved.data();
   int* held = f.held.data();
   return parallel_reduce(
-      state.queue, "path test", tested.count, GuardCount{},
+      state.queue, "collision: paths", tested.count, GuardCount{},
       DRENCH_LAMBDA(int k) {
         const int i = tested[k];
         const bool still = held[i] || moved[i];
@@ -123,7 +123,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
   const float* mass = c.mass.data();
   const float inverse_mass = 1.f / state.parameters.particle_mass;
   parallel_for(
-      state.queue, "path test: share momentum", tested.count, DRENCH_LAMBDA(int k) {
+      state.queue, "collision: share momentum", tested.count, DRENCH_LAMBDA(int k) {
         const int i = tested[k], t = test.stopped[i];
         if (t < 0) return;
         Vec3<float> gain{0.f, 0.f, 0.f};
@@ -136,7 +136,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
         velocity.set(i, velocity[i] + gain * inverse_mass);
       });
   parallel_for(
-      state.queue, "path test: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
+      state.queue, "collision: hold cloth", c.vertices, DRENCH_LAMBDA(int v) {
         const bool stopped = test.stop_count(v) > 0;
         if (!all && !stopped) return;
         if (stopped && !hold[v] && test.inverse_mass[v] > 0.f)
@@ -151,7 +151,8 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
 /// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice
 /// as far as the contact solve predicts. All others make their whole step now: nothing to test. No
 /// step of the solvers' own choice takes a particle that is not near as far as a sheet; should one,
-/// all paths are tested. They count as a support away, not as far_by says: no checkpoint has that.
+/// all paths are tested. They count as a support away, not as beyond_support says: no checkpoint
+/// has that.
 void move_unguarded_particles(State& state) {
   FluidState& f = state.fluid;
   const ClothState& c = state.cloth;
@@ -170,7 +171,7 @@ void move_unguarded_particles(State& state) {
   const VecView x = f.position.view(), v = f.velocity.view(), start = f.start.view();
   const ConstVecView normal = f.normal.view();
   const ConstVecView end = f.end.view();
-  const float* distance = f.sheet_distance.data();
+  const float* distance = f.cloth_distance.data();
   const int *triangle = f.triangle.data(), *order = state.contact.order.data();
   int *moved = f.moved.data(), *key = state.contact.key.data();
   const Mover mover = path_mover_of(state.parameters, dt);
@@ -210,7 +211,7 @@ void accept_paths(State& state, const Tested& tested) {
   const VecView x = state.fluid.position.view();
   const ConstVecView end = state.fluid.end.view();
   parallel_for(
-      state.queue, "path test: accept", tested.count,
+      state.queue, "collision: accept", tested.count,
       DRENCH_LAMBDA(int k) { x.set(tested[k], end[tested[k]]); });
 }
 
@@ -257,7 +258,7 @@ void bring_far_particles_nearer(State& state) {
       state.queue, "cloth: motions", c.vertices, Bounds{},
       DRENCH_LAMBDA(int v) { return bounds_of(to[v] - from[v]); }, JoinBounds{});
   const ConstVecView x = f.position.view(), start = f.start.view();
-  float* far_by = f.far_by.data();
+  float* beyond_support = f.beyond_support.data();
   for_each_lane(
       state.queue, "fluid: nearer to cloth", f.count, DRENCH_LAMBDA(auto i) {
         const auto moved = x.at(i) - start.at(i);
@@ -268,7 +269,7 @@ void bring_far_particles_nearer(State& state) {
         const Vec3<T> beside{most(moved.x, of_cloth.low.x, of_cloth.high.x),
                              most(moved.y, of_cloth.low.y, of_cloth.high.y),
                              most(moved.z, of_cloth.low.z, of_cloth.high.z)};
-        store(far_by, i, load(far_by, i) - square_root(length2(beside)));
+        store(beyond_support, i, load(beyond_support, i) - square_root(length2(beside)));
       });
 }
 

@@ -45,7 +45,8 @@ struct Tested {
 /// To the bit.
 DRENCH_HD bool same(Vec3<float> a, Vec3<float> b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-/// Particles and cloth together, substep by substep, each path tested against the moving triangles.
+/// Particles and cloth together, substep by substep, each path tested against the moving triangles
+/// (continuous collision).
 void move_coupled(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

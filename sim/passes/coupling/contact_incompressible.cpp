@@ -11,13 +11,13 @@ void add_cloth_to_walls(State& state) {
         *gaps = state.contact.gap.data(), *left_open = state.contact.open.data();
   const ConstVecView x = f.position.view(), start = f.start.view(), normal = f.normal.view(),
                      cloth_velocity = state.cloth.velocity.view();
-  const float *distance = f.sheet_distance.data(), *edge = f.edge.data(),
+  const float *distance = f.cloth_distance.data(), *edge = f.edge.data(),
               *half_thickness = state.cloth.half_thickness.data();
   const int* triangle = f.triangle.data();
   Float4* wall = state.pressure.wall.data();
   const float rest = p.rest_density, dt = float(state.dt);
   const ImageWalls walls = image_walls_of(p);
-  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleDensity law = obstacle_density_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const float recovery = dt * 0.1f * p.sound_speed;
   const ClothDensity blank{p.wall_scale, 1.f / p.support_radius, p.spacing, 0.f, 0.f};
@@ -33,7 +33,7 @@ void add_cloth_to_walls(State& state) {
                     gap = distance[i] - half_thickness[triangle[i]] - nearer;
         ClothDensity density = blank;
         density.at(gap, edge[i]);
-        WallShare w = walls.share(x[i], n, gap);
+        WallDensity w = walls.density(x[i], n, gap);
         gaps[row] = gap, left_open[row] = max0(1.f - density.value);
         for (int k = 0; k < obstacles.count; ++k)
           w = law.both(w, law.seen(obstacles.obstacle[k], x[i], n, gap, walls));

@@ -10,7 +10,7 @@
 
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/coupling/contact_rows.h"
-#include "sim/passes/obstacle/obstacle_share.h"
+#include "sim/passes/obstacle/obstacle_density.h"
 #include "sim/passes/pressure/pressure_rows.h"
 
 namespace drench::sim::DRENCH_BACKEND {

@@ -9,8 +9,8 @@ void find_nearest_centroids(State& state) {
   const VecView normal = f.normal.view();
   int* triangle = f.triangle.data();
   float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data(),
-        *distance = f.sheet_distance.data(), *edge = f.edge.data(),
-        *fraction = f.cloth_share.data();
+        *distance = f.cloth_distance.data(), *edge = f.edge.data(),
+        *fraction = f.cloth_density.data();
   const WallTable table{state.wall_table};
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing;
   const Vec3<float> low = state.cloth.low, high = state.cloth.high;
@@ -62,7 +62,7 @@ void add_paper_forces(State& state) {
   const ConstVecView velocity = f.velocity.view(), normal = f.normal.view();
   const VecView acceleration = f.acceleration.view(), impulse = f.impulse.view();
   const ConstVecView cloth_velocity = state.cloth.velocity.view();
-  const float *distance = f.sheet_distance.data(), *inverse_density = f.inverse_density.data();
+  const float *distance = f.cloth_distance.data(), *inverse_density = f.inverse_density.data();
   const WallTable table{state.wall_table};
   const float h = p.support_radius, spacing = p.spacing, dt = float(state.dt),
               mass = p.particle_mass;

@@ -5,7 +5,7 @@ namespace drench::sim::DRENCH_BACKEND {
 void sort_contacts(State& state, float reach) {
   const int triangles = state.cloth.triangles;
   const int* triangle = state.fluid.triangle.data();
-  const float *distance = state.fluid.sheet_distance.data(),
+  const float *distance = state.fluid.cloth_distance.data(),
               *half_thickness = state.cloth.half_thickness.data();
   const float contact_distance = contact_distance_of(state.parameters);
   int* key = state.contact.key.data();

@@ -17,7 +17,7 @@ ContactSetup contact_setup(State& state) {
   return {.near = near_list(state),
           .velocity = f.velocity.view(),
           .normal = f.normal.view(),
-          .distance = f.sheet_distance.data(),
+          .distance = f.cloth_distance.data(),
           .pressure_term = f.pressure_term.data(),
           .inverse_density = f.inverse_density.data(),
           .half_thickness = c.half_thickness.data(),

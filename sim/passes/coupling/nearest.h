@@ -12,8 +12,8 @@ namespace drench::sim::DRENCH_BACKEND {
 struct NearestOutput {
   int* triangle;  // -1 none
   float *weight_b, *weight_c;
-  float* far_by;        // m
-  float reach, search;  // m: triangles within reach count, those within search are looked at
+  float* beyond_support;  // m
+  float reach, search;    // m: triangles within reach count, those within search are looked at
 };
 
 #if !defined(__CUDACC__)
@@ -119,7 +119,7 @@ class PackOfNeighbours {
     store_lanes(which, first_lanes(8), select(found, pack.which, same_index(-1)));
     for (int k = 0; k < count_; ++k) {
       const int i = member_[k];
-      out_.triangle[i] = which[k], out_.far_by[i] = left[k];
+      out_.triangle[i] = which[k], out_.beyond_support[i] = left[k];
       out_.weight_b[i] = wb[k], out_.weight_c[i] = wc[k];
     }
   }
@@ -133,7 +133,7 @@ class PackOfNeighbours {
 
 #endif
 
-/// Into FluidState::triangle, the weights of its foot and far_by.
+/// Into FluidState::triangle, the weights of its foot and beyond_support.
 /// @param position  m, of the particles. @param reach  m.
 void find_nearest_triangles(State& state, const ConstVecView& position, float reach);
 

@@ -104,7 +104,7 @@ NearestOutput nearest_output(State& state, float reach) {
   return {.triangle = f.triangle.data(),
           .weight_b = f.weight_b.data(),
           .weight_c = f.weight_c.data(),
-          .far_by = f.far_by.data(),
+          .beyond_support = f.beyond_support.data(),
           .reach = reach,
           .search = 1.5f * reach};
 }
@@ -121,7 +121,7 @@ void find_nearest_triangles(State& state, const ConstVecView& position, float re
   parallel_for(
       state.queue, "nearest triangle", f.count, DRENCH_LAMBDA(int i) {
         out.triangle[i] = -1;
-        if (out.far_by[i] > 0.f) return;
+        if (out.beyond_support[i] > 0.f) return;
         Vec3<float> p = position[i];
         float best = out.search * out.search;
         int nearest = -1;
@@ -143,7 +143,7 @@ void find_nearest_triangles(State& state, const ConstVecView& position, float re
                                    [&](int k) { test(polygons.sorted[k], polygons.order[k]); });
         const bool found = best < out.reach * out.reach;
         if (found) out.triangle[i] = nearest;
-        out.far_by[i] = sqrtf(best) - out.reach;
+        out.beyond_support[i] = sqrtf(best) - out.reach;
       });
 }
 
@@ -162,8 +162,8 @@ void find_nearest_triangles(State& state, const ConstVecView& position, float re
       for (int i = cell_start[row * g.nx]; i < cell_start[(row + 1) * g.nx]; ++i) {
         out.triangle[i] = -1;
         if (before[i] >= 0)  // the farthest of eight says how far to look for all of them
-          (out.far_by[i] < -0.5f * reach ? close : near).add(i, 2.f * reach);
-        else if (out.far_by[i] <= 0.f)
+          (out.beyond_support[i] < -0.5f * reach ? close : near).add(i, 2.f * reach);
+        else if (out.beyond_support[i] <= 0.f)
           unknown.add(i, 2.f * reach);
       }
     }
@@ -179,8 +179,8 @@ void find_cloth_sides(State& state, const ConstVecView& position) {
   int *triangle = f.triangle.data(), *memory_triangle = f.memory_triangle.data(),
       *memory_side = f.memory_side.data(), *shaded = f.shaded.data();
   const float *weight_b = f.weight_b.data(), *weight_c = f.weight_c.data();
-  float *distance = f.sheet_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(),
-        *cloth_fraction = f.cloth_share.data();
+  float *distance = f.cloth_distance.data(), *plane = f.plane.data(), *edge = f.edge.data(),
+        *cloth_fraction = f.cloth_density.data();
   const float h = state.parameters.support_radius, spacing = state.parameters.spacing,
               scale = state.parameters.wall_scale;
   const float patch = 2.f * h + 2.f * state.cloth.largest_radius;

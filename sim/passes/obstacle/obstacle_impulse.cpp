@@ -1,23 +1,24 @@
 #include "sim/passes/obstacle/obstacle_impulse.h"
 
-#include "sim/passes/obstacle/obstacle_share.h"
+#include "sim/passes/obstacle/obstacle_density.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
-void add_obstacle_shares(State& state) {
+void add_obstacle_density(State& state) {
   const Parameters& p = state.parameters;
   const ConstVecView x = state.fluid.position.view();
-  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleDensity law = obstacle_density_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const float rest = p.rest_density;
   Float4* wall = state.pressure.wall.data();
   parallel_for(
       state.queue, "neighbours: obstacles", state.fluid.count, DRENCH_LAMBDA(int i) {
         for (int k = 0; k < obstacles.count; ++k) {
-          const WallShare share = law.of(obstacles.obstacle[k], x[i]);
+          const WallDensity share = law.of(obstacles.obstacle[k], x[i]);
           if (share.value == 0.f) continue;
           const Float4 w = wall[i];
-          const WallShare all = law.both({w.w / rest, {w.x / rest, w.y / rest, w.z / rest}}, share);
+          const WallDensity all =
+              law.both({w.w / rest, {w.x / rest, w.y / rest, w.z / rest}}, share);
           wall[i] = {rest * all.gradient.x, rest * all.gradient.y, rest * all.gradient.z,
                      rest * all.value};
         }
@@ -26,7 +27,7 @@ void add_obstacle_shares(State& state) {
 
 Impulse pressure_impulse(const State& state, int which) {
   const Parameters& p = state.parameters;
-  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleDensity law = obstacle_density_of(p);
   const ImageWalls walls = image_walls_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const Float4* place = state.pressure.place.data();
@@ -41,9 +42,9 @@ Impulse pressure_impulse(const State& state, int which) {
         Impulse sum;
         for (int image = 0; image < obstacles.count && at.w != 0.f; ++image) {
           if (obstacles.obstacle[image].of != which) continue;
-          const WallShare own = law.of(obstacles.obstacle[image], x);
+          const WallDensity own = law.of(obstacles.obstacle[image], x);
           if (own.value == 0.f) continue;
-          WallShare others = walls.share(x);
+          WallDensity others = walls.density(x);
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image) others = law.both(others, law.of(obstacles.obstacle[k], x));
           sum = sum + times(own.gradient, factor * at.w * (1.f - others.value));
@@ -55,7 +56,7 @@ Impulse pressure_impulse(const State& state, int which) {
 
 Impulse pressure_impulse_near_cloth(const State& state, int which) {
   const Parameters& p = state.parameters;
-  const ObstacleShare law = obstacle_share_of(p);
+  const ObstacleDensity law = obstacle_density_of(p);
   const ImageWalls walls = image_walls_of(p);
   const ObstacleViews obstacles = state.obstacles.views();
   const ClothRows c = cloth_rows(state);
@@ -72,9 +73,9 @@ Impulse pressure_impulse_near_cloth(const State& state, int which) {
         Impulse sum;
         for (int image = 0; image < obstacles.count; ++image) {
           if (obstacles.obstacle[image].of != which) continue;
-          const WallShare own = law.seen(obstacles.obstacle[image], x, n, gap, walls);
+          const WallDensity own = law.seen(obstacles.obstacle[image], x, n, gap, walls);
           if (own.value == 0.f) continue;
-          WallShare others = walls.share(x, n, gap);
+          WallDensity others = walls.density(x, n, gap);
           for (int k = 0; k < obstacles.count; ++k)
             if (k != image)
               others = law.both(others, law.seen(obstacles.obstacle[k], x, n, gap, walls));

@@ -13,7 +13,7 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct WallShare {
+struct WallDensity {
   float value;           // of the rest density
   Vec3<float> gradient;  // 1/m
 };
@@ -35,10 +35,10 @@ struct ImageWalls : DomainWalls {
 
   /// Fraction of density that the walls around a point replace: 1 - prod(1 - H), so that edges and
   /// corners are not counted twice; H is the kernel's integral over the image, over h.
-  DRENCH_HD WallShare share(Vec3<float> p) const { return share(p, {0.f, 0.f, 0.f}, 0.f); }
+  DRENCH_HD WallDensity density(Vec3<float> p) const { return density(p, {0.f, 0.f, 0.f}, 0.f); }
 
   /// The same beside a sheet at `distance` m against its normal: a wall is not seen through it.
-  DRENCH_HD WallShare share(Vec3<float> p, Vec3<float> normal, float distance) const {
+  DRENCH_HD WallDensity density(Vec3<float> p, Vec3<float> normal, float distance) const {
     const float x[3] = {p.x, p.y, p.z}, n[3] = {normal.x, normal.y, normal.z};
     float open[3], slope[3];
     for (int k = 0; k < 3; ++k) {

@@ -292,12 +292,12 @@ void find_neighbours(State& state) {
   const float rest = p.rest_density;
   parallel_for(
       state.queue, "neighbours: walls", f.count, DRENCH_LAMBDA(int i) {
-        const WallShare share = walls.share(x[i]);
+        const WallDensity walled = walls.density(x[i]);
         place[i] = {x.x[i], x.y[i], x.z[i], 0.f};
-        wall[i] = {rest * share.gradient.x, rest * share.gradient.y, rest * share.gradient.z,
-                   rest * share.value};
+        wall[i] = {rest * walled.gradient.x, rest * walled.gradient.y, rest * walled.gradient.z,
+                   rest * walled.value};
       });
-  if (p.obstacles > 0) add_obstacle_shares(state);
+  if (p.obstacles > 0) add_obstacle_density(state);
   const bool sheets = state.contact.near > 0;
   if (sheets) add_cloth_to_walls(state);
   const float scale = mass / (h * h * h);
@@ -383,7 +383,7 @@ void measure_density(State& state) {
                     .scale = p.particle_mass / p.lattice_sum * WendlandC2::factor(p.support_radius),
                     .rest_density = p.rest_density,
                     .walls = image_walls_of(p),
-                    .law = obstacle_share_of(p),
+                    .law = obstacle_density_of(p),
                     .obstacles = state.obstacles.views()});
 }
 

@@ -7,7 +7,7 @@
 
 #include "sim/passes/coupling/cloth_filter.h"
 #include "sim/passes/coupling/collision_rounds.h"
-#include "sim/passes/obstacle/obstacle_share.h"
+#include "sim/passes/obstacle/obstacle_density.h"
 #include "sim/passes/pressure/image_walls.h"
 #include "sim/passes/pressure/pressure_solve.h"
 #include "sim/passes/pressure/velocity_smoothing.h"
@@ -21,7 +21,8 @@ void find_neighbours(State& state);
 
 void project_density(State& state);
 
-/// Fluid and sheets go to their new places, each path tested against the moving triangles.
+/// Fluid and sheets go to their new places, each path tested against the moving triangles
+/// (continuous collision).
 void move_with_sheets(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -3,7 +3,7 @@
 // lists of a step belong to its predicted positions. Moves nothing and changes no order.
 
 #include "sim/neighbours/sort_particles.h"
-#include "sim/passes/obstacle/obstacle_share.h"
+#include "sim/passes/obstacle/obstacle_density.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -15,7 +15,7 @@ struct MeasuredDensity {
   float* density;         // kg/m^3, in the order of the state
   float support_radius, scale, rest_density;
   ImageWalls walls;
-  ObstacleShare law;
+  ObstacleDensity law;
   ObstacleViews obstacles;
 
   DRENCH_HD Inputs<3> inputs() const { return {{position.x, position.y, position.z}}; }
@@ -32,8 +32,8 @@ struct MeasuredDensity {
     sum.w = sum.w + WendlandC2::shape(length2(i.position - j.position), T(support_radius));
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
-    const WallShare share = law.with(walls.share(position[i]), obstacles, position[i]);
-    density[order[i]] = scale * sum.w + rest_density * share.value;
+    const WallDensity walled = law.with(walls.density(position[i]), obstacles, position[i]);
+    density[order[i]] = scale * sum.w + rest_density * walled.value;
   }
 };
 

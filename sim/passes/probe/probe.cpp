@@ -86,7 +86,7 @@ StepPressure step_pressure_of(const State& state) {
 BodyParts body_parts_of(const State& state) {
   return {.step = step_pressure_of(state),
           .image = image_walls_of(state.parameters),
-          .law = obstacle_share_of(state.parameters),
+          .law = obstacle_density_of(state.parameters),
           .obstacles = state.obstacles.views(),
           .rows = cloth_rows(state),
           .normal = state.fluid.normal.view()};

@@ -4,7 +4,7 @@
 // pushed the particles.
 //
 // Walls, obstacles and sheets each replace a fraction of a particle's density and leave the rest to
-// the others (image_walls.h, obstacle_share.h, contact_incompressible.h): S = 1 - prod (1 - S_b).
+// the others (image_walls.h, obstacle_density.h, contact_incompressible.h): S = 1 - prod (1 - S_b).
 // The part of body b in grad S is grad S_b times what the others leave. The parts sum to the whole,
 // so that every push is counted once, on the body that gave it, whatever else touches the fluid
 // there.
@@ -103,7 +103,7 @@ DRENCH_HD Vec3<float> along_axis(int axis, float v) {
 struct BodyParts {
   StepPressure step;
   ImageWalls image;
-  ObstacleShare law;
+  ObstacleDensity law;
   ObstacleViews obstacles;
   ClothRows rows;
   ConstVecView normal;
@@ -161,7 +161,7 @@ struct BodyParts {
   /// Of one obstacle, or image of it.
   DRENCH_HD BodyPart obstacle(const Beside& b, int which) const {
     const ObstacleView& o = obstacles.obstacle[which];
-    const WallShare own = law.seen(o, b.x, b.normal, b.gap, image);
+    const WallDensity own = law.seen(o, b.x, b.normal, b.gap, image);
     if (own.value == 0.f) return {};
     const float others = step.rest_density * b.open * open_walls(b) * open_obstacles(b, which);
     const Vec3<float> inside = o.to_own(1, b.x);

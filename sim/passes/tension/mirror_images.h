@@ -197,7 +197,7 @@ inline MirrorImages mirror_images_of(const State& state) {
                     .normal = f.normal.view(),
                     .start = f.start.view(),
                     .cloth_velocity = state.cloth.velocity.view(),
-                    .distance = f.sheet_distance.data(),
+                    .distance = f.cloth_distance.data(),
                     .edge = f.edge.data(),
                     .half_thickness = state.cloth.half_thickness.data(),
                     .dt = float(state.dt)};

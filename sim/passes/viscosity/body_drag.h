@@ -3,7 +3,7 @@
 // domain does (viscosity_rows.h), whose velocity is theirs at the foot of the particle's
 // perpendicular. A body that fills less of what lies beyond its tangent plane brakes less: by the
 // fraction of the half-space's integral of the kernel that it fills, with the closed forms of
-// obstacle_share.h; by its square along what is curved, as what lies beside the perpendicular
+// obstacle_density.h; by its square along what is curved, as what lies beside the perpendicular
 // weighs most there. Against the integral over a ball of 3 spacings this is
 // up to 13 % off, at a box's edge 29 % (tests/sim/body_drag_test.cpp). Walls and obstacles behind a
 // sheet are not seen through it.

@@ -16,7 +16,7 @@ ClothGaps cloth_gaps(const State& state, const ConstVecView& cloth_velocity) {
           .start = f.start.view(),
           .normal = f.normal.view(),
           .cloth_velocity = cloth_velocity,
-          .distance = f.sheet_distance.data(),
+          .distance = f.cloth_distance.data(),
           .edge = f.edge.data(),
           .half_thickness = state.cloth.half_thickness.data(),
           .triangle = f.triangle.data(),

@@ -50,7 +50,7 @@ struct DensitySum {
   static constexpr int columns = 3;
   static constexpr bool costly = false;
   ConstVecView position;
-  const float* cloth_share;  // fraction of density replaced by cloth, or null
+  const float* cloth_density;  // fraction of density replaced by cloth, or null
   float *density, *pressure_term, *inverse_density;  // kg/m^3, p / rho^2 in m^5/(kg s^2), m^3/kg
   float support_radius;                              // m
   float scale;                                       // m Kernel::factor(h) / lattice_sum
@@ -74,7 +74,7 @@ struct DensitySum {
   }
   DRENCH_HD void finish(int i, const Sum<float>& sum) const {
     const float fraction = wall_density_fraction(walls, position[i], 1.f / support_radius) +
-                           (cloth_share ? cloth_share[i] : 0.f);
+                           (cloth_density ? cloth_density[i] : 0.f);
     const float rho = scale * sum.w + rest_density * fraction;
     density[i] = rho;
     inverse_density[i] = 1.f / rho;

@@ -15,7 +15,7 @@ DensitySum<Kernel> density_pass(State& state) {
   const Parameters& p = state.parameters;
   FluidState& f = state.fluid;
   return {.position = f.position.view(),
-          .cloth_share = f.cloth_share.size() ? f.cloth_share.data() : nullptr,
+          .cloth_density = f.cloth_density.size() ? f.cloth_density.data() : nullptr,
           .density = f.density.data(),
           .pressure_term = f.pressure_term.data(),
           .inverse_density = f.inverse_density.data(),

@@ -16,14 +16,14 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-struct ObstacleShare {
+struct ObstacleDensity {
   float scale, inverse_h, spacing;  // as ImageWalls
 
   /// Farthest that a surface counts, m.
   DRENCH_HD float reach() const { return 0.5f / inverse_h + 0.25f * spacing; }
 
   /// @param normal  unit. @param curvature  half its divergence, 1/m.
-  DRENCH_HD WallShare curved(float distance, Vec3<float> normal, float curvature) const {
+  DRENCH_HD WallDensity curved(float distance, Vec3<float> normal, float curvature) const {
     constexpr float sharpest = 2.f;  // edges of level sets; a sphere of half a spacing
     const float D = (2.f * distance - 0.5f * spacing) * inverse_h;
     if (D >= 1.f) return {0.f, {0.f, 0.f, 0.f}};
@@ -35,7 +35,7 @@ struct ObstacleShare {
     return {scale * value, normal * (scale * slope * inverse_h)};
   }
 
-  DRENCH_HD WallShare box(Vec3<float> own, const float (&half)[3]) const {
+  DRENCH_HD WallDensity box(Vec3<float> own, const float (&half)[3]) const {
     const BoxDistance to(own, half);
     const float x[3] = {own.x, own.y, own.z}, n[3] = {to.normal.x, to.normal.y, to.normal.z};
     float H[3], P[3], g[3];
@@ -52,7 +52,7 @@ struct ObstacleShare {
   }
 
   /// From seven samples of the distance, one voxel apart.
-  DRENCH_HD WallShare field(const ObstacleView& o, Vec3<float> own) const {
+  DRENCH_HD WallDensity field(const ObstacleView& o, Vec3<float> own) const {
     const float mix = o.blend[1], d = o.distance(own, mix), e = o.field[0].voxel;
     if (d >= reach()) return {0.f, {0.f, 0.f, 0.f}};
     const auto [rise, sum] = o.central_differences(own, e, mix);
@@ -63,10 +63,10 @@ struct ObstacleShare {
   }
 
   /// Share of density that one obstacle, where it ends the step, replaces at x.
-  DRENCH_HD_CALL WallShare of(const ObstacleView& o, Vec3<float> x) const {
+  DRENCH_HD_CALL WallDensity of(const ObstacleView& o, Vec3<float> x) const {
     if (!o.near_path(x, x, reach())) return {0.f, {0.f, 0.f, 0.f}};
     const Vec3<float> own = o.to_own(1, x);
-    WallShare share{};
+    WallDensity share{};
     if (o.shape == ObstacleShape::plane) share = curved(own.y, {0.f, 1.f, 0.f}, 0.f);
     if (o.shape == ObstacleShape::sphere) {
       const float r = length(own), inverse = r > 0.f ? 1.f / r : 0.f;
@@ -80,9 +80,9 @@ struct ObstacleShare {
 
   /// The same beside a sheet at `distance` m against its normal, as ImageWalls::share: not seen
   /// through it.
-  DRENCH_HD WallShare seen(const ObstacleView& o, Vec3<float> x, Vec3<float> cloth_normal,
-                           float distance, const ImageWalls& walls) const {
-    const WallShare share = of(o, x);
+  DRENCH_HD WallDensity seen(const ObstacleView& o, Vec3<float> x, Vec3<float> cloth_normal,
+                             float distance, const ImageWalls& walls) const {
+    const WallDensity share = of(o, x);
     if (share.value == 0.f) return share;
     const Vec3<float> own = o.to_own(1, x), n = o.turn(1, o.normal(own, o.blend[1]));
     const float shown = walls.seen(o.distance(own, o.blend[1]) * dot(n, cloth_normal) - distance);
@@ -90,25 +90,26 @@ struct ObstacleShare {
   }
 
   /// Both replace density: 1 - (1 - S)(1 - S'), as walls among themselves.
-  static DRENCH_HD WallShare both(WallShare a, WallShare b) {
+  static DRENCH_HD WallDensity both(WallDensity a, WallDensity b) {
     return {1.f - (1.f - a.value) * (1.f - b.value),
             a.gradient * (1.f - b.value) + b.gradient * (1.f - a.value)};
   }
   /// Walls and all obstacles together at x.
-  DRENCH_HD WallShare with(WallShare walls, const ObstacleViews& obstacles, Vec3<float> x) const {
+  DRENCH_HD WallDensity with(WallDensity walls, const ObstacleViews& obstacles,
+                             Vec3<float> x) const {
     for (int k = 0; k < obstacles.count; ++k) {
-      const WallShare share = of(obstacles.obstacle[k], x);
+      const WallDensity share = of(obstacles.obstacle[k], x);
       if (share.value != 0.f) walls = both(walls, share);
     }
     return walls;
   }
 };
 
-inline ObstacleShare obstacle_share_of(const Parameters& p) {
+inline ObstacleDensity obstacle_density_of(const Parameters& p) {
   return {p.wall_scale, 1.f / p.support_radius, p.spacing};
 }
 
 /// Adds obstacles to what find_neighbours has of the walls.
-void add_obstacle_shares(State& state);
+void add_obstacle_density(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND
