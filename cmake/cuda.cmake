@@ -1,6 +1,6 @@
 # The CUDA simulator is built whenever nvcc is there: PTX for anything from 8.0 on, and code for sm_90
 # made of the same PTX. PTX for 9.0 would be the same but for its name, and is most of nvcc's time.
-# CMAKE_CUDA_ARCHITECTURES asks for others.
+# CMAKE_CUDA_ARCHITECTURES asks for others. docs/decisions/0203-nvcc-units.md
 set(DRENCH_HAS_CUDA OFF)
 if(NOT DRENCH_CUDA STREQUAL OFF)
   if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})

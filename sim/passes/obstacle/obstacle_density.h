@@ -55,11 +55,11 @@ struct ObstacleDensity {
   DRENCH_HD WallDensity field(const ObstacleView& o, Vec3<float> own) const {
     const float mix = o.blend[1], d = o.distance(own, mix), e = o.field[0].voxel;
     if (d >= reach()) return {0.f, {0.f, 0.f, 0.f}};
-    const ObstacleView::Around around = o.around_point(own, e, mix);
-    const float size = length(around.rise);
+    const auto [rise, sum] = o.central_differences(own, e, mix);
+    const float size = length(rise);
     if (size == 0.f) return {0.f, {0.f, 0.f, 0.f}};
-    const float divergence = (around.sum - 6.f * d) / (e * e);
-    return curved(d, around.rise * (1.f / size), 0.5f * divergence);
+    const float divergence = (sum - 6.f * d) / (e * e);
+    return curved(d, rise * (1.f / size), 0.5f * divergence);
   }
 
   /// Share of density that one obstacle, where it ends the step, replaces at x.

@@ -116,14 +116,18 @@ struct ObstacleView : ObstaclePlacement {
     const float first = field[0](own);
     return deform > 0.f ? first + mix * (field[1](own) - first) : first;
   }
-  /// Distances of the six points that stand `step` m off along the axes: how much more they are on
-  /// one side than on the other, and their sum. In a loop, because a distance is long.
-  struct Around {
-    Vec3<float> rise{0.f, 0.f, 0.f};
-    float sum = 0.f;
+  DRENCH_HD Vec3<float> period_along(int k) const {
+    return {period[k][0], period[k][1], period[k][2]};
+  }
+
+  /// Of the distance, over points `step` m off to either side along each axis. A loop, because a
+  /// distance is long.
+  struct CentralDifferences {
+    Vec3<float> rise{0.f, 0.f, 0.f};  // from one side to the other
+    float sum = 0.f;                  // of all six
   };
-  DRENCH_HD Around around_point(Vec3<float> own, float step, float mix) const {
-    Around all;
+  DRENCH_HD CentralDifferences central_differences(Vec3<float> own, float step, float mix) const {
+    CentralDifferences all;
     for (int k = 0; k < 3; ++k) {
       const Vec3<float> off{k == 0 ? step : 0.f, k == 1 ? step : 0.f, k == 2 ? step : 0.f};
       float side[2];
@@ -136,15 +140,13 @@ struct ObstacleView : ObstaclePlacement {
     }
     return all;
   }
-  DRENCH_HD Vec3<float> period_along(int k) const {
-    return {period[k][0], period[k][1], period[k][2]};
-  }
 
   /// Unit, away from the solid; zero deep inside a level set, where nothing is known.
   DRENCH_HD_CALL Vec3<float> normal(Vec3<float> own, float mix) const {
     if (shape == ObstacleShape::plane) return {0.f, 1.f, 0.f};
     if (shape == ObstacleShape::box) return BoxDistance(own, half).normal;
-    if (shape == ObstacleShape::field) own = around_point(own, 0.5f * field[0].voxel, mix).rise;
+    if (shape == ObstacleShape::field)
+      own = central_differences(own, 0.5f * field[0].voxel, mix).rise;
     const float size = length(own);
     return size > 0.f ? own * (1.f / size) : Vec3<float>{0.f, 0.f, 0.f};
   }
