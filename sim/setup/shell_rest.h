@@ -11,8 +11,8 @@
 // moment are in equilibrium on any mesh, which the patch of one triangle alone is not: decision
 // 0029.
 //   Where a side is free, its patch has one condition less; of the surfaces that are left it is the
-// one of least bending energy, whose moment across the side vanishes. Where a neighbour is held
-// as a whole, its plane is what the surface is tangent to: a clamp.
+// one whose second derivatives are nearest to its neighbours'. Where a neighbour is held as a
+// whole, its plane is what the surface is tangent to: a clamp.
 
 #include <Imath/ImathVec.h>
 
