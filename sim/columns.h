@@ -264,6 +264,15 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"bend", "N/m", Group::cloth_fixed}, s.bend, none);
   visit({"fan_slot", "1", Group::cloth_fixed}, s.fan_slot, none);
   visit({"push", "N", Group::cloth_fixed}, s.push, none);
+  visit({"curved_start", "1", Group::cloth_fixed}, s.curved_start, none);
+  visit({"curved_node", "1", Group::cloth_fixed}, s.curved_node, none);
+  visit({"curved_of_start", "1", Group::cloth_fixed}, s.curved_of_start, none);
+  visit({"curved_of", "1", Group::cloth_fixed}, s.curved_of, none);
+  visit({"curved_pull", "N", Group::cloth_fixed}, s.curved_pull, none);
+  visit({"curved_of_pull", "N", Group::cloth_fixed}, s.curved_of_pull, none);
+  visit({"curved_shift", "J", Group::cloth_fixed}, s.curved_shift, none);
+  visit({"shell.normal", "1", Group::shell_system}, s.normal, none);
+  visit({"turning", "J", Group::shell_system}, s.turning, none);
   visit({"shell.path", "m/s", Group::shell_system}, s.path, none);
   visit({"element", "", Group::shell_system}, s.element, none);
   visit({"block", "kg", Group::shell_system}, s.block, none);

@@ -25,6 +25,12 @@ struct ShellTopology {
   // N of a vertex: bending across the seams of sheets that are joined to themselves; or empty
   std::vector<float> push_x, push_y, push_z;
 
+  // Of triangles that are curved at rest, else empty: their energy has the term -n . sum q x over
+  // the nodes of their patches (shell_bending.h), n the unit normal.
+  std::vector<int> curved_start, curved_node;                         // rows by triangle
+  std::vector<float> curved_pull;                                     // N, q
+  std::vector<float> curved_shift_x, curved_shift_y, curved_shift_z;  // J: sum q shift; or empty
+
   bool any() const { return !row_start.empty(); }
 };
 

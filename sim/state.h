@@ -170,14 +170,20 @@ struct ShellState {
   Column<int> fan_slot;     // 2 a fan entry: slots of the triangle's next corner and the one after
   VecColumn push;           // N, of bending across seams
   int ring_slots = 0;       // of all slices
+  // Of sheets that are curved at rest: ShellTopology, and the same by vertex.
+  bool curved = false;
+  Column<int> curved_start, curved_node, curved_of_start, curved_of;
+  Column<float> curved_pull, curved_of_pull;  // N
+  VecColumn curved_shift;                     // J
   // rebuilt every step
-  VecColumn path;          // m/s, of the straight path
-  Column<float> element;   // 36 fields of `triangles`: ElementFields
-  Column<float> block;     // kg, 9 fields of ring entries, by rows
-  Column<float> tension;   // kg, of ring entries: see TensionMatrix
-  Column<float> diagonal;  // kg, 6 fields of vertices: xx xy xz yy yz zz
-  VecColumn base;          // kg m, the sheet's own part of ClothSystem::base
-  VecColumn force;         // N, as `internal`, at the start of this step
+  VecColumn path;             // m/s, of the straight path
+  Column<float> element;      // 36 fields of `triangles`: ElementFields
+  Column<float> block;        // kg, 9 fields of ring entries, by rows
+  Column<float> tension;      // kg, of ring entries: see TensionMatrix
+  Column<float> diagonal;     // kg, 6 fields of vertices: xx xy xz yy yz zz
+  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x
+  VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
+  VecColumn force;            // N, as `internal`, at the start of this step
 };
 
 /// Contacts sorted by triangle.

@@ -1,6 +1,7 @@
 #include "sim/setup/cloth_shell.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sim/setup/shell_rest.h"
 
@@ -87,6 +88,9 @@ void append_nothing(const Sheet& sheet, ShellTopology& t) {
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     t.area.push_back(0.f);
     for (auto& gradient : t.gradient) gradient.push_back(0.f);
+    t.curved_start.push_back(int(t.curved_node.size()));
+    t.curved_shift_x.push_back(0.f), t.curved_shift_y.push_back(0.f),
+        t.curved_shift_z.push_back(0.f);
   }
   t.law.push_back({});
   for (size_t i = 0; i < sheet.point.size(); ++i)
@@ -101,12 +105,35 @@ void append_push(const Sheet& sheet, const BendingMatrix* bending, ShellTopology
   }
 }
 
+/// q of the nodes of patches: see ShellTopology. A triangle that turns by less than a millionth
+/// over its own size is flat.
+void append_curvature(const ShellRest& rest, int base, ShellTopology& t) {
+  const auto is_flat = [&](size_t k) {
+    const auto& r = rest.patch[k].rest;
+    return std::hypot(r.xx, r.yy, r.xy) * std::sqrt(rest.triangle[k].area) < 1e-6;
+  };
+  for (size_t k = 0; k < rest.patch.size(); ++k) {
+    const BendingPatch& p = rest.patch[k];
+    V3d shift(0);
+    for (const PatchNode& n : p.node) {
+      if (is_flat(k)) break;
+      const double q =
+          cpu::bending_weight(rest.triangle[k].area * p.share, rest.bending, n.weight, p.rest);
+      t.curved_node.push_back(n.index + base), t.curved_pull.push_back(float(q));
+      shift += n.shift * q;
+    }
+    t.curved_start.push_back(int(t.curved_node.size()));
+    t.curved_shift_x.push_back(float(shift.x)), t.curved_shift_y.push_back(float(shift.y)),
+        t.curved_shift_z.push_back(float(shift.z));
+  }
+}
+
 }  // namespace
 
 void append_shell(const Sheet& sheet, const Cloth& cloth, const LocalFrame& frame,
                   ClothTopology& topology) {
   ShellTopology& t = topology.shell;
-  if (t.row_start.empty()) t.row_start.push_back(0);
+  if (t.row_start.empty()) t.row_start.push_back(0), t.curved_start.push_back(0);
   if (cloth.model != ClothModel::shell) {
     append_push(sheet, nullptr, t);
     return append_nothing(sheet, t);
@@ -139,6 +166,7 @@ void append_shell(const Sheet& sheet, const Cloth& cloth, const LocalFrame& fram
       stiffest > 0 ? bending_matrix(rest, sheet.point.size()) : no_bending(sheet.point.size());
   append_rows(sheet, bending, t, base);
   append_push(sheet, &bending, t);
+  append_curvature(rest, base, t);
 }
 
 }  // namespace drench::sim

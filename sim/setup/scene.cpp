@@ -482,6 +482,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     ClothTopology& t = scene.cloth;
     t.corner_shift = t.spring_shift = t.rest_period = {};
     t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
+    t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
   }
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =

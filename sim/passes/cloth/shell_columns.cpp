@@ -94,6 +94,32 @@ std::vector<int> fan_slots(const ClothTopology& cloth, const Slices& slices) {
   return slot;
 }
 
+/// Rows by triangle, and by vertex.
+void load_curvature(State& state, const ClothTopology& cloth) {
+  const ShellTopology& t = cloth.shell;
+  ShellState& s = state.shell;
+  s.curved = !t.curved_node.empty();
+  if (!s.curved) return;
+  std::vector<int> start(size_t(cloth.vertices()) + 1, 0), of(t.curved_node.size());
+  std::vector<float> pull(of.size());
+  for (const int v : t.curved_node) ++start[size_t(v) + 1];
+  for (size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
+  std::vector<int> next(start);
+  for (int k = 0; k < cloth.triangles(); ++k) {
+    for (int e = t.curved_start[k]; e < t.curved_start[k + 1]; ++e) {
+      const int at = next[t.curved_node[e]]++;
+      of[at] = k, pull[at] = t.curved_pull[e];
+    }
+  }
+  from_host(s.curved_start, t.curved_start), from_host(s.curved_node, t.curved_node);
+  from_host(s.curved_pull, t.curved_pull), from_host(s.curved_of_pull, pull);
+  from_host(s.curved_of_start, start), from_host(s.curved_of, of);
+  s.normal.resize(cloth.triangles()), s.turning.resize(cloth.triangles());
+  if (!state.cloth.joined) return;
+  from_host(s.curved_shift.x, t.curved_shift_x), from_host(s.curved_shift.y, t.curved_shift_y),
+      from_host(s.curved_shift.z, t.curved_shift_z);
+}
+
 }  // namespace
 
 void load_shell(State& state, const ClothTopology& cloth) {
@@ -108,6 +134,7 @@ void load_shell(State& state, const ClothTopology& cloth) {
   from_host(s.ring_start, slices.ring_start), from_host(s.row_start, slices.row_start);
   from_host(s.end, slices.end), from_host(s.offset, slices.offset), from_host(s.bend, slices.bend);
   from_host(s.fan_slot, fan_slots(cloth, slices));
+  load_curvature(state, cloth);
   const size_t entries = size_t(8) * s.ring_slots, padded = state.cloth.padded;
   s.block.resize(9 * entries), s.tension.resize(entries), s.diagonal.resize(6 * padded);
   for (VecColumn* v :

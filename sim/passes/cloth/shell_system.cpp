@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/passes/cloth/shell_bending.h"
+
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
@@ -127,8 +129,62 @@ void find_paths(State& state) {
       });
 }
 
+/// What a triangle that is curved at rest adds to the forces on its patch: its energy's term
+/// -n . Q, Q = sum q x, pulls nodes by q n, and corners by what turns n.
+struct RestCurvature {
+  ShellCorners corners;
+  const float* area;
+  const int *start, *node, *of_start, *of;
+  const float *pull, *of_pull;
+  ConstVecView shift;
+  VecView normal, turning;
+  bool any;
+
+  DRENCH_HD void prepare(int t) const {
+    if (start[t] == start[t + 1]) return;
+    const int first = corners.vertex(t, 0);
+    const Vec3<float> from = corners.position[first], low = corners.rounding[first];
+    Vec3<float> q{0.f, 0.f, 0.f};
+    for (int e = start[t]; e < start[t + 1]; ++e) {
+      const int v = node[e];
+      q = q + ((corners.position[v] - from) + (corners.rounding[v] - low)) * pull[e];
+    }
+    if (corners.joined) q = q + shift[t];
+    normal.set(t, turning_normal(t).normal), turning.set(t, q);
+  }
+  DRENCH_HD TurningNormal<float> turning_normal(int t) const {
+    return {{0.f, 0.f, 0.f}, corners.edge(t, 1), corners.edge(t, 2), area[t]};
+  }
+  DRENCH_HD Vec3<float> force_on_node(int v) const {
+    Vec3<float> sum{0.f, 0.f, 0.f};
+    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[of[e]] * of_pull[e];
+    return sum;
+  }
+  DRENCH_HD Vec3<float> force_on_corner(int t, int c) const {
+    if (start[t] == start[t + 1]) return {0.f, 0.f, 0.f};
+    return turning_normal(t).derivative(c, turning[t]);
+  }
+};
+
+RestCurvature rest_curvature_of(State& state, const ShellCorners& corners) {
+  ShellState& s = state.shell;
+  return {.corners = corners,
+          .area = s.area.data(),
+          .start = s.curved_start.data(),
+          .node = s.curved_node.data(),
+          .of_start = s.curved_of_start.data(),
+          .of = s.curved_of.data(),
+          .pull = s.curved_pull.data(),
+          .of_pull = s.curved_of_pull.data(),
+          .shift = s.curved_shift.view(),
+          .normal = s.normal.view(),
+          .turning = s.turning.view(),
+          .any = s.curved};
+}
+
 /// Gathers what triangles give to a vertex.
 struct ShellVertices {
+  RestCurvature rest;
   ShellMatrix matrix;
   ConstVecView position, rounding, path, push, internal;
   const int *fan_start, *fan_entry, *fan_slot;
@@ -174,8 +230,9 @@ struct ShellVertices {
       add_block(t, c, (c + 1) % 3, ShellRows::entry(fan_slot[2 * e], i));
       add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
       sum = sum + force_on(t, c);
+      if (rest.any) sum = sum + rest.force_on_corner(t, c);
     }
-    return sum;
+    return rest.any ? sum + rest.force_on_node(i) : sum;
   }
 
   DRENCH_HD void operator()(int i) const {
@@ -215,12 +272,13 @@ void linearise_shell(State& state) {
   ShellState& s = state.shell;
   const ClothState& c = state.cloth;
   find_paths(state);
-  const ShellElements elements{.corners = {.position = c.position.view(),
-                                           .rounding = s.rounding.view(),
-                                           .edge_shift = s.edge_shift.view(),
-                                           .corner = s.corner.data(),
-                                           .stride = s.triangles,
-                                           .joined = c.joined},
+  const ShellCorners corners{.position = c.position.view(),
+                             .rounding = s.rounding.view(),
+                             .edge_shift = s.edge_shift.view(),
+                             .corner = s.corner.data(),
+                             .stride = s.triangles,
+                             .joined = c.joined};
+  const ShellElements elements{.corners = corners,
                                .area = s.area.data(),
                                .gradient = s.gradient.data(),
                                .law = s.law.data(),
@@ -230,7 +288,13 @@ void linearise_shell(State& state) {
                                .dt = float(state.dt)};
   for_each_lane(
       state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
+  const RestCurvature rest = rest_curvature_of(state, corners);
+  if (rest.any)
+    parallel_for(
+        state.queue, "shell: rest curvature", c.triangles,
+        DRENCH_LAMBDA(int t) { rest.prepare(t); });
   const ShellVertices vertices{
+      .rest = rest,
       .matrix = shell_matrix_of(state),
       .position = c.position.view(),
       .rounding = s.rounding.view(),
@@ -264,13 +328,18 @@ void keep_shell_step(State& state) {
   const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
                 acceleration = s.acceleration.view(), internal = s.internal.view();
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
+  const ConstVecView free = state.cloth_system.free.view(),
+                     normal = state.cloth_system.normal.view();
+  const bool obstacles = state.parameters.obstacles > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
         landed.set(i, next[i]), left.set(i, next_velocity[i]), internal.set(i, force[i]);
-        const bool shell = fan_slot[2 * fan_start[i]] >= 0;
-        acceleration.set(
-            i, shell ? (next_velocity[i] - v[i]) * inverse_dt : Vec3<float>{0.f, 0.f, 0.f});
+        const bool shell = fan_slot[2 * fan_start[i]] >= 0,
+                   held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
+                          (obstacles && length2(normal[i]) > 0.f);
+        acceleration.set(i, shell && !held ? (next_velocity[i] - v[i]) * inverse_dt
+                                           : Vec3<float>{0.f, 0.f, 0.f});
         // What x + way + rounding loses by being rounded, if that is where the vertex ends.
         const auto lost = [](float x, float way, float to) { return way - (to - x); };
         const Vec3<float> way = path[i] * dt + change[i] + rounding[i];
