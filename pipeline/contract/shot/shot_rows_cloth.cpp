@@ -68,7 +68,8 @@ std::vector<Parameter> cloth_rows() {
                          "shell: a continuous sheet with the constants of a fabric. springs: a net "
                          "of springs without bending, as published. automatic: springs where any "
                          "of their constants is given or the fluid is weakly compressible, else "
-                         "a shell"),
+                         "a shell")
+          .identity(),
       row<&Cloth::fabric>("cloth", "fabric", "", none, simulate,
                           "a name that `drench fabrics` lists: the constants that are not given")
           .only(ClothModel::automatic, ClothModel::shell),
