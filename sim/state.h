@@ -177,11 +177,12 @@ struct ShellState {
   VecColumn curved_shift;                     // J
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
-  Column<float> element;      // 36 fields of `triangles`: ElementFields
+  Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix
   Column<float> diagonal;     // kg, 6 fields of vertices: xx xy xz yy yz zz
-  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x
+  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x; two
+                              // fields of `triangles`: at the start, where straight paths end
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
   VecColumn force;            // N, as `internal`, at the start of this step
 };

@@ -27,7 +27,7 @@ void load_triangles(State& state, const ClothTopology& cloth) {
   }
   from_host(s.area, area), from_host(s.gradient, gradient), from_host(s.law, law);
   from_host(s.corner, corner), from_host(s.sheet, sheet);
-  s.element.resize(size_t(36) * padded);
+  s.element.resize(size_t(42) * padded);
   if (!state.cloth.joined) return;
   std::vector<float> shift[3];
   const std::vector<float>* from[3] = {&cloth.corner_shift.x, &cloth.corner_shift.y,
@@ -114,7 +114,7 @@ void load_curvature(State& state, const ClothTopology& cloth) {
   from_host(s.curved_start, t.curved_start), from_host(s.curved_node, t.curved_node);
   from_host(s.curved_pull, t.curved_pull), from_host(s.curved_of_pull, pull);
   from_host(s.curved_of_start, start), from_host(s.curved_of, of);
-  s.normal.resize(cloth.triangles()), s.turning.resize(cloth.triangles());
+  s.normal.resize(size_t(2) * s.triangles), s.turning.resize(size_t(2) * s.triangles);
   if (!state.cloth.joined) return;
   from_host(s.curved_shift.x, t.curved_shift_x), from_host(s.curved_shift.y, t.curved_shift_y),
       from_host(s.curved_shift.z, t.curved_shift_z);

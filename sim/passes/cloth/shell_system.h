@@ -9,10 +9,12 @@
 // fluid's impulses and what walls give count in full at once, so that momentum is kept step by
 // step; a vertex that something stopped starts anew, by implicit Euler.
 //
-// f_1 is linearised once, about x_0: the membrane's part of A are 3 x 3 blocks of vertices that
-// share a triangle (shell_membrane.h, stress projected), bending's a number for every pair of
-// vertices (shell_bending.h). Positions carry what they round off: a stiff sheet feels a tenth of a
-// micrometre.
+// f_1 is linearised once, about the end of the straight paths, x_0 + dt p: about x_0 what turns by
+// phi a step would feel a stretch of phi^2/2, and a square of E h = 1 kN/m that spins by 0.0125 a
+// step would lose 0.017 % of its energy in each. The membrane's part of A are 3 x 3 blocks of
+// vertices that share a triangle (shell_membrane.h, stress projected), bending's a number for every
+// pair of vertices (shell_bending.h). Positions carry what they round off: a stiff sheet feels a
+// tenth of a micrometre.
 
 #include "sim/passes/cloth/shell_membrane.h"
 #include "sim/passes/coupling/polygon_grid.h"
@@ -124,7 +126,7 @@ inline ConstVecView path_velocity_of(const State& state) {
   return state.shell.any ? state.shell.path.view() : state.cloth.velocity.view();
 }
 
-/// The straight paths, the blocks, and the sheet's own part of the right side.
+/// The straight paths, the blocks at their ends, and the sheet's own part of the right side.
 void linearise_shell(State& state);
 
 /// Notes what the next step needs of this one, whose end is in ClothState::next.

@@ -77,15 +77,23 @@ void sum_loads(State& state, Base base) {
       });
 }
 
-/// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts.
+/// m/s. Where a shell rests its forces are what rounding leaves of them, some 10 um/s a step; the
+/// sweeps' tolerance counts from no less than this speed of the whole.
+constexpr double quiet_speed = 1e-3;
+
+/// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts, and with `speed`
+/// the kinetic energy, m (v dt)^2, of that.
 template <class Matrix>
-void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of, float keep) {
+void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of, float keep,
+                      double speed) {
   ClothControl* control = state.cloth_system.control.data();
+  const float* inertia = state.cloth_system.inertia.data();
+  const double least = speed * speed * state.dt * state.dt;  // m^2
   reduce_then(
       state.queue, "cloth: reference", state.cloth.vertices, 0.,
       DRENCH_LAMBDA(int i) {
         const Vec3<float> r = matrix.moving(i, of[i]);
-        return dot_double(r, matrix.scaled(i, r));
+        return dot_double(r, matrix.scaled(i, r)) + least * inertia[i];
       },
       Plus{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
@@ -148,7 +156,7 @@ void add_cloth_to_diagonal(State& state) {
   const VecView right = s.right.view();
   sum_row_sizes(state, size, right);
   s.answer.clear(state.queue);
-  add_to_reference(state, matrix, right, 0.f);
+  add_to_reference(state, matrix, right, 0.f, 0.);
   solve_cloth_matrix(state, matrix, answer, right, last_sweeps, 0.03f);
   float* inverse = state.pressure.inverse_diagonal.data();
   parallel_for(
@@ -172,8 +180,8 @@ void start_cloth(State& state) {
   add_cloth_to_diagonal(state);
   sum_loads(state, Base::none);
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
-  add_to_reference(state, matrix, s.right.view(), 0.f);
-  add_to_reference(state, matrix, s.base.view(), 1.f);
+  add_to_reference(state, matrix, s.right.view(), 0.f, state.shell.any ? quiet_speed : 0.);
+  add_to_reference(state, matrix, s.base.view(), 1.f, 0.);
 }
 
 void respond_cloth(State& state, int sweeps, float tolerance) {
@@ -192,7 +200,8 @@ void settle_cloth(State& state) {
     s.right.clear(state.queue);
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
-    add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
+    add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
+                     state.shell.any ? quiet_speed : 0.);
     solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
   if (state.parameters.obstacles > 0)
