@@ -279,7 +279,6 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.tension", "kg", Group::shell_system}, s.tension, none);
   visit({"diagonal", "kg", Group::shell_system}, s.diagonal, none);
   visit({"shell.base", "kg m", Group::shell_system}, s.base, none);
-  visit({"shell.force", "N", Group::shell_system}, s.force, none);
 }
 
 template <class Solids, class Visit>

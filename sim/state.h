@@ -153,7 +153,7 @@ struct ShellState {
   VecColumn rounding;  // m, what that place lacks
   VecColumn left;      // m/s, the velocity that it was left with
   VecColumn acceleration;  // m/s^2, over that step
-  VecColumn internal;      // N, of the sheet on the vertex, at the start of it
+  VecColumn internal;      // N, of the sheet on the vertex, as it acted over that step
   double dt = 0;           // s, of it; 0: there is none
   // fixed; triangles by fields of `triangles`, padded to a multiple of eight
   int triangles = 0;
@@ -184,7 +184,6 @@ struct ShellState {
   VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x; two
                               // fields of `triangles`: at the start, where straight paths end
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
-  VecColumn force;            // N, as `internal`, at the start of this step
 };
 
 /// Contacts sorted by triangle.

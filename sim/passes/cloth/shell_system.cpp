@@ -8,10 +8,10 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-/// Fields of a triangle: -dt^2 times the blocks of corners 0 1, 0 2 and 1 2 by rows, the forces on
-/// corners 1 and 2 where straight paths end and where the step starts, and tensions of the sides
-/// 0 1, 0 2, 1 2.
-enum ElementFields { blocks = 0, forces = 27, start_forces = 33, tensions = 39 };
+/// Fields of a triangle: minus the blocks of corners 0 1, 0 2 and 1 2 by rows, times dt^2 and what
+/// of the new force counts; forces on corners 1 and 2 where straight paths end; tensions of the
+/// sides 0 1, 0 2, 1 2.
+enum ElementFields { blocks = 0, forces = 27, tensions = 33, element_fields = 36 };
 
 /// What places the corners of triangles, where the step starts: positions with what they round off;
 /// or so much later on straight paths.
@@ -53,7 +53,7 @@ struct ShellElements {
   const int* sheet;
   float* element;
   int sheets;
-  float dt;
+  float dt, dt2;  // s; s^2 times what of the new force counts
 
   template <class T, class Index>
   DRENCH_HD MembraneLaw<T> law_of(Index sheet_of) const {
@@ -61,6 +61,18 @@ struct ShellElements {
     return {.moduli = {field(0), field(1), field(2), field(3), T(0.f), T(0.f)},
             .limit = {field(4), field(5)},
             .damping_time = field(6)};
+  }
+
+  /// Whether straight paths strain a triangle so little that it is linearised where they end: else
+  /// an impact would be, far from where it ends.
+  template <class T>
+  DRENCH_HD static auto mostly_turns(Symmetric2<T> first, Symmetric2<T> last) {
+    const T most(0.005f), x = last.xx - first.xx, y = last.yy - first.yy, s = last.xy - first.xy;
+    return maximum(maximum(x, -x), maximum(maximum(y, -y), maximum(s, -s))) < most;
+  }
+  template <class M, class T>
+  DRENCH_HD static Symmetric2<T> select_strain(M mask, Symmetric2<T> a, Symmetric2<T> b) {
+    return {select(mask, a.xx, b.xx), select(mask, a.yy, b.yy), select(mask, a.xy, b.xy)};
   }
 
   template <class Index>
@@ -83,29 +95,36 @@ struct ShellElements {
     const auto later = [&](T time) {
       return SurfaceGradient<T>{start.warp + rate.warp * time, start.weft + rate.weft * time};
     };
-    const SurfaceGradient<T> f = later(T(dt));
+    const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)}, first = green_strain(start),
+                                                       last = green_strain(later(T(dt)));
+    const auto turns = mostly_turns(first, last);
+    const SurfaceGradient<T> f = later(select(turns, T(dt), T(0.f)));
     // Strain is quadratic in time: its mean rate is that halfway.
+    const Symmetric2<T> flow = green_strain_rate(later(T(0.5f * dt)), rate);
     const auto response =
-        of.at(green_strain(f), green_strain_rate(later(T(0.5f * dt)), rate), T(dt));
-    const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)},
-        before = of.at(green_strain(start), still, T(dt)).stress;
+        of.at(select_strain(turns, last, first), select_strain(turns, flow, still), T(dt));
     const Symmetric2<T> pull = positive_part(response.stress);
-    const T scale(-dt * dt);
+    const T scale(-dt2);
+    Block3<T> k_of[3];
     for (int pair = 0; pair < 3; ++pair) {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
-      const Block3<T> k = membrane_block(rest, f, pull, response.moduli, a, b);
+      const Block3<T> k = k_of[pair] = membrane_block(rest, f, pull, response.moduli, a, b);
       const Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
       for (int r = 0; r < 3; ++r) {
         put(blocks + 9 * pair + 3 * r, row[r].x), put(blocks + 9 * pair + 3 * r + 1, row[r].y);
         put(blocks + 9 * pair + 3 * r + 2, row[r].z);
       }
     }
-    const auto put_force = [&](int field, const Vec3<T>& force) {
-      put(field, force.x), put(field + 1, force.y), put(field + 2, force.z);
-    };
     for (int c = 1; c < 3; ++c) {
-      put_force(forces + 3 * c - 3, membrane_force(rest, f, response.stress, c));
-      put_force(start_forces + 3 * c - 3, membrane_force(rest, start, before, c));
+      // Linearised at the start: what the paths change.
+      const Vec3<T> p = corners.opening(t, c), other = corners.opening(t, 3 - c) - p;
+      const Block3<T>& far = k_of[2];
+      const Vec3<T> change = (k_of[c - 1].transpose_times(p) -
+                              (c == 1 ? far.times(other) : far.transpose_times(other))) *
+                             select(turns, T(0.f), T(dt));
+      const Vec3<T> force = membrane_force(rest, f, response.stress, c) + change;
+      put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
+      put(forces + 3 * c - 1, force.z);
     }
     put_tensions(rest, pull, put);
   }
@@ -121,7 +140,7 @@ struct ShellElements {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
       const T ax = rest.along_warp(a), ay = rest.along_weft(a), bx = rest.along_warp(b),
               by = rest.along_weft(b);
-      w[pair] = T(-dt * dt) * rest.area *
+      w[pair] = T(-dt2) * rest.area *
                 (ax * (pull.xx * bx + pull.xy * by) + ay * (pull.xy * bx + pull.yy * by));
     }
     // c (a + b)^2 <= c (1 + s) a^2 + c (1 + 1/s) b^2 with s = sqrt(w_b / w_a) of the two others
@@ -164,7 +183,6 @@ struct RestCurvature {
   const float *pull, *of_pull;
   ConstVecView shift;
   VecView normal, turning;
-  int at;  // in these two, of triangle 0
   bool any;
 
   DRENCH_HD void prepare(int t) const {
@@ -173,19 +191,19 @@ struct RestCurvature {
     Vec3<float> q{0.f, 0.f, 0.f};
     for (int e = start[t]; e < start[t + 1]; ++e) q = q + corners.between(first, node[e]) * pull[e];
     if (corners.joined) q = q + shift[t];
-    normal.set(at + t, turning_normal(t).normal), turning.set(at + t, q);
+    normal.set(t, turning_normal(t).normal), turning.set(t, q);
   }
   DRENCH_HD TurningNormal<float> turning_normal(int t) const {
     return {{0.f, 0.f, 0.f}, corners.edge(t, 1), corners.edge(t, 2), area[t]};
   }
   DRENCH_HD Vec3<float> force_on_node(int v) const {
     Vec3<float> sum{0.f, 0.f, 0.f};
-    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[at + of[e]] * of_pull[e];
+    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[of[e]] * of_pull[e];
     return sum;
   }
   DRENCH_HD Vec3<float> force_on_corner(int t, int c) const {
     if (start[t] == start[t + 1]) return {0.f, 0.f, 0.f};
-    return turning_normal(t).derivative(c, turning[at + t]);
+    return turning_normal(t).derivative(c, turning[t]);
   }
 };
 
@@ -202,29 +220,20 @@ RestCurvature rest_curvature_of(State& state, const ShellCorners& corners) {
           .shift = s.curved_shift.view(),
           .normal = s.normal.view(),
           .turning = s.turning.view(),
-          .at = corners.later > 0.f ? s.triangles : 0,
           .any = s.curved};
 }
 
-/// On a vertex, N: at the start of the step, and where straight paths end.
-struct ShellForces {
-  Vec3<float> start, end;
-  friend DRENCH_HD ShellForces operator+(const ShellForces& a, const ShellForces& b) {
-    return {a.start + b.start, a.end + b.end};
-  }
-};
-
 /// Gathers what triangles give to a vertex.
 struct ShellVertices {
-  RestCurvature rest, rest_at_end;
+  RestCurvature rest;
   ShellMatrix matrix;
   ConstVecView position, rounding, path, push, internal;
   const int *fan_start, *fan_entry, *fan_slot;
   const float* element;
   int triangles, vertices;
   float *block, *tension, *diagonal;
-  VecView base, force;
-  float dt, history;  // history: dt / (2 dt of the step before), at most 1/2; 0 without one
+  VecView base;
+  float dt, before;  // s; what of the last step's force counts
   bool joined;
 
   DRENCH_HD float field(int k, int t) const { return element[k * triangles + t]; }
@@ -238,42 +247,37 @@ struct ShellVertices {
             field(blocks + 9 * pair + (a < b ? 3 * r + c : 3 * c + r), t);
     tension[at] += field(tensions + pair, t);
   }
-  DRENCH_HD Vec3<float> force_on(int first, int t, int c) const {
+  DRENCH_HD Vec3<float> force_on(int t, int c) const {
     const auto on = [&](int k) {
-      return Vec3<float>{field(first + 3 * k, t), field(first + 3 * k + 1, t),
-                         field(first + 3 * k + 2, t)};
+      return Vec3<float>{field(forces + 3 * k, t), field(forces + 3 * k + 1, t),
+                         field(forces + 3 * k + 2, t)};
     };
-    return c > 0 ? on(c - 1) : -(on(0) + on(1));
-  }
-  DRENCH_HD ShellForces forces_on(int t, int c) const {
-    const ShellForces f{force_on(start_forces, t, c), force_on(forces, t, c)};
-    if (!rest.any) return f;
-    return f + ShellForces{rest.force_on_corner(t, c), rest_at_end.force_on_corner(t, c)};
+    const Vec3<float> f = c > 0 ? on(c - 1) : -(on(0) + on(1));
+    return rest.any ? f + rest.force_on_corner(t, c) : f;
   }
 
   /// Blocks of the row, and the triangles' forces.
-  DRENCH_HD ShellForces gather(int i) const {
+  DRENCH_HD Vec3<float> gather(int i) const {
     const int slice = ShellRows::slice(i);
     for (int s = matrix.rows.ring_start[slice]; s < matrix.rows.ring_start[slice + 1]; ++s) {
       const int at = ShellRows::entry(s, i);
       for (int k = 0; k < 9; ++k) block[k * matrix.stride + at] = 0.f;
       tension[at] = 0.f;
     }
-    ShellForces sum{{0.f, 0.f, 0.f}, {0.f, 0.f, 0.f}};
+    Vec3<float> sum{0.f, 0.f, 0.f};
     if (i >= vertices) return sum;
     for (int e = fan_start[i]; e < fan_start[i + 1]; ++e) {
       const int t = fan_entry[e] / 3, c = fan_entry[e] % 3;
       if (fan_slot[2 * e] < 0) continue;
       add_block(t, c, (c + 1) % 3, ShellRows::entry(fan_slot[2 * e], i));
       add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
-      sum = sum + forces_on(t, c);
+      sum = sum + force_on(t, c);
     }
-    if (!rest.any) return sum;
-    return sum + ShellForces{rest.force_on_node(i), rest_at_end.force_on_node(i)};
+    return rest.any ? sum + rest.force_on_node(i) : sum;
   }
 
   DRENCH_HD void operator()(int i) const {
-    ShellForces sum = gather(i);
+    Vec3<float> sum = gather(i);
     float d[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
     const ShellRows& rows = matrix.rows;
     const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
@@ -284,7 +288,7 @@ struct ShellVertices {
       const int at = ShellRows::entry(slot, i), j = rows.end[at];
       const float b = matrix.bend[at];
       const Vec3<float> away = (position[j] - position[i]) + (rounding[j] - rounding[i]);
-      sum = sum + ShellForces{away * b, (away + (path[j] - path[i]) * dt) * b};
+      sum = sum + (away + (path[j] - path[i]) * dt) * b;
       stiff += b * matrix.dt2;
       if (slot >= inner) continue;
       const int to = ShellRows::entry(ring + slot - first, i), stride = matrix.stride;
@@ -295,11 +299,10 @@ struct ShellVertices {
       d[1] += 0.5f * (entry(1) + entry(3)), d[2] += 0.5f * (entry(2) + entry(6)),
           d[4] += 0.5f * (entry(5) + entry(7));
     }
-    if (joined && i < vertices) sum = sum + ShellForces{push[i], push[i]};
+    if (joined && i < vertices) sum = sum + push[i];
     d[0] += stiff, d[3] += stiff, d[5] += stiff;
     for (int k = 0; k < 6; ++k) diagonal[k * 8 * ((vertices + 7) / 8) + i] = d[k];
-    force.set(i, sum.start);
-    base.set(i, (sum.end - (sum.start - internal[i]) * history) * (dt * dt));
+    base.set(i, sum * matrix.dt2 + internal[i] * (before * dt * dt));
   }
 };
 
@@ -324,40 +327,37 @@ void linearise_shell(State& state) {
                                .sheet = s.sheet.data(),
                                .element = s.element.data(),
                                .sheets = s.sheets,
-                               .dt = float(state.dt)};
+                               .dt = float(state.dt),
+                               .dt2 = shell_matrix_of(state).dt2};
   for_each_lane(
       state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
   ShellCorners at_end = corners;
   at_end.later = float(state.dt);
-  const RestCurvature rest = rest_curvature_of(state, corners),
-                      rest_at_end = rest_curvature_of(state, at_end);
+  const RestCurvature rest = rest_curvature_of(state, at_end);
   if (rest.any)
     parallel_for(
         state.queue, "shell: rest curvature", c.triangles,
-        DRENCH_LAMBDA(int t) { rest.prepare(t), rest_at_end.prepare(t); });
-  const ShellVertices vertices{
-      .rest = rest,
-      .rest_at_end = rest_at_end,
-      .matrix = shell_matrix_of(state),
-      .position = c.position.view(),
-      .rounding = s.rounding.view(),
-      .path = s.path.view(),
-      .push = s.push.view(),
-      .internal = s.internal.view(),
-      .fan_start = c.fan_start.data(),
-      .fan_entry = c.fan_entry.data(),
-      .fan_slot = s.fan_slot.data(),
-      .element = s.element.data(),
-      .triangles = s.triangles,
-      .vertices = c.vertices,
-      .block = s.block.data(),
-      .tension = s.tension.data(),
-      .diagonal = s.diagonal.data(),
-      .base = s.base.view(),
-      .force = s.force.view(),
-      .dt = float(state.dt),
-      .history = s.dt > 0 ? 0.5f * float(std::min(1., state.dt / s.dt)) : 0.f,
-      .joined = c.joined};
+        DRENCH_LAMBDA(int t) { rest.prepare(t); });
+  const ShellVertices vertices{.rest = rest,
+                               .matrix = shell_matrix_of(state),
+                               .position = c.position.view(),
+                               .rounding = s.rounding.view(),
+                               .path = s.path.view(),
+                               .push = s.push.view(),
+                               .internal = s.internal.view(),
+                               .fan_start = c.fan_start.data(),
+                               .fan_entry = c.fan_entry.data(),
+                               .fan_slot = s.fan_slot.data(),
+                               .element = s.element.data(),
+                               .triangles = s.triangles,
+                               .vertices = c.vertices,
+                               .block = s.block.data(),
+                               .tension = s.tension.data(),
+                               .diagonal = s.diagonal.data(),
+                               .base = s.base.view(),
+                               .dt = float(state.dt),
+                               .before = float(1 - new_force_share(state)),
+                               .joined = c.joined};
   parallel_for(
       state.queue, "shell: rows", c.padded, DRENCH_LAMBDA(int i) { vertices(i); });
 }
@@ -367,7 +367,8 @@ void keep_shell_step(State& state) {
   const ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
                      next_velocity = c.next_velocity.view(), path = s.path.view(),
-                     change = state.cloth_system.change.view(), force = s.force.view();
+                     change = state.cloth_system.change.view(), base = s.base.view();
+  const ShellMatrix matrix = shell_matrix_of(state);
   const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
                 acceleration = s.acceleration.view(), internal = s.internal.view();
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
@@ -377,7 +378,8 @@ void keep_shell_step(State& state) {
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
-        landed.set(i, next[i]), left.set(i, next_velocity[i]), internal.set(i, force[i]);
+        landed.set(i, next[i]), left.set(i, next_velocity[i]);
+        internal.set(i, (base[i] - matrix.times(change, i)) * (inverse_dt * inverse_dt));
         const bool shell = fan_slot[2 * fan_start[i]] >= 0,
                    held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
                           (obstacles && length2(normal[i]) > 0.f);
