@@ -96,6 +96,13 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::damping_time>("cloth", "damping_time", "s", {0, 10}, simulate,
                                 "inner friction in its plane, viscosity over stiffness")
           .only(ClothModel::shell),
+      row<&Cloth::friction>("cloth", "friction", "", {0, 10}, simulate,
+                            "Coulomb's coefficient of the sheet on itself; of two sheets on each "
+                            "other the geometric mean counts")
+          .only(ClothModel::shell),
+      row<&Cloth::self_collision>("cloth", "self_collision", "", none, simulate,
+                                  "whether it meets itself and other shells: nothing crosses")
+          .only(ClothModel::shell),
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "
                         "with the sheet, which it drags along). automatic is as that of "

@@ -256,7 +256,7 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 }  // namespace
 
-void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
                          float tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
@@ -265,8 +265,12 @@ void settle_at_obstacles(State& state, const ConstVecView& given, int most_itera
   parallel_for(
       state.queue, "cloth: given", state.cloth.padded,
       DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
-  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
+  for (int round = 0; round < most_rounds; ++round) {
+    const bool held = state.parameters.obstacles > 0 && revise_holds(state, given, round),
+               met = revise_sheet_rows(state, round);
+    if (!held && !met) break;
     solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
+  }
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

@@ -195,8 +195,8 @@ void settle_cloth(State& state) {
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f);
     solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
-  if (state.parameters.obstacles > 0)
-    settle_at_obstacles(state, given, last_sweeps, last_tolerance);
+  if (state.parameters.obstacles > 0 || state.self_contact.rows > 0)
+    settle_contacts(state, given, last_sweeps, last_tolerance);
   balance_loose_cloth(state, s.change.view(), given);
 }
 
@@ -260,6 +260,7 @@ void finish_cloth(State& state) {
         predicted.put(i, velocity);
       });
   if (state.parameters.obstacles > 0) finish_at_obstacles(state, near ? right : base);
+  guard_sheets(state);
   if (shells) keep_shell_step(state);
 }
 
