@@ -289,6 +289,7 @@ void for_each_self_contact_column(S& state, const Visit& visit) {
   visit({"sheet_vertex", "", Group::cloth_fixed}, s.vertex, none);
   visit({"owned", "1", Group::cloth_fixed}, s.owned, none);
   visit({"self.to", "m", Group::self_contact}, s.to, none);
+  visit({"self.point", "m", Group::self_contact}, s.point, none);
   visit({"self.low", "m", Group::self_contact}, s.low, none);
   visit({"self.high", "m", Group::self_contact}, s.high, none);
   visit({"self.sorted_low", "m", Group::self_contact}, s.sorted_low, none);

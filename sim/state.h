@@ -194,6 +194,13 @@ struct SheetVertex {
   int sheet;
 };
 
+/// A vertex and its way in a step, as the search for pairs reads them.
+struct SheetPoint {
+  Vec3<float> x, way;    // m
+  float half_thickness;  // m
+  int vertex;
+};
+
 /// Two pieces of sheets that share no vertex: a vertex and the corners of a triangle, or the ends
 /// of one edge and of another.
 struct SheetPair {
@@ -224,6 +231,7 @@ struct SheetRow {
 struct SelfContact {
   bool any = false;       // sheets take part
   float thickness = 0;    // m, of the thickest pair
+  float edge = 0;         // m, mean
   float slack = 0;        // m, that a vertex may end off the path that the pairs were found for
   int pairs = 0, rows = 0;
   // fixed
@@ -232,6 +240,7 @@ struct SelfContact {
                       // for; -1: takes no part
   // rebuilt every step
   VecColumn to;                            // m, ends of the paths that the pairs were found for
+  Column<SheetPoint> point;
   VecColumn low, high;                     // m, boxes of the triangles' paths
   VecColumn sorted_low, sorted_high;       // m, in the order of the grid
   Column<int> cell, order, cell_start;     // triangles by the middle of their boxes

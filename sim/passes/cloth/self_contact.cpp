@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "sim/backend/sort.h"
 #include "sim/passes/cloth/cloth_implicit.h"
@@ -210,10 +212,17 @@ struct RowRevision {
   }
 };
 
-/// Beyond what the straight paths say: gravity's part, and a little of what pushes.
+/// How far off the straight paths vertices may end before pairs have to be found anew: what gravity
+/// and a little of what pushes take, or what they did in the step before, up to a tenth of an edge.
 float slack_of(const State& state, float gravity) {
+  const SelfContact& s = state.self_contact;
   const float dt = float(state.dt);
-  return 2.f * gravity * dt * dt + 0.1f * state.self_contact.thickness;
+  const ConstVecView acceleration = state.shell.acceleration.view();
+  const float fastest2 = parallel_reduce(
+      state.queue, "self: accelerations", state.cloth.vertices, 0.f,
+      DRENCH_LAMBDA(int i) { return length2(acceleration[i]); }, Larger{});
+  const float least = 2.f * gravity * dt * dt + 0.1f * s.thickness;
+  return std::max(least, std::min(1.5f * dt * dt * std::sqrt(fastest2), 0.1f * s.edge));
 }
 
 }  // namespace
@@ -262,6 +271,9 @@ bool revise_sheet_rows(State& state, int round) {
   const bool changed = parallel_reduce(
                            state.queue, "self: revise", s.rows, 0,
                            DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
+  if(getenv("DBG")){int act=0,grip=0,rub=0,rel=0,live=0;double viol=0,pull=0;for(int k=0;k<s.rows;++k){auto&r=row[k];live+=r.mass>0;act+=r.stiffness>0;grip+=r.grip>0;rub+=length(r.rub)>0;rel+=r.released>0;
+    Vec3<float> q{0,0,0};for(int c=0;c<4;++c)q=q+revise.change[r.vertex[c]]*r.weight[c];float gap=r.gap+dot(r.normal,q);if(r.mass>0){viol=std::max<double>(viol,(r.target-gap)/r.thickness);}}
+    printf("  round %d changed %d rows %d live %d active %d grip %d rub %d released %d  worst lack %.3f sweeps %d\n",round,int(changed),s.rows,live,act,grip,rub,rel,viol,state.cloth_system.control.data()->sweeps);}
   if (!changed) return false;
   ++s.rounds;
   load_by_rows(state, Sides::all);

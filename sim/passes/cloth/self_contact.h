@@ -56,6 +56,14 @@ struct SheetRows {
       if (row[entry[e] >> 2].stiffness > 0.f) return true;
     return false;
   }
+  /// Whether another sheet does: a shift of the whole meets resistance.
+  DRENCH_HD bool touches_another(int i, const SheetVertex* vertex) const {
+    for (int e = start[i]; e < start[i + 1]; ++e) {
+      const SheetRow& r = row[entry[e] >> 2];
+      if (r.stiffness > 0.f && vertex[r.vertex[0]].sheet != vertex[r.vertex[3]].sheet) return true;
+    }
+    return false;
+  }
 };
 
 inline SheetRows sheet_rows_of(const State& state) {

@@ -44,13 +44,14 @@ struct JoinSpans {
 struct PairSearch {
   GridShape grid;
   const int *cell_start, *order, *owned, *corner;
-  ConstVecView low, high, sorted_low, sorted_high, position, to;
+  const SheetPoint* point;
+  ConstVecView low, high, sorted_low, sorted_high;
   SheetPieces pieces;
   float half, slack;
 
   template <class Visit>
   DRENCH_HD void for_each_pair_of(int t, const Visit& visit) const {
-    if (owned[t] <= 0) return;
+    if (owned[t] < 0) return;
     const Vec3<float> l = low[t], h = high[t];
     const int x0 = grid.cell_x(l.x - half), x1 = grid.cell_x(h.x + half);
     const int y0 = grid.cell_y(l.y - half), y1 = grid.cell_y(h.y + half);
@@ -59,7 +60,7 @@ struct PairSearch {
       for (int y = y0; y <= y1; ++y) {
         const int end = cell_start[grid.index(x1, y, z) + 1];
         for (int k = cell_start[grid.index(x0, y, z)]; k < end; ++k)
-          if (meets(k, l, h) && order[k] != t) pairs_of(t, order[k], visit);
+          if (order[k] > t && meets(k, l, h)) pairs_of(t, order[k], visit);
       }
     }
   }
@@ -69,52 +70,65 @@ struct PairSearch {
   }
   template <class Visit>
   DRENCH_HD void pairs_of(int t, int u, const Visit& visit) const {
-    const int *a = corner + 3 * t, *b = corner + 3 * u;
-    for (int c = 0; c < 3; ++c) {
-      if (!(owned[t] & 1 << c) || among(a[c], b)) continue;
-      const SheetPair pair{{a[c], b[0], b[1], b[2]}, u};
-      if (may_meet(pair)) visit(pair);
-    }
-    if (t > u) return;
+    const SheetPoint a[3] = {point[corner[3 * t]], point[corner[3 * t + 1]],
+                             point[corner[3 * t + 2]]},
+                     b[3] = {point[corner[3 * u]], point[corner[3 * u + 1]],
+                             point[corner[3 * u + 2]]};
+    const float reach = reach_of(a, b);
+    const Bounds all_a = JoinBounds{}(box(a[0], a[1]), bounds_of(a[2].x)),
+                 all_b = JoinBounds{}(box(b[0], b[1]), bounds_of(b[2].x));
+    corners_of(t, a, u, b, all_b, reach, visit);
+    corners_of(u, b, t, a, all_a, reach, visit);
     for (int c = 0; c < 3; ++c) {
       if (!(owned[t] & 8 << c)) continue;
-      const int a0 = a[c], a1 = a[c == 2 ? 0 : c + 1];
+      const SheetPoint &a0 = a[c], &a1 = a[c == 2 ? 0 : c + 1];
+      const Bounds side = box(a0, a1);
+      if (apart(side, all_b, reach)) continue;
       for (int e = 0; e < 3; ++e) {
-        if (!(owned[u] & 8 << e)) continue;
-        const int b0 = b[e], b1 = b[e == 2 ? 0 : e + 1];
-        if (a0 == b0 || a0 == b1 || a1 == b0 || a1 == b1) continue;
-        const SheetPair pair{{a0, a1, b0, b1}, -1};
-        if (may_meet(pair)) visit(pair);
+        const SheetPoint &b0 = b[e], &b1 = b[e == 2 ? 0 : e + 1];
+        if (!(owned[u] & 8 << e) || is(a0, b0) || is(a0, b1) || is(a1, b0) || is(a1, b1)) continue;
+        if (!apart(side, box(b0, b1), reach)) take(a0, a1, b0, b1, -1, visit);
       }
     }
   }
-  static DRENCH_HD bool among(int v, const int* corners) {
-    return v == corners[0] || v == corners[1] || v == corners[2];
+  /// What the corners of one make with another.
+  template <class Visit>
+  DRENCH_HD void corners_of(int t, const SheetPoint (&a)[3], int u, const SheetPoint (&b)[3],
+                            const Bounds& all, float reach, const Visit& visit) const {
+    for (int c = 0; c < 3; ++c) {
+      if (!(owned[t] & 1 << c) || is(a[c], b[0]) || is(a[c], b[1]) || is(a[c], b[2])) continue;
+      if (!apart(bounds_of(a[c].x), all, reach)) take(a[c], b[0], b[1], b[2], u, visit);
+    }
   }
-
-  DRENCH_HD bool may_meet(const SheetPair& pair) const {
+  static DRENCH_HD bool is(const SheetPoint& a, const SheetPoint& b) {
+    return a.vertex == b.vertex;
+  }
+  static DRENCH_HD Bounds box(const SheetPoint& a, const SheetPoint& b) {
+    return JoinBounds{}(bounds_of(a.x), bounds_of(b.x));
+  }
+  static DRENCH_HD bool apart(const Bounds& a, const Bounds& b, float reach) {
+    return a.low.x > b.high.x + reach || b.low.x > a.high.x + reach ||
+           a.low.y > b.high.y + reach || b.low.y > a.high.y + reach ||
+           a.low.z > b.high.z + reach || b.low.z > a.high.z + reach;
+  }
+  /// How far apart pieces of two triangles may be at the start and meet all the same, m.
+  DRENCH_HD float reach_of(const SheetPoint (&a)[3], const SheetPoint (&b)[3]) const {
+    const Vec3<float> common = (a[0].way + b[0].way) * 0.5f;
+    float off2 = 0.f;
+    for (int k = 0; k < 3; ++k)
+      off2 = maximum(off2, maximum(length2(a[k].way - common), length2(b[k].way - common)));
+    return a[0].half_thickness + b[0].half_thickness + 2.f * (square_root(off2) + slack);
+  }
+  template <class Visit>
+  DRENCH_HD void take(const SheetPoint& a, const SheetPoint& b, const SheetPoint& c,
+                      const SheetPoint& d, int triangle, const Visit& visit) const {
+    const SheetPair pair{{a.vertex, b.vertex, c.vertex, d.vertex}, triangle};
     const bool edges = pieces.edges(pair);
-    Vec3<float> x[4], d[4];
-    pieces.gather(pair, position, x);
-    pieces.gather(pair, to, d);
-    for (int k = 0; k < 4; ++k) d[k] = d[k] - x[k];
-    const float whole = pieces.vertex[pair.vertex[0]].half_thickness +
-                        pieces.vertex[pair.vertex[3]].half_thickness;
-    const float nearer = approach_of_pieces(edges, d) + 2.f * slack, reach = whole + nearer;
-    const int last = edges ? 1 : 0;
-    if (apart(x[0].x, x[last].x, x[1].x, x[2].x, x[3].x, edges) > reach ||
-        apart(x[0].y, x[last].y, x[1].y, x[2].y, x[3].y, edges) > reach ||
-        apart(x[0].z, x[last].z, x[1].z, x[2].z, x[3].z, edges) > reach)
-      return false;
-    const float distance = length(distance_of_pieces(edges, x).apart);
-    return distance <= reach && distance <= pieces.thickness(pair) + nearer;
-  }
-  /// Along one axis, from the piece of a0 and a1 to that of b0 (unless `edges`), b1 and b2.
-  static DRENCH_HD float apart(float a0, float a1, float b0, float b1, float b2, bool edges) {
-    const float low = minimum(a0, a1), high = maximum(a0, a1);
-    float below = minimum(b1, b2), above = maximum(b1, b2);
-    if (!edges) below = minimum(below, b0), above = maximum(above, b0);
-    return maximum(below - high, low - above);
+    const Vec3<float> x[4] = {a.x, b.x, c.x, d.x}, way[4] = {a.way, b.way, c.way, d.way};
+    const float nearer = approach_of_pieces(edges, way) + 2.f * slack,
+                distance = length(distance_of_pieces(edges, x).apart);
+    if (distance > a.half_thickness + d.half_thickness + nearer) return;
+    if (distance <= pieces.thickness(pair) + nearer) visit(pair);
   }
 };
 
@@ -129,18 +143,23 @@ PairSearch sort_boxes(State& state, float slack) {
   const Vec3<float> mean = to_float(sum * (1. / c.vertices));
   const VecView low = s.low.view(), high = s.high.view();
   const int *corner = c.corner.data(), *owned = s.owned.data();
-  const float* half_thickness = c.half_thickness.data();
+  const SheetVertex* of = s.vertex.data();
+  SheetPoint* point = s.point.data();
+  parallel_for(
+      state.queue, "self: points", c.vertices, DRENCH_LAMBDA(int i) {
+        point[i] = {x[i], to[i] - x[i], of[i].half_thickness, i};
+      });
   const BoxesSpan span = parallel_reduce(
       state.queue, "self: boxes", c.triangles, BoxesSpan{},
       DRENCH_LAMBDA(int t) {
         if (owned[t] < 0) return BoxesSpan{};
         Bounds box;
         for (int k = 0; k < 3; ++k) {
-          const int v = corner[3 * t + k];
-          box = JoinBounds{}(box, JoinBounds{}(bounds_of(x[v]), bounds_of(to[v] - mean)));
+          const SheetPoint p = point[corner[3 * t + k]];
+          box = JoinBounds{}(box, JoinBounds{}(bounds_of(p.x), bounds_of(p.x + (p.way - mean))));
         }
         // A thousandth more than enough, for what rounding takes.
-        const float more = 1.001f * (half_thickness[t] + slack) +
+        const float more = 1.001f * (point[corner[3 * t]].half_thickness + slack) +
                            1e-6f * (length(box.low) + length(box.high));
         const Vec3<float> room{more, more, more};
         box = {box.low - room, box.high + room};
@@ -168,12 +187,11 @@ PairSearch sort_boxes(State& state, float slack) {
           .order = order,
           .owned = owned,
           .corner = corner,
+          .point = point,
           .low = low,
           .high = high,
           .sorted_low = sorted_low,
           .sorted_high = sorted_high,
-          .position = x,
-          .to = to,
           .pieces = sheet_pieces_of(state),
           .half = 1.0001f * span.half,
           .slack = slack};
@@ -194,12 +212,18 @@ void load_self_contact(State& state, const ClothTopology& t) {
                  .sheet = t.sheet[k / 3]};
     if (t.meets_sheets[v]) s.thickness = std::max(s.thickness, 2 * t.half_thickness[k / 3]);
   }
+  double edges = 0;
+  for (size_t k = 0; k < t.corner.size(); ++k) {
+    const size_t next = k % 3 == 2 ? k - 2 : k + 1;
+    edges += length(vertex[size_t(t.corner[next])].rest - vertex[size_t(t.corner[k])].rest);
+  }
+  s.edge = float(edges / double(t.corner.size()));
   from_host(s.vertex, vertex), from_host(s.owned, owned_pieces(t));
   for (VecColumn* column : {&s.low, &s.high, &s.sorted_low, &s.sorted_high})
     column->resize(t.triangles());
   s.to.resize(state.cloth.padded), s.wanted.resize(state.cloth.padded), s.load.resize(state.cloth.padded);
   s.cell.resize(t.triangles()), s.count.resize(t.triangles()), s.first.resize(t.triangles());
-  s.portion.resize(state.cloth.padded);
+  s.portion.resize(state.cloth.padded), s.point.resize(state.cloth.padded);
 }
 
 void find_sheet_pairs(State& state, float slack) {
