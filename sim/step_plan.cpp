@@ -37,7 +37,7 @@ void settle_cloth_alone(State& state) {
   if (state.parameters.air_density > 0) wind_on_cloth(state);
   if (state.shell.any) linearise_shell(state);
   linearise_cloth(state);
-  if (state.self_contact.any) start_sheet_rows(state);
+  start_sheet_rows(state);
   settle_cloth(state);
   finish_cloth(state);
   finish_substep(state.cloth);
@@ -91,9 +91,7 @@ bool coupled_exactly(const Parameters& p, bool cloth) {
 }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_shells(const Parameters& p, bool cloth) { return strong(p, cloth) && p.shells; }
-bool strong_meeting(const Parameters& p, bool cloth) {
-  return strong(p, cloth) && p.self_contact;
-}
+bool strong_meeting(const Parameters& p, bool cloth) { return strong(p, cloth) && p.self_contact; }
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
 }

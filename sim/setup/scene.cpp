@@ -493,9 +493,9 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
   }
   // Images across seams are not looked for.
-  scene.parameters.self_contact =
-      std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
-      sheets_are_implicit(scene.parameters) && scene.cloth.corner_shift.size() == 0;
+  scene.parameters.self_contact = std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
+                                  sheets_are_implicit(scene.parameters) &&
+                                  scene.cloth.corner_shift.size() == 0;
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));

@@ -43,8 +43,8 @@ std::optional<SheetCrossing::Kind> meeting(const Piece& one, const Piece& other)
   for (size_t c = 0; c < 3; ++c) {
     const size_t d = (c + 1) % 3;
     if (other.has(one.vertex[c])) continue;
-    if (!other.has(one.vertex[d]) && cpu::segment_crosses(one.at[c], one.at[d], other.at[0],
-                                                          other.at[1], other.at[2]))
+    if (!other.has(one.vertex[d]) &&
+        cpu::segment_crosses(one.at[c], one.at[d], other.at[0], other.at[1], other.at[2]))
       return SheetCrossing::Kind::crosses;
     if (cpu::closest_point(one.at[c], other.at[0], other.at[1], other.at[2]).distance2 <
         least * least)
@@ -75,8 +75,8 @@ std::optional<SheetCrossing> find_sheet_crossing(const ClothTopology& cloth,
         if (back && (!kind || *back == SheetCrossing::Kind::crosses)) kind = back;
       }
       const auto [low, high] = std::minmax(a.index, b.index);
-      if (kind && (!first || low < first->triangle ||
-                   (low == first->triangle && high < first->other)))
+      if (kind &&
+          (!first || low < first->triangle || (low == first->triangle && high < first->other)))
         first = SheetCrossing{low, high, *kind};
     }
   }

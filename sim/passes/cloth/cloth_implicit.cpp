@@ -181,7 +181,8 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
           const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
           const double gripped =
               constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
-          const double met = matrix.contact.any && matrix.contact.touches_another(i, vertex) ? 1. : 0.;
+          const double met =
+              matrix.contact.any && matrix.contact.touches_another(i, vertex) ? 1. : 0.;
           return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
                                 3. - free.x - free.y - free.z + gripped + met};
         },
@@ -261,8 +262,8 @@ struct WallRevision {
   }
 };
 
-/// What holds the vertices by the solve that was made, kg m, into ClothSystem::residual. The springs
-/// of a vertex reach others, whose constraints must not change meanwhile.
+/// What holds the vertices by the solve that was made, kg m, into ClothSystem::residual. The
+/// springs of a vertex reach others, whose constraints must not change meanwhile.
 void find_reactions(State& state, const ConstVecView& given) {
   ClothSystem& s = state.cloth_system;
   const ClothMatrix matrix = cloth_matrix(state);
@@ -323,7 +324,7 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 }  // namespace
 
 void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
-                         float tolerance) {
+                     float tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();

@@ -214,8 +214,7 @@ struct HoldRevision {
 /// The solve of the sheets was made: on with friction and with other vertices held, until these are
 /// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
 /// momentum of a sheet that is held.
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
-                         float tolerance);
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

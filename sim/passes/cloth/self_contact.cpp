@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "sim/backend/sort.h"
 #include "sim/passes/cloth/cloth_implicit.h"
@@ -41,8 +39,8 @@ struct RowMaker {
     r.mass = 1.f / inverse;
     r.normal = at.apart * (1.f / distance);
     r.thickness = pieces.thickness(pair);
-    r.friction = pieces.vertex[pair.vertex[0]].root_friction *
-                 pieces.vertex[pair.vertex[3]].root_friction;
+    r.friction =
+        pieces.vertex[pair.vertex[0]].root_friction * pieces.vertex[pair.vertex[3]].root_friction;
     Vec3<float> way{0.f, 0.f, 0.f}, speed = way;
     for (int k = 0; k < 4; ++k) {
       way = way + path[pair.vertex[k]] * (dt * r.weight[k]);
@@ -271,9 +269,6 @@ bool revise_sheet_rows(State& state, int round) {
   const bool changed = parallel_reduce(
                            state.queue, "self: revise", s.rows, 0,
                            DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
-  if(getenv("DBG")){int act=0,grip=0,rub=0,rel=0,live=0;double viol=0,pull=0;for(int k=0;k<s.rows;++k){auto&r=row[k];live+=r.mass>0;act+=r.stiffness>0;grip+=r.grip>0;rub+=length(r.rub)>0;rel+=r.released>0;
-    Vec3<float> q{0,0,0};for(int c=0;c<4;++c)q=q+revise.change[r.vertex[c]]*r.weight[c];float gap=r.gap+dot(r.normal,q);if(r.mass>0){viol=std::max<double>(viol,(r.target-gap)/r.thickness);}}
-    printf("  round %d changed %d rows %d live %d active %d grip %d rub %d released %d  worst lack %.3f sweeps %d\n",round,int(changed),s.rows,live,act,grip,rub,rel,viol,state.cloth_system.control.data()->sweeps);}
   if (!changed) return false;
   ++s.rounds;
   load_by_rows(state, Sides::all);

@@ -1,5 +1,3 @@
-#include <cstdio>
-#include <cstdlib>
 #include "sim/backend/sort.h"
 #include "sim/passes/cloth/self_contact.h"
 
@@ -21,8 +19,8 @@ struct PairTest {
       x[c] = to_double(position[p.vertex[c]]);
       d[c] = to_double(next[p.vertex[c]]) - x[c];
     }
-    const float whole = pieces.vertex[p.vertex[0]].half_thickness +
-                        pieces.vertex[p.vertex[3]].half_thickness;
+    const float whole =
+        pieces.vertex[p.vertex[0]].half_thickness + pieces.vertex[p.vertex[3]].half_thickness;
     const double part = safe_part(pieces.edges(p), x, d, 0.01 * whole);
     stop[k] = part < 1 ? float(part) : 2.f;
     return part < 1;
@@ -152,22 +150,17 @@ void find_pairs_of_paths(State& state) {
 void guard_sheets(State& state) {
   if (!state.self_contact.any) return;
   constexpr int rounds_at_part = 8, rounds = 16;
-  auto&s_=state.self_contact;
   int round = 0;
   for (;; ++round) {
     // Who is stopped has others come at him that moved along with him.
-    if (!sheet_pairs_hold(state, state.cloth.next.view())) {if(getenv("DBG2"))printf("refind round %d\n",round);find_pairs_of_paths(state);}
+    if (!sheet_pairs_hold(state, state.cloth.next.view())) find_pairs_of_paths(state);
     if (count_unsafe(state) == 0) break;
-    if (getenv("DBG")&&round==0){int shown=0;for(int k=0;k<s_.pairs&&shown<12;++k){if(s_.stop.data()[k]>1)continue;++shown;auto&p=s_.pair.data()[k];Vec3<float>a[4],b[4];auto pc=sheet_pieces_of(state);pc.gather(p,state.cloth.position.view(),a);pc.gather(p,state.cloth.next.view(),b);auto da=distance_of_pieces(pc.edges(p),a),db=distance_of_pieces(pc.edges(p),b);
-      printf("   unsafe %s %d %d %d %d sheets %d %d  start %.4g end %.4g dot %.3f part %.3f w %.2f %.2f %.2f %.2f end w %.2f %.2f %.2f %.2f",pc.edges(p)?"EE":"VT",p.vertex[0],p.vertex[1],p.vertex[2],p.vertex[3],pc.vertex[p.vertex[0]].sheet,pc.vertex[p.vertex[3]].sheet,length(da.apart)*1e3,length(db.apart)*1e3,dot(da.apart,db.apart)/length(da.apart)/length(db.apart),s_.stop.data()[k],da.weight[0],da.weight[1],da.weight[2],da.weight[3],db.weight[0],db.weight[1],db.weight[2],db.weight[3]);
-      for(int q=0;q<s_.rows;++q){auto&r=s_.row.data()[q];if(r.vertex[0]==p.vertex[0]&&r.vertex[1]==p.vertex[1]&&r.vertex[2]==p.vertex[2]&&r.vertex[3]==p.vertex[3])printf(" row mass %g stiff %g rel %d gap %.3g",r.mass,r.stiffness,r.released,r.gap*1e3);}printf("\n");}}
     if (round == 0) keep_wanted_paths(state);
     stop_vertices(state, round < rounds_at_part ? Stop::at_part
                          : round < rounds       ? Stop::bounded
                                                 : Stop::at_start);
     if (round == rounds) break;
   }
-  if(round>0&&getenv("DBG")){int st=0;for(int v=0;v<state.cloth.vertices;++v)st+=state.self_contact.portion.data()[v]<1;printf("  guard rounds %d stopped %d pairs %d\n",round,st,state.self_contact.pairs);}
   if (round > 0) give_stopped_velocities(state);
 }
 

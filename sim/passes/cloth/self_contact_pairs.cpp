@@ -87,7 +87,7 @@ struct PairSearch {
       for (int e = 0; e < 3; ++e) {
         const SheetPoint &b0 = b[e], &b1 = b[e == 2 ? 0 : e + 1];
         if (!(owned[u] & 8 << e) || is(a0, b0) || is(a0, b1) || is(a1, b0) || is(a1, b1)) continue;
-        if (!apart(side, box(b0, b1), reach)) take(a0, a1, b0, b1, -1, visit);
+        if (!apart(side, box(b0, b1), reach)) take(a0, a1, b0, b1, -1, reach, visit);
       }
     }
   }
@@ -97,7 +97,7 @@ struct PairSearch {
                             const Bounds& all, float reach, const Visit& visit) const {
     for (int c = 0; c < 3; ++c) {
       if (!(owned[t] & 1 << c) || is(a[c], b[0]) || is(a[c], b[1]) || is(a[c], b[2])) continue;
-      if (!apart(bounds_of(a[c].x), all, reach)) take(a[c], b[0], b[1], b[2], u, visit);
+      if (!apart(bounds_of(a[c].x), all, reach)) take(a[c], b[0], b[1], b[2], u, reach, visit);
     }
   }
   static DRENCH_HD bool is(const SheetPoint& a, const SheetPoint& b) {
@@ -107,9 +107,8 @@ struct PairSearch {
     return JoinBounds{}(bounds_of(a.x), bounds_of(b.x));
   }
   static DRENCH_HD bool apart(const Bounds& a, const Bounds& b, float reach) {
-    return a.low.x > b.high.x + reach || b.low.x > a.high.x + reach ||
-           a.low.y > b.high.y + reach || b.low.y > a.high.y + reach ||
-           a.low.z > b.high.z + reach || b.low.z > a.high.z + reach;
+    return a.low.x > b.high.x + reach || b.low.x > a.high.x + reach || a.low.y > b.high.y + reach ||
+           b.low.y > a.high.y + reach || a.low.z > b.high.z + reach || b.low.z > a.high.z + reach;
   }
   /// How far apart pieces of two triangles may be at the start and meet all the same, m.
   DRENCH_HD float reach_of(const SheetPoint (&a)[3], const SheetPoint (&b)[3]) const {
@@ -119,12 +118,24 @@ struct PairSearch {
       off2 = maximum(off2, maximum(length2(a[k].way - common), length2(b[k].way - common)));
     return a[0].half_thickness + b[0].half_thickness + 2.f * (square_root(off2) + slack);
   }
+  /// Whether a plane across the line of their middles stands between two pieces with room to spare:
+  /// what most neighbours in a sheet need no distance for.
+  static DRENCH_HD bool apart_along_middles(bool edges, const Vec3<float> (&x)[4], float reach) {
+    const Vec3<float> first = edges ? (x[0] + x[1]) * 0.5f : x[0],
+                      second = edges ? (x[2] + x[3]) * 0.5f : (x[1] + x[2] + x[3]) * (1.f / 3.f),
+                      axis = first - second;
+    const float p0 = dot(axis, x[0]), p1 = dot(axis, x[1]), p2 = dot(axis, x[2]),
+                p3 = dot(axis, x[3]), far = maximum(p2, p3);
+    const float room = edges ? minimum(p0, p1) - far : p0 - maximum(p1, far);
+    return room > 0.f && room * room > reach * reach * length2(axis);
+  }
   template <class Visit>
   DRENCH_HD void take(const SheetPoint& a, const SheetPoint& b, const SheetPoint& c,
-                      const SheetPoint& d, int triangle, const Visit& visit) const {
+                      const SheetPoint& d, int triangle, float reach, const Visit& visit) const {
     const SheetPair pair{{a.vertex, b.vertex, c.vertex, d.vertex}, triangle};
     const bool edges = pieces.edges(pair);
     const Vec3<float> x[4] = {a.x, b.x, c.x, d.x}, way[4] = {a.way, b.way, c.way, d.way};
+    if (apart_along_middles(edges, x, reach)) return;
     const float nearer = approach_of_pieces(edges, way) + 2.f * slack,
                 distance = length(distance_of_pieces(edges, x).apart);
     if (distance > a.half_thickness + d.half_thickness + nearer) return;
@@ -221,7 +232,8 @@ void load_self_contact(State& state, const ClothTopology& t) {
   from_host(s.vertex, vertex), from_host(s.owned, owned_pieces(t));
   for (VecColumn* column : {&s.low, &s.high, &s.sorted_low, &s.sorted_high})
     column->resize(t.triangles());
-  s.to.resize(state.cloth.padded), s.wanted.resize(state.cloth.padded), s.load.resize(state.cloth.padded);
+  s.to.resize(state.cloth.padded), s.wanted.resize(state.cloth.padded),
+      s.load.resize(state.cloth.padded);
   s.cell.resize(t.triangles()), s.count.resize(t.triangles()), s.first.resize(t.triangles());
   s.portion.resize(state.cloth.padded), s.point.resize(state.cloth.padded);
 }
