@@ -48,8 +48,10 @@ struct RowMaker {
     }
     r.gap = distance + dot(r.normal, way);
     r.slip = off_normal(way, r.normal), r.speed = off_normal(speed, r.normal);
-    // What starts too near comes apart by a quarter of the thickness a step.
-    r.target = minimum(r.thickness, distance + 0.25f * r.thickness);
+    // What starts too near comes apart no faster than it would fall through its thickness: a step
+    // that is shorter is to throw it no faster.
+    const float apart = dt * maximum(square_root(gravity * r.thickness), 20.f * r.thickness);
+    r.target = minimum(r.thickness, distance + minimum(apart, 0.25f * r.thickness));
     if (r.gap > r.target + gravity * dt * dt) return r;
     r.stiffness = row_stiffness * r.mass;
     if (length(r.speed) < r.friction * gravity * dt) r.grip = row_grip * r.mass;
