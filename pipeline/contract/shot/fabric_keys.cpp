@@ -27,6 +27,7 @@ constexpr Constant constants[] = {
     {"bend_bias", &Cloth::bend_bias, &Fabric::bend_bias},
     {"stretch_limit", &Cloth::stretch_limit, &Fabric::stretch_limit},
     {"damping_time", &Cloth::damping_time, &Fabric::damping_time},
+    {"friction", &Cloth::friction, &Fabric::friction},
 };
 
 constexpr const char* spring_keys[] = {"adjacent_stiffness", "diagonal_stiffness", "spring_damping",
