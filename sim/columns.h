@@ -251,6 +251,7 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.acceleration", "m/s^2", Group::shell_history, vertices, kept}, s.acceleration,
         &H::shell_acceleration);
   visit({"internal", "N", Group::shell_history, vertices, kept}, s.internal, &H::shell_internal);
+  visit({"rise", "N", Group::shell_history, vertices, kept}, s.rise, &H::shell_rise);
   visit({"area", "m^2", Group::cloth_fixed}, s.area, none);
   visit({"shell.gradient", "1/m", Group::cloth_fixed}, s.gradient, none);
   visit({"shell.corner", "1", Group::cloth_fixed}, s.corner, none);

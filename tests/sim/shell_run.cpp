@@ -82,7 +82,7 @@ damping_time = {}
   for (size_t v = 0; v < surface.held.size(); ++v)
     if (surface.held[v]) pins += fmt::format("{}{}", pins.empty() ? "" : ", ", v);
   if (!pins.empty()) text += "[[cloth.pin]]\nvertices = [" + pins + "]\n";
-  return text + sheet.more;
+  return text;
 }
 
 ShellRun::ShellRun(const ShellSheet& sheet)

@@ -27,7 +27,7 @@ void load_triangles(State& state, const ClothTopology& cloth) {
   }
   from_host(s.area, area), from_host(s.gradient, gradient), from_host(s.law, law);
   from_host(s.corner, corner), from_host(s.sheet, sheet);
-  s.element.resize(size_t(42) * padded);
+  s.element.resize(size_t(36) * padded);
   if (!state.cloth.joined) return;
   std::vector<float> shift[3];
   const std::vector<float>* from[3] = {&cloth.corner_shift.x, &cloth.corner_shift.y,
@@ -114,7 +114,7 @@ void load_curvature(State& state, const ClothTopology& cloth) {
   from_host(s.curved_start, t.curved_start), from_host(s.curved_node, t.curved_node);
   from_host(s.curved_pull, t.curved_pull), from_host(s.curved_of_pull, pull);
   from_host(s.curved_of_start, start), from_host(s.curved_of, of);
-  s.normal.resize(size_t(2) * s.triangles), s.turning.resize(size_t(2) * s.triangles);
+  s.normal.resize(cloth.triangles()), s.turning.resize(cloth.triangles());
   if (!state.cloth.joined) return;
   from_host(s.curved_shift.x, t.curved_shift_x), from_host(s.curved_shift.y, t.curved_shift_y),
       from_host(s.curved_shift.z, t.curved_shift_z);
@@ -137,8 +137,8 @@ void load_shell(State& state, const ClothTopology& cloth) {
   load_curvature(state, cloth);
   const size_t entries = size_t(8) * s.ring_slots, padded = state.cloth.padded;
   s.block.resize(9 * entries), s.tension.resize(entries), s.diagonal.resize(6 * padded);
-  for (VecColumn* v :
-       {&s.path, &s.base, &s.force, &s.landed, &s.rounding, &s.left, &s.acceleration, &s.internal})
+  for (VecColumn* v : {&s.path, &s.base, &s.force, &s.landed, &s.rounding, &s.left, &s.acceleration,
+                       &s.internal, &s.rise})
     v->resize(padded);
   if (!state.cloth.joined) return;
   for (auto [column, host] : {std::pair(&s.push.x, &t.push_x), std::pair(&s.push.y, &t.push_y),

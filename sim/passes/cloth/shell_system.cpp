@@ -9,34 +9,26 @@ namespace drench::sim::DRENCH_BACKEND {
 namespace {
 
 /// Fields of a triangle: -dt^2 times the blocks of corners 0 1, 0 2 and 1 2 by rows, the forces on
-/// corners 1 and 2 where straight paths end and where the step starts, and tensions of the sides
-/// 0 1, 0 2, 1 2.
-enum ElementFields { blocks = 0, forces = 27, start_forces = 33, tensions = 39 };
+/// corners 1 and 2 where straight paths end, and tensions of the sides 0 1, 0 2, 1 2.
+enum ElementFields { blocks = 0, forces = 27, tensions = 33 };
 
-/// What places the corners of triangles, where the step starts: positions with what they round off;
-/// or so much later on straight paths.
+/// What places the corners of triangles: positions with what they round off, and straight paths.
 struct ShellCorners {
   ConstVecView position, rounding, path, edge_shift;
   const int* corner;
-  int stride;   // from one corner to the next, of triangles
-  float later;  // s
+  int stride;  // from one corner to the next, of triangles
+  float dt;    // s
   bool joined;
 
   template <class Index>
   DRENCH_HD auto vertex(Index t, int c) const {
     return load(corner + c * stride, t);
   }
-  /// From one vertex to another, but for the shifts of seams.
-  template <class Index>
-  DRENCH_HD auto between(Index from, Index to) const {
-    const auto way = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from)),
-               d = path.at(to) - path.at(from);
-    return way + d * decltype(d.x)(later);
-  }
-  /// From corner 0 to corner c.
+  /// From corner 0 to corner c, at the start.
   template <class Index>
   DRENCH_HD auto edge(Index t, int c) const {
-    auto e = between(vertex(t, 0), vertex(t, c));
+    const auto from = vertex(t, 0), to = vertex(t, c);
+    auto e = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from));
     if (joined) e = e + edge_shift.at(t + (c - 1) * stride);
     return e;
   }
@@ -45,10 +37,24 @@ struct ShellCorners {
   DRENCH_HD auto opening(Index t, int c) const {
     return path.at(vertex(t, c)) - path.at(vertex(t, 0));
   }
+  /// From one vertex to another where paths end, but for the shifts of seams.
+  DRENCH_HD Vec3<float> between_ends(int from, int to) const {
+    return (position[to] - position[from]) + (rounding[to] - rounding[from]) +
+           (path[to] - path[from]) * dt;
+  }
+  DRENCH_HD Vec3<float> edge_at_end(int t, int c) const { return edge(t, c) + opening(t, c) * dt; }
 };
 
+/// How far on its path a triangle is linearised. Where it turns by more than a tenth in a step the
+/// path stretches it by what the step then takes back, and a limp sheet would boil by what is left.
+template <class T>
+DRENCH_HD T followed_part(const SurfaceGradient<T>& rate, float dt) {
+  const T turn = (length2(rate.warp) + length2(rate.weft)) * T(100.f * dt * dt);
+  return T(1.f) / (T(1.f) + turn * turn);
+}
+
 struct ShellElements {
-  ShellCorners corners;  // at the start
+  ShellCorners corners;
   const float *area, *gradient, *law;
   const int* sheet;
   float* element;
@@ -83,13 +89,15 @@ struct ShellElements {
     const auto later = [&](T time) {
       return SurfaceGradient<T>{start.warp + rate.warp * time, start.weft + rate.weft * time};
     };
-    const SurfaceGradient<T> f = later(T(dt));
-    // Strain is quadratic in time: its mean rate is that halfway.
-    const auto response =
-        of.at(green_strain(f), green_strain_rate(later(T(0.5f * dt)), rate), T(dt));
+    const T part = followed_part(rate, dt), left = (T(1.f) - part) * T(dt);
+    const SurfaceGradient<T> f = later(part * T(dt)), ahead{rate.warp * left, rate.weft * left};
+    // Strain is quadratic along the path: its mean rate is that halfway.
+    auto response =
+        of.at(green_strain(f), green_strain_rate(later(part * T(0.5f * dt)), rate) * part, T(dt));
+    response.stress = response.stress + response.moduli.times(green_strain_rate(f, ahead));
+    // Not of f: the stretch by the path is taken back.
     const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)},
-        before = of.at(green_strain(start), still, T(dt)).stress;
-    const Symmetric2<T> pull = positive_part(response.stress);
+        pull = positive_part(of.at(green_strain(start), still, T(dt)).stress);
     const T scale(-dt * dt);
     for (int pair = 0; pair < 3; ++pair) {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
@@ -100,12 +108,11 @@ struct ShellElements {
         put(blocks + 9 * pair + 3 * r + 2, row[r].z);
       }
     }
-    const auto put_force = [&](int field, const Vec3<T>& force) {
-      put(field, force.x), put(field + 1, force.y), put(field + 2, force.z);
-    };
     for (int c = 1; c < 3; ++c) {
-      put_force(forces + 3 * c - 3, membrane_force(rest, f, response.stress, c));
-      put_force(start_forces + 3 * c - 3, membrane_force(rest, start, before, c));
+      const Vec3<T> force =
+          membrane_force(rest, f, response.stress, c) + membrane_force(rest, ahead, pull, c);
+      put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
+      put(forces + 3 * c - 1, force.z);
     }
     put_tensions(rest, pull, put);
   }
@@ -164,28 +171,28 @@ struct RestCurvature {
   const float *pull, *of_pull;
   ConstVecView shift;
   VecView normal, turning;
-  int at;  // in these two, of triangle 0
   bool any;
 
   DRENCH_HD void prepare(int t) const {
     if (start[t] == start[t + 1]) return;
     const int first = corners.vertex(t, 0);
     Vec3<float> q{0.f, 0.f, 0.f};
-    for (int e = start[t]; e < start[t + 1]; ++e) q = q + corners.between(first, node[e]) * pull[e];
+    for (int e = start[t]; e < start[t + 1]; ++e)
+      q = q + corners.between_ends(first, node[e]) * pull[e];
     if (corners.joined) q = q + shift[t];
-    normal.set(at + t, turning_normal(t).normal), turning.set(at + t, q);
+    normal.set(t, turning_normal(t).normal), turning.set(t, q);
   }
   DRENCH_HD TurningNormal<float> turning_normal(int t) const {
-    return {{0.f, 0.f, 0.f}, corners.edge(t, 1), corners.edge(t, 2), area[t]};
+    return {{0.f, 0.f, 0.f}, corners.edge_at_end(t, 1), corners.edge_at_end(t, 2), area[t]};
   }
   DRENCH_HD Vec3<float> force_on_node(int v) const {
     Vec3<float> sum{0.f, 0.f, 0.f};
-    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[at + of[e]] * of_pull[e];
+    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[of[e]] * of_pull[e];
     return sum;
   }
   DRENCH_HD Vec3<float> force_on_corner(int t, int c) const {
     if (start[t] == start[t + 1]) return {0.f, 0.f, 0.f};
-    return turning_normal(t).derivative(c, turning[at + t]);
+    return turning_normal(t).derivative(c, turning[t]);
   }
 };
 
@@ -202,23 +209,14 @@ RestCurvature rest_curvature_of(State& state, const ShellCorners& corners) {
           .shift = s.curved_shift.view(),
           .normal = s.normal.view(),
           .turning = s.turning.view(),
-          .at = corners.later > 0.f ? s.triangles : 0,
           .any = s.curved};
 }
 
-/// On a vertex, N: at the start of the step, and where straight paths end.
-struct ShellForces {
-  Vec3<float> start, end;
-  friend DRENCH_HD ShellForces operator+(const ShellForces& a, const ShellForces& b) {
-    return {a.start + b.start, a.end + b.end};
-  }
-};
-
 /// Gathers what triangles give to a vertex.
 struct ShellVertices {
-  RestCurvature rest, rest_at_end;
+  RestCurvature rest;
   ShellMatrix matrix;
-  ConstVecView position, rounding, path, push, internal;
+  ConstVecView push, rise;
   const int *fan_start, *fan_entry, *fan_slot;
   const float* element;
   int triangles, vertices;
@@ -238,42 +236,37 @@ struct ShellVertices {
             field(blocks + 9 * pair + (a < b ? 3 * r + c : 3 * c + r), t);
     tension[at] += field(tensions + pair, t);
   }
-  DRENCH_HD Vec3<float> force_on(int first, int t, int c) const {
+  DRENCH_HD Vec3<float> force_on(int t, int c) const {
     const auto on = [&](int k) {
-      return Vec3<float>{field(first + 3 * k, t), field(first + 3 * k + 1, t),
-                         field(first + 3 * k + 2, t)};
+      return Vec3<float>{field(forces + 3 * k, t), field(forces + 3 * k + 1, t),
+                         field(forces + 3 * k + 2, t)};
     };
     return c > 0 ? on(c - 1) : -(on(0) + on(1));
   }
-  DRENCH_HD ShellForces forces_on(int t, int c) const {
-    const ShellForces f{force_on(start_forces, t, c), force_on(forces, t, c)};
-    if (!rest.any) return f;
-    return f + ShellForces{rest.force_on_corner(t, c), rest_at_end.force_on_corner(t, c)};
-  }
 
   /// Blocks of the row, and the triangles' forces.
-  DRENCH_HD ShellForces gather(int i) const {
+  DRENCH_HD Vec3<float> gather(int i) const {
     const int slice = ShellRows::slice(i);
     for (int s = matrix.rows.ring_start[slice]; s < matrix.rows.ring_start[slice + 1]; ++s) {
       const int at = ShellRows::entry(s, i);
       for (int k = 0; k < 9; ++k) block[k * matrix.stride + at] = 0.f;
       tension[at] = 0.f;
     }
-    ShellForces sum{{0.f, 0.f, 0.f}, {0.f, 0.f, 0.f}};
+    Vec3<float> sum{0.f, 0.f, 0.f};
     if (i >= vertices) return sum;
     for (int e = fan_start[i]; e < fan_start[i + 1]; ++e) {
       const int t = fan_entry[e] / 3, c = fan_entry[e] % 3;
       if (fan_slot[2 * e] < 0) continue;
       add_block(t, c, (c + 1) % 3, ShellRows::entry(fan_slot[2 * e], i));
       add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
-      sum = sum + forces_on(t, c);
+      sum = sum + force_on(t, c);
+      if (rest.any) sum = sum + rest.force_on_corner(t, c);
     }
-    if (!rest.any) return sum;
-    return sum + ShellForces{rest.force_on_node(i), rest_at_end.force_on_node(i)};
+    return rest.any ? sum + rest.force_on_node(i) : sum;
   }
 
   DRENCH_HD void operator()(int i) const {
-    ShellForces sum = gather(i);
+    Vec3<float> sum = gather(i);
     float d[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
     const ShellRows& rows = matrix.rows;
     const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
@@ -283,8 +276,7 @@ struct ShellVertices {
     for (int slot = first; slot < last; ++slot) {
       const int at = ShellRows::entry(slot, i), j = rows.end[at];
       const float b = matrix.bend[at];
-      const Vec3<float> away = (position[j] - position[i]) + (rounding[j] - rounding[i]);
-      sum = sum + ShellForces{away * b, (away + (path[j] - path[i]) * dt) * b};
+      sum = sum + rest.corners.between_ends(i, j) * b;
       stiff += b * matrix.dt2;
       if (slot >= inner) continue;
       const int to = ShellRows::entry(ring + slot - first, i), stride = matrix.stride;
@@ -295,11 +287,11 @@ struct ShellVertices {
       d[1] += 0.5f * (entry(1) + entry(3)), d[2] += 0.5f * (entry(2) + entry(6)),
           d[4] += 0.5f * (entry(5) + entry(7));
     }
-    if (joined && i < vertices) sum = sum + ShellForces{push[i], push[i]};
+    if (joined && i < vertices) sum = sum + push[i];
     d[0] += stiff, d[3] += stiff, d[5] += stiff;
     for (int k = 0; k < 6; ++k) diagonal[k * 8 * ((vertices + 7) / 8) + i] = d[k];
-    force.set(i, sum.start);
-    base.set(i, (sum.end - (sum.start - internal[i]) * history) * (dt * dt));
+    force.set(i, sum);
+    base.set(i, (sum - rise[i] * history) * (dt * dt));
   }
 };
 
@@ -315,7 +307,7 @@ void linearise_shell(State& state) {
                              .edge_shift = s.edge_shift.view(),
                              .corner = s.corner.data(),
                              .stride = s.triangles,
-                             .later = 0.f,
+                             .dt = float(state.dt),
                              .joined = c.joined};
   const ShellElements elements{.corners = corners,
                                .area = s.area.data(),
@@ -327,23 +319,16 @@ void linearise_shell(State& state) {
                                .dt = float(state.dt)};
   for_each_lane(
       state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
-  ShellCorners at_end = corners;
-  at_end.later = float(state.dt);
-  const RestCurvature rest = rest_curvature_of(state, corners),
-                      rest_at_end = rest_curvature_of(state, at_end);
+  const RestCurvature rest = rest_curvature_of(state, corners);
   if (rest.any)
     parallel_for(
         state.queue, "shell: rest curvature", c.triangles,
-        DRENCH_LAMBDA(int t) { rest.prepare(t), rest_at_end.prepare(t); });
+        DRENCH_LAMBDA(int t) { rest.prepare(t); });
   const ShellVertices vertices{
       .rest = rest,
-      .rest_at_end = rest_at_end,
       .matrix = shell_matrix_of(state),
-      .position = c.position.view(),
-      .rounding = s.rounding.view(),
-      .path = s.path.view(),
       .push = s.push.view(),
-      .internal = s.internal.view(),
+      .rise = s.rise.view(),
       .fan_start = c.fan_start.data(),
       .fan_entry = c.fan_entry.data(),
       .fan_slot = s.fan_slot.data(),
@@ -367,17 +352,27 @@ void keep_shell_step(State& state) {
   const ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
                      next_velocity = c.next_velocity.view(), path = s.path.view(),
-                     change = state.cloth_system.change.view(), force = s.force.view();
+                     change = state.cloth_system.change.view();
   const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
-                acceleration = s.acceleration.view(), internal = s.internal.view();
+                acceleration = s.acceleration.view(), internal = s.internal.view(),
+                rise = s.rise.view(), force = s.force.view();
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
   const ConstVecView free = state.cloth_system.free.view(),
                      normal = state.cloth_system.normal.view();
   const bool obstacles = state.parameters.obstacles > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
+  const ShellMatrix matrix = shell_matrix_of(state);
+  for_each_lane(
+      state.queue, "shell: forces at the end", c.vertices, DRENCH_LAMBDA(auto i) {
+        const auto pull = matrix.times(change, i);
+        force.put(i, force.at(i) - pull * decltype(pull.x)(inverse_dt * inverse_dt));
+      });
+  const bool again = s.dt > 0;  // there is a step before to rise from
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
-        landed.set(i, next[i]), left.set(i, next_velocity[i]), internal.set(i, force[i]);
+        landed.set(i, next[i]), left.set(i, next_velocity[i]);
+        rise.set(i, again ? force[i] - internal[i] : Vec3<float>{0.f, 0.f, 0.f});
+        internal.set(i, force[i]);
         const bool shell = fan_slot[2 * fan_start[i]] >= 0,
                    held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
                           (obstacles && length2(normal[i]) > 0.f);
