@@ -251,7 +251,6 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.acceleration", "m/s^2", Group::shell_history, vertices, kept}, s.acceleration,
         &H::shell_acceleration);
   visit({"internal", "N", Group::shell_history, vertices, kept}, s.internal, &H::shell_internal);
-  visit({"rise", "N", Group::shell_history, vertices, kept}, s.rise, &H::shell_rise);
   visit({"area", "m^2", Group::cloth_fixed}, s.area, none);
   visit({"shell.gradient", "1/m", Group::cloth_fixed}, s.gradient, none);
   visit({"shell.corner", "1", Group::cloth_fixed}, s.corner, none);
@@ -280,7 +279,6 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.tension", "kg", Group::shell_system}, s.tension, none);
   visit({"diagonal", "kg", Group::shell_system}, s.diagonal, none);
   visit({"shell.base", "kg m", Group::shell_system}, s.base, none);
-  visit({"shell.force", "N", Group::shell_system}, s.force, none);
 }
 
 template <class Solids, class Visit>

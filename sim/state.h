@@ -153,8 +153,7 @@ struct ShellState {
   VecColumn rounding;  // m, what that place lacks
   VecColumn left;      // m/s, the velocity that it was left with
   VecColumn acceleration;  // m/s^2, over that step
-  VecColumn internal;      // N, of the sheet on the vertex at the end of it, as its solve had it
-  VecColumn rise;          // N, by which that exceeds the one of the step before
+  VecColumn internal;      // N, of the sheet on the vertex, as it acted over that step
   double dt = 0;           // s, of it; 0: there is none
   // fixed; triangles by fields of `triangles`, padded to a multiple of eight
   int triangles = 0;
@@ -178,13 +177,13 @@ struct ShellState {
   VecColumn curved_shift;                     // J
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
-  Column<float> element;      // 36 fields of `triangles`: ElementFields
+  Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix
   Column<float> diagonal;     // kg, 6 fields of vertices: xx xy xz yy yz zz
-  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x
+  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x; two
+                              // fields of `triangles`: at the start, where straight paths end
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
-  VecColumn force;            // N, of the sheet where straight paths end; then as `internal`
 };
 
 /// Contacts sorted by triangle.

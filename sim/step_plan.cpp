@@ -175,7 +175,7 @@ const Pass all_passes[] = {
     {"move_with_sheets", strong,
      moving | near_list | sheets | start | drift | cloth_system | shell_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
-         sorting | cloth_load | stopped | shell_history | shell_system,
+         sorting | cloth_load | stopped | shell_history,
      move_with_sheets},
     {"move_coupled", coupled_exactly, moving | near_list | sheets,
      moving | cloth | cloth_substep | near_cloth | memory | path | start | cloth_air | contact |

@@ -126,6 +126,8 @@ TEST_F(ShotDigest, ChangesForExactlyTheStagesOfEachRow) {
     everything.sink.emplace_back().shape.type = type;
   }
   everything.material.emplace_back().type = MaterialType::metal;
+  everything.cloth.emplace_back().model = ClothModel::shell;
+  everything.cloth.emplace_back().model = ClothModel::springs;
   size_t seen = 0;
   for (const Parameter& p : shot_table::parameters()) {
     if (p.field == nullptr) continue;

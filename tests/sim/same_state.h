@@ -35,7 +35,6 @@ inline void expect_same_state(const sim::HostState& a, const sim::HostState& b) 
   expect_same_vectors(a.shell_left, b.shell_left);
   expect_same_vectors(a.shell_acceleration, b.shell_acceleration);
   expect_same_vectors(a.shell_internal, b.shell_internal);
-  expect_same_vectors(a.shell_rise, b.shell_rise);
   EXPECT_EQ(a.shell_dt, b.shell_dt);
 }
 

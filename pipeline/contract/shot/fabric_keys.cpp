@@ -29,13 +29,44 @@ constexpr Constant constants[] = {
     {"damping_time", &Cloth::damping_time, &Fabric::damping_time},
 };
 
+constexpr const char* spring_keys[] = {"adjacent_stiffness", "diagonal_stiffness", "spring_damping",
+                                       "retardation_time"};
+constexpr const char* shell_keys[] = {"fabric",        "young_warp",  "young_weft", "shear_modulus",
+                                      "poisson",       "bend_warp",   "bend_weft",  "bend_bias",
+                                      "stretch_limit", "damping_time"};
+
+/// The first of these keys that the shot gives, or null.
+template <size_t N>
+const char* first_given(const char* const (&keys)[N], const ShotSources& sources,
+                        const std::string& path) {
+  for (const char* key : keys)
+    if (sources.where.contains(path + key)) return key;
+  return nullptr;
+}
+
+/// @throws Error where keys of both models are given.
+ClothModel model_of(const Shot& shot, const ShotSources& sources, const std::string& path) {
+  const char* const spring = first_given(spring_keys, sources, path);
+  const char* const shell = first_given(shell_keys, sources, path);
+  if (spring != nullptr && shell != nullptr) {
+    throw Error(
+        fmt::format("{0}: {1}{2} is of a shell, but {1}{3} of a net of springs. Remove one, "
+                    "or say which with {1}model",
+                    sources.at(path + shell), path, shell, spring));
+  }
+  if (shell != nullptr) return ClothModel::shell;
+  const bool is_explicit = shot.fluid.present() && !is_incompressible(shot);
+  return spring != nullptr || is_explicit ? ClothModel::springs : ClothModel::shell;
+}
+
 }  // namespace
 
 void take_fabrics(Shot& shot, const ShotSources& sources) {
   for (size_t i = 0; i < shot.cloth.size(); ++i) {
     Cloth& cloth = shot.cloth[i];
-    if (cloth.model != ClothModel::shell) continue;
     const std::string path = fmt::format("cloth[{}].", i);
+    if (cloth.model == ClothModel::automatic) cloth.model = model_of(shot, sources, path);
+    if (cloth.model != ClothModel::shell) continue;
     const Fabric* const fabric = find_fabric(cloth.fabric);
     if (fabric == nullptr) {
       std::string names;

@@ -151,11 +151,13 @@ struct ClothPin {  // vertices held where they start; exactly one of the two for
   std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
 };
 
-enum class ClothModel { springs, shell };
+/// automatic, which a file's shots have resolved: springs where the file gives a constant of
+/// springs or the fluid is weakly compressible, else a shell.
+enum class ClothModel { automatic, springs, shell };
 
 struct Cloth {
   std::string name = "cloth";
-  ClothModel model = ClothModel::springs;
+  ClothModel model = ClothModel::automatic;
   // A grid (mesh_file empty): corner + i/nu u + j/nv v, with both diagonals as springs.
   V3d corner{-0.5, 1, -0.5}, u{1, 0, 0}, v{0, 0, 1};  // m
   V2i cells{64, 64};

@@ -385,7 +385,7 @@ class Checker : CheckBase {
                        "fluid.solver = \"incompressible\", or model = \"springs\"",
                        path));
     }
-    if (cloth.model == ClothModel::springs &&
+    if (cloth.model != ClothModel::shell &&
         !(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
       fail(
           path + ".adjacent_stiffness",

@@ -46,56 +46,59 @@ std::vector<Parameter> cloth_rows() {
                                  "mass of an area; of a shell that gives none its fabric's"),
       row<&Cloth::adjacent_stiffness>("cloth", "adjacent_stiffness", "N/m", {0, 1e9}, simulate,
                                       "two-dimensional modulus of the springs along edges")
-          .only(ClothModel::springs),
+          .only(ClothModel::automatic, ClothModel::springs),
       row<&Cloth::diagonal_stiffness>(
           "cloth", "diagonal_stiffness", "N/m", {0, 1e9}, simulate,
           "of the springs along both diagonals; half of adjacent_stiffness is isotropic")
-          .only(ClothModel::springs),
+          .only(ClothModel::automatic, ClothModel::springs),
       row<&Cloth::damping>("cloth", "damping", "1/s", {0, 1e4}, simulate,
                            "rate at which velocity is lost"),
       row<&Cloth::spring_damping>("cloth", "spring_damping", "", {0, 1}, simulate,
                                   "along each spring, fraction of critical; keeps momentum")
-          .only(ClothModel::springs),
+          .only(ClothModel::automatic, ClothModel::springs),
       row<&Cloth::retardation_time>("cloth", "retardation_time", "s", {0, 1}, simulate,
                                     "inner friction, viscosity over stiffness of every spring: a "
                                     "swing of period T loses 1 - exp(-2 pi^2 t / T) of its height "
                                     "with this t; cotton about 0.005. Beside incompressible fluid "
                                     "only")
-          .only(ClothModel::springs),
+          .only(ClothModel::automatic, ClothModel::springs),
       row<&Cloth::thickness>("cloth", "thickness", "m", {1e-6, 1}, simulate,
                              "thickness; of a shell that gives none its fabric's"),
       row<&Cloth::model>("cloth", "model", "", none, simulate,
-                         "springs: a net of springs without bending, as published. shell: a "
-                         "continuous sheet with the constants of a fabric"),
+                         "shell: a continuous sheet with the constants of a fabric. springs: a net "
+                         "of springs without bending, as published. automatic: springs where any "
+                         "of their constants is given or the fluid is weakly compressible, else "
+                         "a shell")
+          .identity(),
       row<&Cloth::fabric>("cloth", "fabric", "", none, simulate,
                           "a name that `drench fabrics` lists: the constants that are not given")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::young_warp>("cloth", "young_warp", "N/m", {1e-3, 1e8}, simulate,
                               "Young's modulus times thickness along warp: along u of a grid, "
                               "along the first texture coordinate of a mesh")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::young_weft>("cloth", "young_weft", "N/m", {1e-3, 1e8}, simulate, "along weft")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::shear_modulus>("cloth", "shear_modulus", "N/m", {1e-3, 1e8}, simulate,
                                  "shear modulus times thickness")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::poisson>("cloth", "poisson", "", {-0.99, 0.99}, simulate,
                            "geometric mean of the two Poisson ratios, in its plane and in bending")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::bend_warp>("cloth", "bend_warp", "N m", {0, 1e4}, simulate,
                              "rigidity: moment per width over curvature, bent along warp")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::bend_weft>("cloth", "bend_weft", "N m", {0, 1e4}, simulate, "bent along weft")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::bend_bias>("cloth", "bend_bias", "N m", {0, 1e4}, simulate,
                              "bent along the diagonal between them")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::stretch_limit>("cloth", "stretch_limit", "", {1.0001, 100}, simulate,
                                  "length over rest length beyond which it stiffens, softly")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::damping_time>("cloth", "damping_time", "s", {0, 10}, simulate,
                                 "inner friction in its plane, viscosity over stiffness")
-          .only(ClothModel::shell),
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "
                         "with the sheet, which it drags along). automatic is as that of "

@@ -227,7 +227,11 @@ Shot one_of_everything(const std::string& name) {
   sheet.pin.resize(2);
   sheet.pin[0].vertices = {0, 64};
   sheet.pin[1].box = {V3d(-0.5, 0.9, 0.4), V3d(0.5, 1.1, 0.6)};
-  shot.cloth.push_back(sheet);
+  for (const ClothModel model : {ClothModel::shell, ClothModel::springs}) {
+    sheet.model = model;
+    shot.cloth.push_back(sheet);
+    sheet.name = "cloth2";
+  }
   for (const ProbeType type :
        {ProbeType::height, ProbeType::pressure, ProbeType::force, ProbeType::tip, ProbeType::energy,
         ProbeType::volume, ProbeType::velocity, ProbeType::front}) {

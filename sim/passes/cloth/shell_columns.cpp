@@ -114,7 +114,7 @@ void load_curvature(State& state, const ClothTopology& cloth) {
   from_host(s.curved_start, t.curved_start), from_host(s.curved_node, t.curved_node);
   from_host(s.curved_pull, t.curved_pull), from_host(s.curved_of_pull, pull);
   from_host(s.curved_of_start, start), from_host(s.curved_of, of);
-  s.normal.resize(cloth.triangles()), s.turning.resize(cloth.triangles());
+  s.normal.resize(s.triangles), s.turning.resize(s.triangles);
   if (!state.cloth.joined) return;
   from_host(s.curved_shift.x, t.curved_shift_x), from_host(s.curved_shift.y, t.curved_shift_y),
       from_host(s.curved_shift.z, t.curved_shift_z);
@@ -137,8 +137,8 @@ void load_shell(State& state, const ClothTopology& cloth) {
   load_curvature(state, cloth);
   const size_t entries = size_t(8) * s.ring_slots, padded = state.cloth.padded;
   s.block.resize(9 * entries), s.tension.resize(entries), s.diagonal.resize(6 * padded);
-  for (VecColumn* v : {&s.path, &s.base, &s.force, &s.landed, &s.rounding, &s.left, &s.acceleration,
-                       &s.internal, &s.rise})
+  for (VecColumn* v :
+       {&s.path, &s.base, &s.landed, &s.rounding, &s.left, &s.acceleration, &s.internal})
     v->resize(padded);
   if (!state.cloth.joined) return;
   for (auto [column, host] : {std::pair(&s.push.x, &t.push_x), std::pair(&s.push.y, &t.push_y),

@@ -223,6 +223,7 @@ template <class T>
 struct Block3 {
   Vec3<T> x, y, z;
   DRENCH_HD Vec3<T> times(Vec3<T> v) const { return {dot(x, v), dot(y, v), dot(z, v)}; }
+  DRENCH_HD Vec3<T> transpose_times(Vec3<T> v) const { return x * v.x + y * v.y + z * v.z; }
 };
 
 /// The block of corners a and b, N/m, of the derivative of -membrane_force: A (B_a^T C B_b + (grad

@@ -8,27 +8,35 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-/// Fields of a triangle: -dt^2 times the blocks of corners 0 1, 0 2 and 1 2 by rows, the forces on
-/// corners 1 and 2 where straight paths end, and tensions of the sides 0 1, 0 2, 1 2.
-enum ElementFields { blocks = 0, forces = 27, tensions = 33 };
+/// Fields of a triangle: minus the blocks of corners 0 1, 0 2 and 1 2 by rows, times dt^2 and what
+/// of the new force counts; forces on corners 1 and 2 where straight paths end; tensions of the
+/// sides 0 1, 0 2, 1 2.
+enum ElementFields { blocks = 0, forces = 27, tensions = 33, element_fields = 36 };
 
-/// What places the corners of triangles: positions with what they round off, and straight paths.
+/// What places the corners of triangles, where the step starts: positions with what they round off;
+/// or so much later on straight paths.
 struct ShellCorners {
   ConstVecView position, rounding, path, edge_shift;
   const int* corner;
-  int stride;  // from one corner to the next, of triangles
-  float dt;    // s
+  int stride;   // from one corner to the next, of triangles
+  float later;  // s
   bool joined;
 
   template <class Index>
   DRENCH_HD auto vertex(Index t, int c) const {
     return load(corner + c * stride, t);
   }
-  /// From corner 0 to corner c, at the start.
+  /// From one vertex to another, but for the shifts of seams.
+  template <class Index>
+  DRENCH_HD auto between(Index from, Index to) const {
+    const auto way = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from)),
+               d = path.at(to) - path.at(from);
+    return way + d * decltype(d.x)(later);
+  }
+  /// From corner 0 to corner c.
   template <class Index>
   DRENCH_HD auto edge(Index t, int c) const {
-    const auto from = vertex(t, 0), to = vertex(t, c);
-    auto e = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from));
+    auto e = between(vertex(t, 0), vertex(t, c));
     if (joined) e = e + edge_shift.at(t + (c - 1) * stride);
     return e;
   }
@@ -37,29 +45,15 @@ struct ShellCorners {
   DRENCH_HD auto opening(Index t, int c) const {
     return path.at(vertex(t, c)) - path.at(vertex(t, 0));
   }
-  /// From one vertex to another where paths end, but for the shifts of seams.
-  DRENCH_HD Vec3<float> between_ends(int from, int to) const {
-    return (position[to] - position[from]) + (rounding[to] - rounding[from]) +
-           (path[to] - path[from]) * dt;
-  }
-  DRENCH_HD Vec3<float> edge_at_end(int t, int c) const { return edge(t, c) + opening(t, c) * dt; }
 };
 
-/// How far on its path a triangle is linearised. Where it turns by more than a tenth in a step the
-/// path stretches it by what the step then takes back, and a limp sheet would boil by what is left.
-template <class T>
-DRENCH_HD T followed_part(const SurfaceGradient<T>& rate, float dt) {
-  const T turn = (length2(rate.warp) + length2(rate.weft)) * T(100.f * dt * dt);
-  return T(1.f) / (T(1.f) + turn * turn);
-}
-
 struct ShellElements {
-  ShellCorners corners;
+  ShellCorners corners;  // at the start
   const float *area, *gradient, *law;
   const int* sheet;
   float* element;
   int sheets;
-  float dt;
+  float dt, dt2;  // s; s^2 times what of the new force counts
 
   template <class T, class Index>
   DRENCH_HD MembraneLaw<T> law_of(Index sheet_of) const {
@@ -67,6 +61,18 @@ struct ShellElements {
     return {.moduli = {field(0), field(1), field(2), field(3), T(0.f), T(0.f)},
             .limit = {field(4), field(5)},
             .damping_time = field(6)};
+  }
+
+  /// Whether straight paths strain a triangle so little that it is linearised where they end: else
+  /// an impact would be, far from where it ends.
+  template <class T>
+  DRENCH_HD static auto mostly_turns(Symmetric2<T> first, Symmetric2<T> last) {
+    const T most(0.005f), x = last.xx - first.xx, y = last.yy - first.yy, s = last.xy - first.xy;
+    return maximum(maximum(x, -x), maximum(maximum(y, -y), maximum(s, -s))) < most;
+  }
+  template <class M, class T>
+  DRENCH_HD static Symmetric2<T> select_strain(M mask, Symmetric2<T> a, Symmetric2<T> b) {
+    return {select(mask, a.xx, b.xx), select(mask, a.yy, b.yy), select(mask, a.xy, b.xy)};
   }
 
   template <class Index>
@@ -89,19 +95,20 @@ struct ShellElements {
     const auto later = [&](T time) {
       return SurfaceGradient<T>{start.warp + rate.warp * time, start.weft + rate.weft * time};
     };
-    const T part = followed_part(rate, dt), left = (T(1.f) - part) * T(dt);
-    const SurfaceGradient<T> f = later(part * T(dt)), ahead{rate.warp * left, rate.weft * left};
-    // Strain is quadratic along the path: its mean rate is that halfway.
-    auto response =
-        of.at(green_strain(f), green_strain_rate(later(part * T(0.5f * dt)), rate) * part, T(dt));
-    response.stress = response.stress + response.moduli.times(green_strain_rate(f, ahead));
-    // Not of f: the stretch by the path is taken back.
-    const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)},
-        pull = positive_part(of.at(green_strain(start), still, T(dt)).stress);
-    const T scale(-dt * dt);
+    const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)}, first = green_strain(start),
+                                                       last = green_strain(later(T(dt)));
+    const auto turns = mostly_turns(first, last);
+    const SurfaceGradient<T> f = later(select(turns, T(dt), T(0.f)));
+    // Strain is quadratic in time: its mean rate is that halfway.
+    const Symmetric2<T> flow = green_strain_rate(later(T(0.5f * dt)), rate);
+    const auto response =
+        of.at(select_strain(turns, last, first), select_strain(turns, flow, still), T(dt));
+    const Symmetric2<T> pull = positive_part(response.stress);
+    const T scale(-dt2);
+    Block3<T> k_of[3];
     for (int pair = 0; pair < 3; ++pair) {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
-      const Block3<T> k = membrane_block(rest, f, pull, response.moduli, a, b);
+      const Block3<T> k = k_of[pair] = membrane_block(rest, f, pull, response.moduli, a, b);
       const Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
       for (int r = 0; r < 3; ++r) {
         put(blocks + 9 * pair + 3 * r, row[r].x), put(blocks + 9 * pair + 3 * r + 1, row[r].y);
@@ -109,8 +116,13 @@ struct ShellElements {
       }
     }
     for (int c = 1; c < 3; ++c) {
-      const Vec3<T> force =
-          membrane_force(rest, f, response.stress, c) + membrane_force(rest, ahead, pull, c);
+      // Linearised at the start: what the paths change.
+      const Vec3<T> p = corners.opening(t, c), other = corners.opening(t, 3 - c) - p;
+      const Block3<T>& far = k_of[2];
+      const Vec3<T> change = (k_of[c - 1].transpose_times(p) -
+                              (c == 1 ? far.times(other) : far.transpose_times(other))) *
+                             select(turns, T(0.f), T(dt));
+      const Vec3<T> force = membrane_force(rest, f, response.stress, c) + change;
       put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
       put(forces + 3 * c - 1, force.z);
     }
@@ -128,7 +140,7 @@ struct ShellElements {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
       const T ax = rest.along_warp(a), ay = rest.along_weft(a), bx = rest.along_warp(b),
               by = rest.along_weft(b);
-      w[pair] = T(-dt * dt) * rest.area *
+      w[pair] = T(-dt2) * rest.area *
                 (ax * (pull.xx * bx + pull.xy * by) + ay * (pull.xy * bx + pull.yy * by));
     }
     // c (a + b)^2 <= c (1 + s) a^2 + c (1 + 1/s) b^2 with s = sqrt(w_b / w_a) of the two others
@@ -177,13 +189,12 @@ struct RestCurvature {
     if (start[t] == start[t + 1]) return;
     const int first = corners.vertex(t, 0);
     Vec3<float> q{0.f, 0.f, 0.f};
-    for (int e = start[t]; e < start[t + 1]; ++e)
-      q = q + corners.between_ends(first, node[e]) * pull[e];
+    for (int e = start[t]; e < start[t + 1]; ++e) q = q + corners.between(first, node[e]) * pull[e];
     if (corners.joined) q = q + shift[t];
     normal.set(t, turning_normal(t).normal), turning.set(t, q);
   }
   DRENCH_HD TurningNormal<float> turning_normal(int t) const {
-    return {{0.f, 0.f, 0.f}, corners.edge_at_end(t, 1), corners.edge_at_end(t, 2), area[t]};
+    return {{0.f, 0.f, 0.f}, corners.edge(t, 1), corners.edge(t, 2), area[t]};
   }
   DRENCH_HD Vec3<float> force_on_node(int v) const {
     Vec3<float> sum{0.f, 0.f, 0.f};
@@ -216,13 +227,13 @@ RestCurvature rest_curvature_of(State& state, const ShellCorners& corners) {
 struct ShellVertices {
   RestCurvature rest;
   ShellMatrix matrix;
-  ConstVecView push, rise;
+  ConstVecView position, rounding, path, push, internal;
   const int *fan_start, *fan_entry, *fan_slot;
   const float* element;
   int triangles, vertices;
   float *block, *tension, *diagonal;
-  VecView base, force;
-  float dt, history;  // history: dt / (2 dt of the step before), at most 1/2; 0 without one
+  VecView base;
+  float dt, before;  // s; what of the last step's force counts
   bool joined;
 
   DRENCH_HD float field(int k, int t) const { return element[k * triangles + t]; }
@@ -241,7 +252,8 @@ struct ShellVertices {
       return Vec3<float>{field(forces + 3 * k, t), field(forces + 3 * k + 1, t),
                          field(forces + 3 * k + 2, t)};
     };
-    return c > 0 ? on(c - 1) : -(on(0) + on(1));
+    const Vec3<float> f = c > 0 ? on(c - 1) : -(on(0) + on(1));
+    return rest.any ? f + rest.force_on_corner(t, c) : f;
   }
 
   /// Blocks of the row, and the triangles' forces.
@@ -260,7 +272,6 @@ struct ShellVertices {
       add_block(t, c, (c + 1) % 3, ShellRows::entry(fan_slot[2 * e], i));
       add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
       sum = sum + force_on(t, c);
-      if (rest.any) sum = sum + rest.force_on_corner(t, c);
     }
     return rest.any ? sum + rest.force_on_node(i) : sum;
   }
@@ -276,7 +287,8 @@ struct ShellVertices {
     for (int slot = first; slot < last; ++slot) {
       const int at = ShellRows::entry(slot, i), j = rows.end[at];
       const float b = matrix.bend[at];
-      sum = sum + rest.corners.between_ends(i, j) * b;
+      const Vec3<float> away = (position[j] - position[i]) + (rounding[j] - rounding[i]);
+      sum = sum + (away + (path[j] - path[i]) * dt) * b;
       stiff += b * matrix.dt2;
       if (slot >= inner) continue;
       const int to = ShellRows::entry(ring + slot - first, i), stride = matrix.stride;
@@ -290,8 +302,7 @@ struct ShellVertices {
     if (joined && i < vertices) sum = sum + push[i];
     d[0] += stiff, d[3] += stiff, d[5] += stiff;
     for (int k = 0; k < 6; ++k) diagonal[k * 8 * ((vertices + 7) / 8) + i] = d[k];
-    force.set(i, sum);
-    base.set(i, (sum - rise[i] * history) * (dt * dt));
+    base.set(i, sum * matrix.dt2 + internal[i] * (before * dt * dt));
   }
 };
 
@@ -307,7 +318,7 @@ void linearise_shell(State& state) {
                              .edge_shift = s.edge_shift.view(),
                              .corner = s.corner.data(),
                              .stride = s.triangles,
-                             .dt = float(state.dt),
+                             .later = 0.f,
                              .joined = c.joined};
   const ShellElements elements{.corners = corners,
                                .area = s.area.data(),
@@ -316,33 +327,37 @@ void linearise_shell(State& state) {
                                .sheet = s.sheet.data(),
                                .element = s.element.data(),
                                .sheets = s.sheets,
-                               .dt = float(state.dt)};
+                               .dt = float(state.dt),
+                               .dt2 = shell_matrix_of(state).dt2};
   for_each_lane(
       state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
-  const RestCurvature rest = rest_curvature_of(state, corners);
+  ShellCorners at_end = corners;
+  at_end.later = float(state.dt);
+  const RestCurvature rest = rest_curvature_of(state, at_end);
   if (rest.any)
     parallel_for(
         state.queue, "shell: rest curvature", c.triangles,
         DRENCH_LAMBDA(int t) { rest.prepare(t); });
-  const ShellVertices vertices{
-      .rest = rest,
-      .matrix = shell_matrix_of(state),
-      .push = s.push.view(),
-      .rise = s.rise.view(),
-      .fan_start = c.fan_start.data(),
-      .fan_entry = c.fan_entry.data(),
-      .fan_slot = s.fan_slot.data(),
-      .element = s.element.data(),
-      .triangles = s.triangles,
-      .vertices = c.vertices,
-      .block = s.block.data(),
-      .tension = s.tension.data(),
-      .diagonal = s.diagonal.data(),
-      .base = s.base.view(),
-      .force = s.force.view(),
-      .dt = float(state.dt),
-      .history = s.dt > 0 ? 0.5f * float(std::min(1., state.dt / s.dt)) : 0.f,
-      .joined = c.joined};
+  const ShellVertices vertices{.rest = rest,
+                               .matrix = shell_matrix_of(state),
+                               .position = c.position.view(),
+                               .rounding = s.rounding.view(),
+                               .path = s.path.view(),
+                               .push = s.push.view(),
+                               .internal = s.internal.view(),
+                               .fan_start = c.fan_start.data(),
+                               .fan_entry = c.fan_entry.data(),
+                               .fan_slot = s.fan_slot.data(),
+                               .element = s.element.data(),
+                               .triangles = s.triangles,
+                               .vertices = c.vertices,
+                               .block = s.block.data(),
+                               .tension = s.tension.data(),
+                               .diagonal = s.diagonal.data(),
+                               .base = s.base.view(),
+                               .dt = float(state.dt),
+                               .before = float(1 - new_force_share(state)),
+                               .joined = c.joined};
   parallel_for(
       state.queue, "shell: rows", c.padded, DRENCH_LAMBDA(int i) { vertices(i); });
 }
@@ -352,27 +367,19 @@ void keep_shell_step(State& state) {
   const ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), v = c.velocity.view(), next = c.next.view(),
                      next_velocity = c.next_velocity.view(), path = s.path.view(),
-                     change = state.cloth_system.change.view();
+                     change = state.cloth_system.change.view(), base = s.base.view();
+  const ShellMatrix matrix = shell_matrix_of(state);
   const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
-                acceleration = s.acceleration.view(), internal = s.internal.view(),
-                rise = s.rise.view(), force = s.force.view();
+                acceleration = s.acceleration.view(), internal = s.internal.view();
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
   const ConstVecView free = state.cloth_system.free.view(),
                      normal = state.cloth_system.normal.view();
   const bool obstacles = state.parameters.obstacles > 0;
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
-  const ShellMatrix matrix = shell_matrix_of(state);
-  for_each_lane(
-      state.queue, "shell: forces at the end", c.vertices, DRENCH_LAMBDA(auto i) {
-        const auto pull = matrix.times(change, i);
-        force.put(i, force.at(i) - pull * decltype(pull.x)(inverse_dt * inverse_dt));
-      });
-  const bool again = s.dt > 0;  // there is a step before to rise from
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
         landed.set(i, next[i]), left.set(i, next_velocity[i]);
-        rise.set(i, again ? force[i] - internal[i] : Vec3<float>{0.f, 0.f, 0.f});
-        internal.set(i, force[i]);
+        internal.set(i, (base[i] - matrix.times(change, i)) * (inverse_dt * inverse_dt));
         const bool shell = fan_slot[2 * fan_start[i]] >= 0,
                    held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
                           (obstacles && length2(normal[i]) > 0.f);

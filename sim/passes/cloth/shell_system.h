@@ -2,22 +2,22 @@
 // The step of sheets that are shells, in the sheets' one system A w = b (cloth_implicit.h). Here
 // w = dt (v_1 - v_0), and a vertex ends at x_0 + dt p + w, its straight path p being
 //   p = v_0 - dt/2 a_0,                          a_0 the acceleration over the step before.
-// Forces inside the sheet count with f_1 - (f_0 - f_-1) dt / (2 dt_-1). Together this is the linear
-// two-step method rho = z^2 - z, sigma = z^2 - z/2 + 1/2: of second order, A-stable, damping a mode
-// of angle phi = omega dt a step by phi^4/4 and the stiffest by sqrt(2) a step, where implicit
-// Euler takes phi^2/2 (Hairer and Wanner 1996, V.1, for what A-stable linear methods can be). The
-// fluid's impulses and what walls give count in full at once, so that momentum is kept step by
-// step; a vertex that something stopped starts anew, by implicit Euler.
+// Of the forces inside the sheet
+//   F_1 = 2/3 f(x_1) + 1/3 F_0                                   (equal steps; F_0 of the last one)
+// acts over the step. So places follow the two-step method rho = z^2 - z, sigma = z^2 - z/2 + 1/2,
+// whose real part of rho / sigma on the unit circle is (1 - cos phi)^2 / |sigma|^2, and velocities
+// the second backward differentiation formula. Both are A-stable and of second order (Hairer and
+// Wanner 1996, V.1), and so is the whole: the product of two numbers of positive real part is not
+// negative, as -(omega dt)^2 is. A mode of angle phi a step loses some phi^4, where implicit Euler
+// takes phi^2/2. What comes from without, the fluid's impulses, weight and walls, counts in full at
+// once; forces inside sum to zero step by step, so that momentum is kept. A vertex that something
+// stopped takes up its path anew.
 //
-// f_1 is linearised once, about the end of the straight paths, x_0 + dt p: about x_0 what turns by
-// phi a step would feel a stretch of phi^2/2, and a square of E h = 1 kN/m that spins by 0.0125 a
-// step would lose 0.017 % of its energy in each. A triangle that turns by much more than a tenth is
-// linearised where it starts, with its straight path in the linear part, and f_0 and f_-1 are those
-// that the linear systems had: with what the forces really are where the steps ended, the errors
-// that turning leaves, a limp sheet of E h = 10 kN/m that is shaken at 3 m/s blows up.
-// The membrane's part of A are 3 x 3 blocks of vertices that share a triangle (shell_membrane.h,
-// stress of the start, projected), bending's a number for every pair of vertices (shell_bending.h).
-// Positions carry what they round off: a stiff sheet feels a tenth of a micrometre.
+// f is linearised once, the membrane triangle by triangle: where the straight paths end if these
+// hardly strain it, so that turning costs no stretch, else at x_0. Its part of A are 3 x 3 blocks
+// of vertices that share a triangle (shell_membrane.h, stress projected), bending's a number for
+// every pair of vertices (shell_bending.h). Positions carry what they round off: a stiff sheet
+// feels a tenth of a micrometre.
 
 #include "sim/passes/cloth/shell_membrane.h"
 #include "sim/passes/coupling/polygon_grid.h"
@@ -52,7 +52,7 @@ struct ShellMatrix {
   ShellRows rows;
   const float *block, *bend;
   int stride;  // from one field of the blocks to the next
-  float dt2;   // s^2
+  float dt2;   // s^2, times what of the new force counts
   bool any;
 
   template <class Index>
@@ -81,13 +81,20 @@ inline ShellRows shell_rows_of(const ShellState& s) {
   return {s.ring_start.data(), s.row_start.data(), s.end.data(), s.offset.data()};
 }
 
+/// What of the force where a step ends acts over it; the rest is of the last step's: (1 + r) / (1 +
+/// 2 r), r = dt over that of the last step. 1 in a first step.
+inline double new_force_share(const State& state) {
+  const double r = state.shell.dt > 0 ? state.dt / state.shell.dt : 0;
+  return (1 + r) / (1 + 2 * r);
+}
+
 inline ShellMatrix shell_matrix_of(const State& state) {
   const ShellState& s = state.shell;
   return {.rows = shell_rows_of(s),
           .block = s.block.data(),
           .bend = s.bend.data(),
           .stride = 8 * s.ring_slots,
-          .dt2 = float(state.dt * state.dt),
+          .dt2 = float(new_force_share(state) * state.dt * state.dt),
           .any = s.any};
 }
 

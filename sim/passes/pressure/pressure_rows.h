@@ -197,4 +197,8 @@ void accelerate_by_pressure(State& state);
 /// product = D vector.
 void density_rate(State& state);
 
+/// Of D D^T, and InverseDiagonal::own_acceleration in PressureState::scratch_b; where there may be
+/// levels EvenInverseDiagonal::even as well, in PressureState::next until an iteration.
+void invert_diagonal(State& state);
+
 }  // namespace drench::sim::DRENCH_BACKEND

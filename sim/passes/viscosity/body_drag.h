@@ -150,6 +150,10 @@ struct ClothRates {
   float *along, *across;
 };
 
+inline ClothRates cloth_rates(State& state) {
+  return {state.contact.rate_along.data(), state.contact.rate_across.data()};
+}
+
 /// What brakes every particle in this step's viscosity.
 void find_body_drag(State& state);
 
