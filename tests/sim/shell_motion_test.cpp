@@ -135,7 +135,7 @@ TEST(ShellMotion, AFreeSheetFallsByTheParabola) {
   const double start = height(), dt = 2e-3, g = shell_gravity;
   for (int k = 0; k < 250; ++k) run.step(dt);
   EXPECT_NEAR(height() - start, -g / 2 * (run.time * run.time + dt * dt), 1e-6);
-  for (const V3d& u : run.velocities()) EXPECT_NEAR(u.y, -g * run.time, 1e-4);
+  for (const V3d& u : run.velocities()) EXPECT_NEAR(u.y, -g * run.time, 2e-4);
 }
 
 /// A free square that spins, about its normal or about a middle line.
@@ -190,8 +190,8 @@ ShellRun shaken(SheetMesh mesh, double speed, double damping_time) {
   return run;
 }
 
-// With forces at the ends of steps in the history, both of the undamped ones reach km/s. Momentum
-// drifts by 1e-4 of m v where stress is thousands of times what moves a vertex: rounding.
+// With half the last change of forces taken explicitly both of the undamped ones reach km/s.
+// Momentum drifts by 1e-4 of m v where stress is thousands of times what moves a vertex: rounding.
 TEST(ShellMotion, AShakenSheetGainsNoEnergy) {
   struct Case {
     SheetMesh mesh;
