@@ -281,6 +281,36 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.base", "kg m", Group::shell_system}, s.base, none);
 }
 
+template <class S, class Visit>
+void for_each_self_contact_column(S& state, const Visit& visit) {
+  using Group = ColumnGroup;
+  auto& s = state.self_contact;
+  visit({"sheet_vertex", "", Group::cloth_fixed}, s.vertex, none);
+  visit({"owned", "1", Group::cloth_fixed}, s.owned, none);
+  visit({"self.to", "m", Group::self_contact}, s.to, none);
+  visit({"self.point", "m", Group::self_contact}, s.point, none);
+  visit({"self.low", "m", Group::self_contact}, s.low, none);
+  visit({"self.high", "m", Group::self_contact}, s.high, none);
+  visit({"self.sorted_low", "m", Group::self_contact}, s.sorted_low, none);
+  visit({"self.sorted_high", "m", Group::self_contact}, s.sorted_high, none);
+  visit({"self.cell", "1", Group::self_contact}, s.cell, none);
+  visit({"self.order", "1", Group::self_contact}, s.order, none);
+  visit({"self.cell_start", "1", Group::self_contact}, s.cell_start, none);
+  visit({"pair.count", "1", Group::self_contact}, s.count, none);
+  visit({"pair.first", "1", Group::self_contact}, s.first, none);
+  visit({"pair", "1", Group::self_contact}, s.pair, none);
+  visit({"row", "", Group::self_contact}, s.row, none);
+  visit({"row.key", "1", Group::self_contact}, s.key, none);
+  visit({"row.start", "1", Group::self_contact}, s.start, none);
+  visit({"row.entry", "1", Group::self_contact}, s.entry, none);
+  visit({"row.load", "kg m", Group::self_contact}, s.load, none);
+  visit({"wanted", "m", Group::self_contact}, s.wanted, none);
+  visit({"portion", "1", Group::self_contact}, s.portion, none);
+  visit({"stop", "1", Group::self_contact}, s.stop, none);
+  visit({"pair.start", "1", Group::self_contact}, s.pair_start, none);
+  visit({"pair.entry", "1", Group::self_contact}, s.pair_entry, none);
+}
+
 template <class Solids, class Visit>
 void for_each_solid_column(Solids& solids, ColumnGroup group, const Visit& visit) {
   visit({"view", "", group}, solids.view, none);
@@ -299,6 +329,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_cloth_column(state, visit);
   for_each_system_column(state, visit);
   for_each_shell_column(state, visit);
+  for_each_self_contact_column(state, visit);
   for_each_solid_column(state.obstacles, ColumnGroup::obstacles, visit);
   for_each_solid_column(state.sinks, ColumnGroup::sinks, visit);
   visit({"stopped", "kg m/s", ColumnGroup::stopped}, state.obstacles.stopped, none);

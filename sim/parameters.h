@@ -42,6 +42,7 @@ struct Parameters {
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
   bool shells = false;           // any sheet is one
+  bool self_contact = false;     // any sheet meets itself and others
   bool paper = false;            // coupling scheme
   bool every_path = false;       // is tested, also of what cannot meet a sheet: for tests
   // air, which moves as WindNow says; 0: none

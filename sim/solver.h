@@ -53,6 +53,11 @@ struct ClothTopology {
   std::vector<float> wetting;    // of a triangle: cosine of its contact angle
   std::vector<float> air_share;  // of a vertex: area its mass stands for / a third of its triangles
   HostVec rest_centroid;
+  // Of a vertex: its place at rest, m; whether contact with sheets concerns it, and Coulomb's
+  // coefficient there.
+  HostVec rest;
+  std::vector<char> meets_sheets;
+  std::vector<float> friction;
   std::vector<int> fan_start, fan_entry, rim;
   // Where a sheet is joined to itself across the seam of a periodic axis, else empty: how far from
   // its vertex a corner of a triangle, the other end of a spring stands, m; of each sheet the

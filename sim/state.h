@@ -186,6 +186,76 @@ struct ShellState {
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
 };
 
+/// What contact among sheets asks of a vertex.
+struct SheetVertex {
+  Vec3<float> rest;      // m
+  float half_thickness;  // m
+  float root_friction;   // of Coulomb's coefficient
+  int sheet;
+};
+
+/// A vertex and its way in a step, as the search for pairs reads them.
+struct SheetPoint {
+  Vec3<float> x, way;    // m
+  float half_thickness;  // m
+  int vertex;
+};
+
+/// Two pieces of sheets that share no vertex: a vertex and the corners of a triangle, or the ends
+/// of one edge and of another.
+struct SheetPair {
+  int vertex[4];
+  int triangle;  // -1: edges
+};
+
+/// A pair in the sheets' system (passes/cloth/self_contact.h). Vectors of weights w_j: sum w_j x_j
+/// is from the second piece to the first.
+struct SheetRow {
+  int vertex[4];
+  float weight[4];
+  Vec3<float> normal;               // unit, from the second to the first
+  float gap;                        // m, at the end of the straight paths
+  float thickness;                  // m, that the pair keeps apart
+  float target;                     // m, gap that is asked for
+  Vec3<float> slip;                 // m, across the normal along the straight paths
+  Vec3<float> speed;                // m/s, across the normal at the start of the step
+  float mass;                       // kg, reduced; 0: no row
+  float friction;                   // Coulomb's coefficient
+  float stiffness, grip;            // kg, along the normal and across it; 0: none
+  float in_block, in_block_across;  // kg, what the blocks of the preconditioner hold of these
+  Vec3<float> rub;                  // kg m, friction of what slides
+  int released;                     // times that the row was let go in this step
+};
+
+/// Contact of shells with themselves and each other (passes/cloth/self_contact_pairs.h).
+struct SelfContact {
+  bool any = false;     // sheets take part
+  float thickness = 0;  // m, of the thickest pair
+  float edge = 0;       // m, mean
+  float slack = 0;      // m, that a vertex may end off the path that the pairs were found for
+  int pairs = 0, rows = 0;
+  // fixed
+  Column<SheetVertex> vertex;
+  Column<int> owned;  // of a triangle, bits: corners 0, 1, 2 and sides 01, 12, 20 that it stands
+                      // for; -1: takes no part
+  // rebuilt every step
+  VecColumn to;  // m, ends of the paths that the pairs were found for
+  Column<SheetPoint> point;
+  VecColumn low, high;                  // m, boxes of the triangles' paths
+  VecColumn sorted_low, sorted_high;    // m, in the order of the grid
+  Column<int> cell, order, cell_start;  // triangles by the middle of their boxes
+  GridShape grid{};
+  Column<int> count, first;  // of a triangle: its pairs
+  Column<SheetPair> pair;
+  Column<SheetRow> row;
+  Column<int> key, start, entry;       // of a vertex: 4 row + corner
+  VecColumn load;                      // kg m, of the rows on a vertex, as it is in the right side
+  VecColumn wanted;                    // m, ends of the paths that the guard shortens
+  Column<float> portion, stop;         // of a vertex' path that it may go; of a pair's
+  Column<int> pair_start, pair_entry;  // of a vertex: 4 pair + corner
+  uint64_t rounds = 0, stops = 0;      // since the start: of the rows; vertices that were stopped
+};
+
 /// Contacts sorted by triangle.
 struct ContactState {
   Column<int> key, order, start;
@@ -336,6 +406,7 @@ struct State {
   ClothState cloth;
   ClothSystem cloth_system;
   ShellState shell;
+  SelfContact self_contact;
   ContactState contact;
   ObstacleState obstacles, sinks;
   WindNow wind;

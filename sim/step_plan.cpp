@@ -37,6 +37,7 @@ void settle_cloth_alone(State& state) {
   if (state.parameters.air_density > 0) wind_on_cloth(state);
   if (state.shell.any) linearise_shell(state);
   linearise_cloth(state);
+  start_sheet_rows(state);
   settle_cloth(state);
   finish_cloth(state);
   finish_substep(state.cloth);
@@ -90,6 +91,7 @@ bool coupled_exactly(const Parameters& p, bool cloth) {
 }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_shells(const Parameters& p, bool cloth) { return strong(p, cloth) && p.shells; }
+bool strong_meeting(const Parameters& p, bool cloth) { return strong(p, cloth) && p.self_contact; }
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
 }
@@ -110,7 +112,7 @@ constexpr ColumnSet walls =
 constexpr ColumnSet sheets = cloth | cloth_fixed;
 constexpr ColumnSet near_list = near_cloth | contact | rows | cloth_fixed;
 /// What a pressure solve writes beside cloth.
-constexpr ColumnSet response = cloth_system | cloth_obstacles | loads;
+constexpr ColumnSet response = cloth_system | cloth_obstacles | loads | self_contact;
 
 const Pass all_passes[] = {
     {"turn_frame", turning, moving | cloth, velocity, turn_frame, cloth},
@@ -129,6 +131,8 @@ const Pass all_passes[] = {
     {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
     {"linearise_shell", strong_shells, sheets, shell_system | shell_history, linearise_shell},
     {"linearise_cloth", strong, sheets | cloth_load | cloth_air, cloth_system, linearise_cloth},
+    {"start_sheet_rows", strong_meeting, sheets | shell_system | shell_history,
+     self_contact | cloth_system | sorting, start_sheet_rows},
     {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
      find_neighbours, cloth_rows},
     {"apply_surface_tension", tense, velocity | lists | walls, velocity | tension | scratch,
@@ -170,12 +174,12 @@ const Pass all_passes[] = {
     {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
     {"settle_cloth", implicit_alone, sheets,
      cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped | shell_system |
-         shell_history,
+         shell_history | self_contact | sorting,
      settle_cloth_alone},
     {"move_with_sheets", strong,
      moving | near_list | sheets | start | drift | cloth_system | shell_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
-         sorting | cloth_load | stopped | shell_history,
+         sorting | cloth_load | stopped | shell_history | self_contact,
      move_with_sheets},
     {"move_coupled", coupled_exactly, moving | near_list | sheets,
      moving | cloth | cloth_substep | near_cloth | memory | path | start | cloth_air | contact |

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/error.h"
 #include "sim/passes/coupling/geometry.h"
+#include "sim/setup/sheet_crossing.h"
 
 namespace drench::sim {
 
@@ -192,12 +193,36 @@ void check_cloth_outside(const Shot& shot, Scene& scene) {
   }
 }
 
+/// Refuses shells that start through themselves or each other: contact only keeps apart.
+void check_sheets_apart(const Shot& shot, const Scene& scene) {
+  if (!scene.parameters.self_contact) return;
+  const auto crossing = find_sheet_crossing(scene.cloth, scene.start.cloth_position);
+  if (!crossing) return;
+  const auto triangle_text = [&](int t) {
+    const auto s = size_t(scene.cloth.sheet[t]);
+    const HostVec& x = scene.start.cloth_position;
+    const int v = scene.cloth.corner[3 * t];
+    return fmt::format("triangle {} of cloth \"{}\" near ({:.4g}, {:.4g}, {:.4g}) m",
+                       t - scene.first_triangle[s], scene.sheet[s].name,
+                       scene.frame.to_world(0, x.x[v]), scene.frame.to_world(1, x.y[v]),
+                       scene.frame.to_world(2, x.z[v]));
+  };
+  const bool crosses = crossing->kind == SheetCrossing::Kind::crosses;
+  throw Error(fmt::format(
+      "{}: cloth starts {}: {} and {}. Contact keeps sheets apart that start apart, and knows no "
+      "side where they do not. Move them a thickness apart, or let the sheet pass through others: "
+      "self_collision = false",
+      shot.file.string(), crosses ? "through cloth" : "on cloth, with no room between",
+      triangle_text(crossing->triangle), triangle_text(crossing->other)));
+}
+
 }  // namespace
 
 void check_cloth_start(const Shot& shot, Scene& scene) {
   check_cloth_within_walls(shot, scene);
   check_overlap(shot, scene);
   check_cloth_outside(shot, scene);
+  check_sheets_apart(shot, scene);
 }
 
 }  // namespace drench::sim

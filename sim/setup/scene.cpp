@@ -331,6 +331,10 @@ void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) 
   }
 }
 
+bool meets_sheets(const Cloth& cloth) {
+  return cloth.model == ClothModel::shell && cloth.self_collision;
+}
+
 void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame,
                   const Shot& shot, Scene& scene) {
   ClothTopology& t = scene.cloth;
@@ -372,6 +376,10 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
       const V3d a = sheet.rest[k[0]];
       third += (sheet.rest[k[1]] - a).cross(sheet.rest[k[2]] - a).length() / 6;
     }
+    const V3d& rest = sheet.rest[sheet.point[v]];
+    t.rest.push(frame.to_local(0, rest.x), frame.to_local(1, rest.y), frame.to_local(2, rest.z));
+    t.meets_sheets.push_back(meets_sheets(cloth));
+    t.friction.push_back(float(cloth.friction));
     t.air_share.push_back(float(sheet.mass[v] / (cloth.areal_density * third)));
     t.mass.push_back(float(sheet.mass[v]));
     t.inverse_mass.push_back(sheet.pinned[v] ? 0.f : float(1 / sheet.mass[v]));
@@ -484,6 +492,10 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
     t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
     t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
   }
+  // Images across seams are not looked for.
+  scene.parameters.self_contact = std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
+                                  sheets_are_implicit(scene.parameters) &&
+                                  scene.cloth.corner_shift.size() == 0;
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));

@@ -27,6 +27,7 @@ constexpr Constant constants[] = {
     {"bend_bias", &Cloth::bend_bias, &Fabric::bend_bias},
     {"stretch_limit", &Cloth::stretch_limit, &Fabric::stretch_limit},
     {"damping_time", &Cloth::damping_time, &Fabric::damping_time},
+    {"friction", &Cloth::friction, &Fabric::friction},
 };
 
 constexpr const char* spring_keys[] = {"adjacent_stiffness", "diagonal_stiffness", "spring_damping",
@@ -45,7 +46,7 @@ const char* first_given(const char* const (&keys)[N], const ShotSources& sources
 }
 
 /// @throws Error where keys of both models are given.
-ClothModel model_of(const Shot& shot, const ShotSources& sources, const std::string& path) {
+ClothModel model_of(const ShotSources& sources, const std::string& path) {
   const char* const spring = first_given(spring_keys, sources, path);
   const char* const shell = first_given(shell_keys, sources, path);
   if (spring != nullptr && shell != nullptr) {
@@ -54,9 +55,7 @@ ClothModel model_of(const Shot& shot, const ShotSources& sources, const std::str
                     "or say which with {1}model",
                     sources.at(path + shell), path, shell, spring));
   }
-  if (shell != nullptr) return ClothModel::shell;
-  const bool is_explicit = shot.fluid.present() && !is_incompressible(shot);
-  return spring != nullptr || is_explicit ? ClothModel::springs : ClothModel::shell;
+  return shell != nullptr ? ClothModel::shell : ClothModel::springs;
 }
 
 }  // namespace
@@ -65,7 +64,7 @@ void take_fabrics(Shot& shot, const ShotSources& sources) {
   for (size_t i = 0; i < shot.cloth.size(); ++i) {
     Cloth& cloth = shot.cloth[i];
     const std::string path = fmt::format("cloth[{}].", i);
-    if (cloth.model == ClothModel::automatic) cloth.model = model_of(shot, sources, path);
+    if (cloth.model == ClothModel::automatic) cloth.model = model_of(sources, path);
     if (cloth.model != ClothModel::shell) continue;
     const Fabric* const fabric = find_fabric(cloth.fabric);
     if (fabric == nullptr) {

@@ -151,8 +151,8 @@ struct ClothPin {  // vertices held where they start; exactly one of the two for
   std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
 };
 
-/// automatic, which a file's shots have resolved: springs where the file gives a constant of
-/// springs or the fluid is weakly compressible, else a shell.
+/// automatic, which the shots of files have resolved: a shell where any of its constants is given,
+/// else springs.
 enum class ClothModel { automatic, springs, shell };
 
 struct Cloth {
@@ -180,6 +180,8 @@ struct Cloth {
   double bend_warp = 1.96e-5, bend_weft = 1.37e-5, bend_bias = 1.27e-5;  // N m
   double stretch_limit = 1.05;    // length over rest length where it stiffens
   double damping_time = 0.005;    // s, viscosity over stiffness in its plane
+  double friction = 0.5;          // Coulomb's coefficient on itself
+  bool self_collision = true;     // it meets itself and other shells
   Slip slip = Slip::automatic;    // of fluid along it
   double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid
   std::string material = "cotton";

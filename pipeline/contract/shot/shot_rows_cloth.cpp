@@ -66,9 +66,8 @@ std::vector<Parameter> cloth_rows() {
                              "thickness; of a shell that gives none its fabric's"),
       row<&Cloth::model>("cloth", "model", "", none, simulate,
                          "shell: a continuous sheet with the constants of a fabric. springs: a net "
-                         "of springs without bending, as published. automatic: springs where any "
-                         "of their constants is given or the fluid is weakly compressible, else "
-                         "a shell")
+                         "of springs without bending, as published. automatic: a shell where any "
+                         "of its constants is given, else springs")
           .identity(),
       row<&Cloth::fabric>("cloth", "fabric", "", none, simulate,
                           "a name that `drench fabrics` lists: the constants that are not given")
@@ -98,6 +97,13 @@ std::vector<Parameter> cloth_rows() {
           .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::damping_time>("cloth", "damping_time", "s", {0, 10}, simulate,
                                 "inner friction in its plane, viscosity over stiffness")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::friction>("cloth", "friction", "", {0, 10}, simulate,
+                            "Coulomb's coefficient of the sheet on itself; of two sheets on each "
+                            "other the geometric mean counts")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::self_collision>("cloth", "self_collision", "", none, simulate,
+                                  "whether it meets itself and other shells: nothing crosses")
           .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "

@@ -171,6 +171,7 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
   const ConstraintProjection constraints = constraint_projection(state);
   const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
+  const SheetVertex* vertex = state.self_contact.vertex.data();
   for (const VertexRange& sheet : state.cloth.loose) {
     const int first = sheet.first;
     reduce_then(
@@ -180,8 +181,10 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
           const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
           const double gripped =
               constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
+          const double met =
+              matrix.contact.any && matrix.contact.touches_another(i, vertex) ? 1. : 0.;
           return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
-                                3. - free.x - free.y - free.z + gripped};
+                                3. - free.x - free.y - free.z + gripped + met};
         },
         Plus{},
         DRENCH_LAMBDA(const ClothImbalance& lack) {
@@ -222,27 +225,91 @@ void hold_at_obstacles(State& state) {
 
 namespace {
 
+/// What a round makes of one vertex at the walls.
+struct WallRevision {
+  ClothWalls walls;
+  ConstVecView position, path, reaction;
+  VecView free, change;
+  BlockInverse block;
+  const float *inertia, *inverse_mass;
+  float dt, reach;
+  bool release;
+
+  DRENCH_HD bool operator()(int i) const {
+    if (inverse_mass[i] == 0.f) return false;
+    const Vec3<float> from = position[i], straight = from + path[i] * dt, to = straight + change[i],
+                      push = reaction[i];
+    Vec3<float> axes = free[i], w = change[i];
+    bool held = false, freed = false;
+    const auto along = [&](float low, float high, float from, float straight, float to, float push,
+                           float& axis, float& w) {
+      if (axis == 0.f) {
+        const bool pulls = 2.f * to < low + high ? push < 0.f : push > 0.f;
+        if (release && pulls) axis = 1.f, freed = true;
+        return;
+      }
+      const float stop = minimum(maximum(to, low), high);
+      if (fabsf(stop - to) <= 1e-3f * reach || fabsf(stop - from) > reach) return;
+      axis = 0.f, w = stop - straight, held = true;
+    };
+    along(walls.low.x, walls.high.x, from.x, straight.x, to.x, push.x, axes.x, w.x);
+    along(walls.low.y, walls.high.y, from.y, straight.y, to.y, push.y, axes.y, w.y);
+    along(walls.low.z, walls.high.z, from.z, straight.z, to.z, push.z, axes.z, w.z);
+    if (!held && !freed) return false;
+    free.set(i, axes), change.set(i, w);
+    if (held) block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+    return true;
+  }
+};
+
+/// What holds the vertices by the solve that was made, kg m, into ClothSystem::residual. The
+/// springs of a vertex reach others, whose constraints must not change meanwhile.
+void find_reactions(State& state, const ConstVecView& given) {
+  ClothSystem& s = state.cloth_system;
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ConstVecView change = s.change.view();
+  const VecView reaction = s.residual.view();
+  parallel_for(
+      state.queue, "cloth: reactions", state.cloth.vertices,
+      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
+}
+
+/// Lets go the axes along which a wall pulls, where sheets lie on sheets: alone each of them would
+/// have gone to the wall. Holds what went through it. Whether anything changed.
+bool revise_walls(State& state, int round) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const WallRevision revise{.walls = cloth_walls_of(state.parameters),
+                            .position = c.position.view(),
+                            .path = path_velocity_of(state),
+                            .reaction = s.residual.view(),
+                            .free = s.free.view(),
+                            .change = s.change.view(),
+                            .block = block_inverse(state),
+                            .inertia = s.inertia.data(),
+                            .inverse_mass = c.inverse_mass.data(),
+                            .dt = float(state.dt),
+                            .reach = state.parameters.spacing,
+                            .release = round < 3};
+  return parallel_reduce(
+             state.queue, "cloth: revise walls", c.vertices, 0,
+             DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
+}
+
 /// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
 /// sticks and who slides; whether anything changed. What was let go is not held again in the step:
 /// the guard stops it.
 bool revise_holds(State& state, const ConstVecView& given, int round) {
   ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
-  const ClothMatrix matrix = cloth_matrix(state);
-  const VecView change = s.change.view();
-  const VecView reaction = s.residual.view();
-  // The springs of a vertex reach others, whose constraints must not change meanwhile.
-  parallel_for(
-      state.queue, "cloth: reactions", c.vertices,
-      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
   const HoldRevision revise{.hold = cloth_hold_of(state),
                             .position = c.position.view(),
                             .velocity = c.velocity.view(),
                             .path = path_velocity_of(state),
-                            .change = change,
+                            .change = s.change.view(),
                             .given = given,
                             .right = s.answer.view(),
-                            .reaction = reaction,
+                            .reaction = s.residual.view(),
                             .rub = s.rub.view(),
                             .slides = s.slides.data(),
                             .mass = c.mass.data(),
@@ -256,8 +323,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 }  // namespace
 
-void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
-                         float tolerance) {
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     float tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();
@@ -265,8 +332,15 @@ void settle_at_obstacles(State& state, const ConstVecView& given, int most_itera
   parallel_for(
       state.queue, "cloth: given", state.cloth.padded,
       DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
-  for (int round = 0; round < most_rounds && revise_holds(state, given, round); ++round)
+  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
+  for (int round = 0; round < most_rounds; ++round) {
+    find_reactions(state, given);
+    bool changed = obstacles && revise_holds(state, given, round);
+    if (sheets) changed |= revise_walls(state, round);
+    if (sheets) changed |= revise_sheet_rows(state, round);
+    if (!changed) break;
     solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
+  }
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

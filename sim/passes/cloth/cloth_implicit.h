@@ -12,6 +12,7 @@
 
 #include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_springs.h"
+#include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/shell_system.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -47,6 +48,7 @@ inline ConstraintProjection constraint_projection(const State& state) {
 struct ClothMatrix {
   SpringEnds ends;
   ShellMatrix shell;
+  SheetRows contact;
   const float *tension, *inertia;
   ConstVecView axis;
   ConstraintProjection constraints;
@@ -69,7 +71,8 @@ struct ClothMatrix {
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
       y = y + d * load(tension, at) + e * dot(e, d);
     }
-    return shell.any ? y + shell.times(view, i) : y;
+    if (shell.any) y = y + shell.times(view, i);
+    return contact.any ? y + contact.times(view, i) : y;
   }
 };
 
@@ -77,6 +80,7 @@ inline ClothMatrix cloth_matrix(const State& state) {
   const ClothSystem& s = state.cloth_system;
   return {.ends = spring_ends_of(state.cloth),
           .shell = shell_matrix_of(state),
+          .contact = sheet_rows_of(state),
           .tension = s.tension.data(),
           .inertia = s.inertia.data(),
           .axis = s.axis.view(),
@@ -102,6 +106,20 @@ struct BlockInverse {
     const T d2 = T(1.f) / maximum(b[5] - l20 * b[2] - l21 * m21, least);
     const T value[6] = {d0, d1, d2, l10, l20, l21};
     for (int k = 0; k < 6; ++k) store(field(k), i, value[k]);
+  }
+  /// The entries of a block, as `put` takes them.
+  DRENCH_HD void entries(int i, float (&b)[6]) const {
+    const float d0 = 1.f / field(0)[i], d1 = 1.f / field(1)[i], d2 = 1.f / field(2)[i],
+                l10 = field(3)[i], l20 = field(4)[i], l21 = field(5)[i];
+    b[0] = d0, b[1] = d0 * l10, b[2] = d0 * l20;
+    b[3] = d0 * l10 * l10 + d1, b[4] = d0 * l10 * l20 + d1 * l21;
+    b[5] = d0 * l20 * l20 + d1 * l21 * l21 + d2;
+  }
+  DRENCH_HD void add(int i, const float (&more)[6], float least) const {
+    float b[6];
+    entries(i, b);
+    for (int k = 0; k < 6; ++k) b[k] += more[k];
+    put(i, b, least);
   }
   /// The block of `from` on the directions that are perpendicular to `held` and along the axes
   /// `free`; the rest of it is any.

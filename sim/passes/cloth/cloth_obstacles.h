@@ -139,7 +139,7 @@ inline ClothHold cloth_hold_of(State& state) {
 /// As hold_at_walls, whose axes it takes into account.
 void hold_at_obstacles(State& state);
 
-/// What a round of settle_at_obstacles makes of one vertex. Forces in kg m, over dt^2.
+/// What a round of settle_contacts makes of one vertex. Forces in kg m, over dt^2.
 struct HoldRevision {
   ClothHold hold;
   ConstVecView position, velocity, path;
@@ -214,8 +214,7 @@ struct HoldRevision {
 /// The solve of the sheets was made: on with friction and with other vertices held, until these are
 /// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
 /// momentum of a sheet that is held.
-void settle_at_obstacles(State& state, const ConstVecView& given, int most_iterations,
-                         float tolerance);
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

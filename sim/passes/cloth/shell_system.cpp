@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/shell_bending.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -365,6 +366,7 @@ void keep_shell_step(State& state) {
   const ConstVecView free = state.cloth_system.free.view(),
                      normal = state.cloth_system.normal.view();
   const bool obstacles = state.parameters.obstacles > 0;
+  const SheetRows contact = sheet_rows_of(state);
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
@@ -372,7 +374,8 @@ void keep_shell_step(State& state) {
         internal.set(i, (base[i] - matrix.times(change, i)) * (inverse_dt * inverse_dt));
         const bool shell = fan_slot[2 * fan_start[i]] >= 0,
                    held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
-                          (obstacles && length2(normal[i]) > 0.f);
+                          (obstacles && length2(normal[i]) > 0.f) ||
+                          (contact.any && contact.touches(i));
         acceleration.set(i, shell && !held ? (next_velocity[i] - v[i]) * inverse_dt
                                            : Vec3<float>{0.f, 0.f, 0.f});
         // What x + way + rounding loses by being rounded, if that is where the vertex ends.

@@ -146,6 +146,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
         next.set(v, x[v]);
       });
   if (state.parameters.obstacles > 0) carry_held_vertices(state);
+  guard_sheets(state);  // others may go through what is held
 }
 
 /// Chooses the particles that could meet a sheet within the step, with room for cloth to move twice

@@ -204,8 +204,8 @@ void settle_cloth(State& state) {
                      state.shell.any ? quiet_speed : 0.);
     solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
   }
-  if (state.parameters.obstacles > 0)
-    settle_at_obstacles(state, given, last_sweeps, last_tolerance);
+  if (state.parameters.obstacles > 0 || state.self_contact.rows > 0)
+    settle_contacts(state, given, last_sweeps, last_tolerance);
   balance_loose_cloth(state, s.change.view(), given);
 }
 
@@ -269,6 +269,7 @@ void finish_cloth(State& state) {
         predicted.put(i, velocity);
       });
   if (state.parameters.obstacles > 0) finish_at_obstacles(state, near ? right : base);
+  guard_sheets(state);
   if (shells) keep_shell_step(state);
 }
 

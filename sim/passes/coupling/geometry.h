@@ -1,6 +1,7 @@
 #pragma once
 // Point, segment and path against triangles.
 
+#include "sim/backend/double_scalar.h"
 #include "sim/backend/vec3.h"
 
 namespace drench::sim::DRENCH_BACKEND {

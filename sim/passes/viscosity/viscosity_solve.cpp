@@ -40,17 +40,9 @@ void invert_drag_blocks(State& state) {
   const float mass = state.parameters.particle_mass, *inertia = state.cloth_system.inertia.data();
   parallel_for(
       state.queue, "sheet drag: blocks", state.cloth.vertices, DRENCH_LAMBDA(int v) {
-        const float d0 = 1.f / whole.field(0)[v], d1 = 1.f / whole.field(1)[v],
-                    d2 = 1.f / whole.field(2)[v], l10 = whole.field(3)[v], l20 = whole.field(4)[v],
-                    l21 = whole.field(5)[v], more = mass * loads.on(v).x;
-        const float b[6] = {d0 + more,
-                            d0 * l10,
-                            d0 * l20,
-                            d0 * l10 * l10 + d1 + more,
-                            d0 * l10 * l20 + d1 * l21,
-                            d0 * l20 * l20 + d1 * l21 * l21 + d2 + more};
-        const float least = maximum(inertia[v], 1e-20f);
-        block.put(v, b, least);
+        const float more = mass * loads.on(v).x, least = maximum(inertia[v], 1e-20f);
+        block.copy(v, whole);
+        block.add(v, {more, 0.f, 0.f, more, 0.f, more}, least);
         if (constraints.obstacles && length2(constraints.normal[v]) > 0.f)
           block.put_free(v, block, constraints.axis[v], constraints.normal[v], least);
       });
@@ -160,7 +152,7 @@ void give_back_cloth_drag(State& state) {
       state.queue, "sheet drag: give back", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         right.set(v, right[v] + loads.on(v) * (mass * dt));
         change.set(v, change[v] + more[v] * dt);
-        const bool rubs = grip && grip[v] >= 0;  // friction as settle_at_obstacles has found it
+        const bool rubs = grip && grip[v] >= 0;  // friction as settle_contacts has found it
         more.set(v, rubs ? right[v] + rub[v] : right[v]);
       });
   solve_cloth(state, change, more, last_sweeps, (grip ? 0.1f : 1.f) * last_tolerance);

@@ -1,0 +1,281 @@
+#include "sim/passes/cloth/self_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/backend/sort.h"
+#include "sim/passes/cloth/cloth_implicit.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+DRENCH_HD Vec3<float> off_normal(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
+
+/// Makes the row of a pair.
+struct RowMaker {
+  SheetPieces pieces;
+  const int* owned;
+  const float* inverse_mass;
+  ConstVecView position, rounding, velocity, path;
+  float dt, gravity;
+
+  DRENCH_HD SheetRow operator()(const SheetPair& pair) const {
+    SheetRow r{};
+    Vec3<float> x[4];
+    const Vec3<float> from = position[pair.vertex[0]], low = rounding[pair.vertex[0]];
+    for (int k = 0; k < 4; ++k) {
+      const int v = pair.vertex[k];
+      x[k] = (position[v] - from) + (rounding[v] - low);
+    }
+    const PieceDistance<float> at = distance_of_pieces(pieces.edges(pair), x);
+    const float distance = length(at.apart);
+    float inverse = 0.f;
+    for (int k = 0; k < 4; ++k) {
+      r.vertex[k] = pair.vertex[k], r.weight[k] = at.weight[k];
+      inverse += at.weight[k] * at.weight[k] * inverse_mass[pair.vertex[k]];
+    }
+    if (!stands_for(pair, at) || inverse == 0.f || distance == 0.f) return r;
+    r.mass = 1.f / inverse;
+    r.normal = at.apart * (1.f / distance);
+    r.thickness = pieces.thickness(pair);
+    r.friction =
+        pieces.vertex[pair.vertex[0]].root_friction * pieces.vertex[pair.vertex[3]].root_friction;
+    Vec3<float> way{0.f, 0.f, 0.f}, speed = way;
+    for (int k = 0; k < 4; ++k) {
+      way = way + path[pair.vertex[k]] * (dt * r.weight[k]);
+      speed = speed + velocity[pair.vertex[k]] * r.weight[k];
+    }
+    r.gap = distance + dot(r.normal, way);
+    r.slip = off_normal(way, r.normal), r.speed = off_normal(speed, r.normal);
+    // What starts too near comes apart no faster than it would fall through its thickness: a step
+    // that is shorter is to throw it no faster.
+    const float apart = dt * maximum(square_root(gravity * r.thickness), 20.f * r.thickness);
+    r.target = minimum(r.thickness, distance + minimum(apart, 0.25f * r.thickness));
+    if (r.gap > r.target + gravity * dt * dt) return r;
+    r.stiffness = row_stiffness * r.mass;
+    if (length(r.speed) < r.friction * gravity * dt) r.grip = row_grip * r.mass;
+    return r;
+  }
+  /// Whether the closest points lie inside of two edges, or on what the triangle owns.
+  DRENCH_HD bool stands_for(const SheetPair& pair, const PieceDistance<float>& at) const {
+    constexpr float none = 1e-5f;
+    if (pieces.edges(pair)) {
+      return at.weight[0] > none && at.weight[1] > none && at.weight[2] < -none &&
+             at.weight[3] < -none;
+    }
+    const bool a = at.weight[1] < -none, b = at.weight[2] < -none, c = at.weight[3] < -none;
+    if (a && b && c) return true;
+    const int bits = owned[pair.triangle];
+    const int piece = a && b ? 8 : b && c ? 16 : c && a ? 32 : a ? 1 : b ? 2 : 4;
+    return (bits & piece) != 0;
+  }
+};
+
+/// What a row gives beside its part of A: kg m.
+DRENCH_HD Vec3<float> push_of(const SheetRow& r) {
+  if (r.stiffness == 0.f) return {0.f, 0.f, 0.f};
+  return r.normal * (r.stiffness * (r.target - r.gap)) + r.rub - r.slip * r.grip;
+}
+
+/// Rows of vertices.
+void sort_rows(State& state) {
+  SelfContact& s = state.self_contact;
+  const SheetRow* row = s.row.data();
+  const int entries = 4 * s.rows, padded = state.cloth.padded;
+  s.key.resize(entries);
+  int* key = s.key.data();
+  parallel_for(
+      state.queue, "self: keys of rows", entries, DRENCH_LAMBDA(int e) {
+        const SheetRow& r = row[e >> 2];
+        key[e] = r.mass > 0.f ? r.vertex[e & 3] : padded;
+      });
+  stable_sort_keys(state.queue, s.key, entries, padded, s.entry, s.start);
+}
+
+/// Whose right sides follow the rows.
+enum class Sides { base, all };
+
+/// Puts what the rows give now on the right sides in place of what they gave.
+void load_by_rows(State& state, Sides sides) {
+  SelfContact& s = state.self_contact;
+  ClothSystem& system = state.cloth_system;
+  const SheetRows rows = sheet_rows_of(state);
+  const VecView load = s.load.view(), base = system.base.view(), right = system.right.view(),
+                answer = system.answer.view();
+  const bool all = sides == Sides::all;
+  parallel_for(
+      state.queue, "self: loads", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        Vec3<float> sum{0.f, 0.f, 0.f};
+        for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
+          const int at = rows.entry[e];
+          sum = sum + push_of(rows.row[at >> 2]) * rows.row[at >> 2].weight[at & 3];
+        }
+        const Vec3<float> more = sum - load[i];
+        load.set(i, sum);
+        base.set(i, base[i] + more);
+        if (all) right.set(i, right[i] + more), answer.set(i, answer[i] + more);
+      });
+}
+
+/// Brings the blocks of the preconditioner to the rows as they are, on the directions that a vertex
+/// may go.
+void put_rows_in_blocks(State& state, Sides sides) {
+  SelfContact& s = state.self_contact;
+  const SheetRows rows = sheet_rows_of(state);
+  ConstraintProjection may = constraint_projection(state);
+  may.obstacles = may.obstacles && sides == Sides::all;  // before, normals are of the last step
+  const BlockInverse block = block_inverse(state), free_block = free_block_inverse(state);
+  const float* inertia = state.cloth_system.inertia.data();
+  parallel_for(
+      state.queue, "self: blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        if (rows.start[i] == rows.start[i + 1]) return;
+        float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
+        bool any = false;
+        for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
+          const SheetRow& r = rows.row[rows.entry[e] >> 2];
+          const float w = r.weight[rows.entry[e] & 3], across = r.grip - r.in_block_across,
+                      along_normal = r.stiffness - r.in_block - across;
+          if (across == 0.f && along_normal == 0.f) continue;
+          any = true;
+          const auto column = [&](Vec3<float> axis) {
+            const Vec3<float> p = may.project(i, axis);
+            return may.project(i, p * across + r.normal * (along_normal * dot(r.normal, p))) *
+                   (w * w);
+          };
+          const Vec3<float> x = column({1.f, 0.f, 0.f}), y = column({0.f, 1.f, 0.f}),
+                            z = column({0.f, 0.f, 1.f});
+          more[0] += x.x, more[1] += x.y, more[2] += x.z, more[3] += y.y, more[4] += y.z,
+              more[5] += z.z;
+        }
+        if (!any) return;
+        block.add(i, more, inertia[i]);
+        if (may.obstacles) free_block.add(i, more, inertia[i]);
+      });
+  SheetRow* row = s.row.data();
+  parallel_for(
+      state.queue, "self: blocks hold", s.rows, DRENCH_LAMBDA(int k) {
+        row[k].in_block = row[k].stiffness, row[k].in_block_across = row[k].grip;
+      });
+}
+
+/// What a round makes of one row.
+struct RowRevision {
+  ConstVecView change;
+  float inverse_dt, dt;
+  int round;
+
+  /// Whether anything is to change.
+  DRENCH_HD bool operator()(SheetRow& r) const {
+    if (r.mass == 0.f) return false;
+    Vec3<float> s{0.f, 0.f, 0.f};
+    for (int k = 0; k < 4; ++k) s = s + change[r.vertex[k]] * r.weight[k];
+    const float along = dot(r.normal, s), gap = r.gap + along;
+    if (r.stiffness == 0.f) {
+      // What was let go twice is the guard's.
+      if (gap >= r.target - 0.02f * r.thickness || r.released > 1) return false;
+      r.stiffness = row_stiffness * r.mass;
+      return true;
+    }
+    const float force = r.stiffness * (r.target - gap);
+    if (force < 0.f) {
+      r.stiffness = r.grip = 0.f, r.rub = {0.f, 0.f, 0.f};
+      ++r.released;
+      return true;
+    }
+    return r.friction > 0.f && rubs(r, off_normal(s, r.normal), r.friction * force);
+  }
+  /// @param s  m, across the normal. @param most  kg m
+  DRENCH_HD bool rubs(SheetRow& r, Vec3<float> s, float most) const {
+    const float now = length(r.rub);
+    if (r.grip > 0.f) {
+      const Vec3<float> pull = (r.slip + s) * -r.grip;
+      const float size = length(pull);
+      return size > most && slide(r, pull * (most / size));
+    }
+    if (now == 0.f) {  // holds what is slow enough for friction to stop it
+      const float size = length(r.speed);
+      if (size * r.mass * dt <= most) return stick(r);
+      return slide(r, r.speed * (-most / size));
+    }
+    const Vec3<float> slip = r.speed + s * inverse_dt;
+    if (round < 3 && dot(slip, r.rub) > 0.f) return stick(r);
+    return fabsf(now - most) > 0.02f * most && slide(r, r.rub * (most / now));
+  }
+  static DRENCH_HD bool stick(SheetRow& r) {
+    r.grip = row_grip * r.mass, r.rub = {0.f, 0.f, 0.f};
+    return true;
+  }
+  static DRENCH_HD bool slide(SheetRow& r, Vec3<float> rub) {
+    r.grip = 0.f, r.rub = rub;
+    return true;
+  }
+};
+
+/// How far off the straight paths vertices may end before pairs have to be found anew: what gravity
+/// and a little of what pushes take, or what they did in the step before, up to a tenth of an edge.
+float slack_of(const State& state, float gravity) {
+  const SelfContact& s = state.self_contact;
+  const float dt = float(state.dt);
+  const ConstVecView acceleration = state.shell.acceleration.view();
+  const float fastest2 = parallel_reduce(
+      state.queue, "self: accelerations", state.cloth.vertices, 0.f,
+      DRENCH_LAMBDA(int i) { return length2(acceleration[i]); }, Larger{});
+  const float least = 2.f * gravity * dt * dt + 0.1f * s.thickness;
+  return std::max(least, std::min(1.5f * dt * dt * std::sqrt(fastest2), 0.1f * s.edge));
+}
+
+}  // namespace
+
+void start_sheet_rows(State& state) {
+  SelfContact& s = state.self_contact;
+  const ClothState& c = state.cloth;
+  s.pairs = s.rows = 0;
+  if (!s.any) return;
+  const float* g = state.parameters.gravity;
+  const float dt = float(state.dt), gravity = std::hypot(g[0], g[1], g[2]);
+  const ConstVecView x = c.position.view(), path = path_velocity_of(state);
+  const VecView to = s.to.view();
+  parallel_for(
+      state.queue, "self: paths", c.vertices,
+      DRENCH_LAMBDA(int i) { to.set(i, x[i] + path[i] * dt); });
+  find_sheet_pairs(state, slack_of(state, gravity));
+  if (s.pairs == 0) return;
+  s.rows = s.pairs;
+  s.row.resize(s.rows);
+  const RowMaker make{.pieces = sheet_pieces_of(state),
+                      .owned = s.owned.data(),
+                      .inverse_mass = c.inverse_mass.data(),
+                      .position = x,
+                      .rounding = state.shell.rounding.view(),
+                      .velocity = c.velocity.view(),
+                      .path = path,
+                      .dt = dt,
+                      .gravity = gravity};
+  const SheetPair* pair = s.pair.data();
+  SheetRow* row = s.row.data();
+  parallel_for(
+      state.queue, "self: rows", s.rows, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
+  sort_rows(state);
+  s.load.clear(state.queue);
+  load_by_rows(state, Sides::base);
+  put_rows_in_blocks(state, Sides::base);
+}
+
+bool revise_sheet_rows(State& state, int round) {
+  SelfContact& s = state.self_contact;
+  if (s.rows == 0) return false;
+  const float dt = float(state.dt);
+  const RowRevision revise{state.cloth_system.change.view(), 1.f / dt, dt, round};
+  SheetRow* row = s.row.data();
+  const bool changed = parallel_reduce(
+                           state.queue, "self: revise", s.rows, 0,
+                           DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
+  if (!changed) return false;
+  ++s.rounds;
+  load_by_rows(state, Sides::all);
+  put_rows_in_blocks(state, Sides::all);
+  return true;
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND

@@ -1,0 +1,86 @@
+#pragma once
+// Contact of shells with themselves and each other, in the sheets' one system A w = b
+// (cloth_implicit.h). A pair of pieces that the step would bring nearer than their thickness is a
+// row: with s = sum_j w_j x_j, from one piece to the other, and n its direction at the start it
+// adds to A
+//   (k n n^T + g (1 - n n^T)) w_i w_j,
+// a stiffness of many times the pair's reduced mass, g only while friction holds the pair. A row
+// never pulls: after the solve those that do are let go, and those that came too near are taken in,
+// in a few rounds (revise_sheet_rows); the same rounds find who sticks and who slides by Coulomb's
+// law. Within a pressure solve the rows stay as they are. Where a pair's closest points lie on a
+// side or a corner of a triangle, the one that owns these has the row, so that contact is not
+// counted by how many triangles meet there (the blocks of Chen et al. 2025).
+//
+// What the solve leaves is no proof: guard_sheets, last of all, stops vertices short of crossing.
+
+#include "sim/passes/cloth/self_contact_pairs.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+/// Of a row, over the pair's reduced mass: 50 layers at rest press the lowest by a fifth of a
+/// millimetre at most; and across the normal, where what is held creeps.
+constexpr float row_stiffness = 100.f, row_grip = 100.f;
+
+/// The rows' part of A.
+struct SheetRows {
+  const SheetRow* row;
+  const int *start, *entry;
+  bool any;
+
+  /// What a row gives at a displacement, kg m.
+  static DRENCH_HD Vec3<float> pull(const SheetRow& r, const ConstVecView& x) {
+    Vec3<float> s{0.f, 0.f, 0.f};
+    for (int k = 0; k < 4; ++k) s = s + x[r.vertex[k]] * r.weight[k];
+    return s * r.grip + r.normal * ((r.stiffness - r.grip) * dot(r.normal, s));
+  }
+  DRENCH_HD Vec3<float> times(const ConstVecView& x, int i) const {
+    Vec3<float> y{0.f, 0.f, 0.f};
+    for (int e = start[i]; e < start[i + 1]; ++e) {
+      const SheetRow& r = row[entry[e] >> 2];
+      if (r.stiffness > 0.f) y = y + pull(r, x) * r.weight[entry[e] & 3];
+    }
+    return y;
+  }
+#if !defined(__CUDACC__)
+  DRENCH_HD_CALL Vec3<Pack> times(const ConstVecView& x, Lanes i) const {
+    alignas(32) float lane[3][8] = {};
+    for (int k = 0; k < 8; ++k) {
+      const Vec3<float> y = times(x, i.base + k);
+      lane[0][k] = y.x, lane[1][k] = y.y, lane[2][k] = y.z;
+    }
+    return {Pack::load(lane[0]), Pack::load(lane[1]), Pack::load(lane[2])};
+  }
+#endif
+  DRENCH_HD bool touches(int i) const {
+    for (int e = start[i]; e < start[i + 1]; ++e)
+      if (row[entry[e] >> 2].stiffness > 0.f) return true;
+    return false;
+  }
+  /// Whether another sheet does: a shift of the whole meets resistance.
+  DRENCH_HD bool touches_another(int i, const SheetVertex* vertex) const {
+    for (int e = start[i]; e < start[i + 1]; ++e) {
+      const SheetRow& r = row[entry[e] >> 2];
+      if (r.stiffness > 0.f && vertex[r.vertex[0]].sheet != vertex[r.vertex[3]].sheet) return true;
+    }
+    return false;
+  }
+};
+
+inline SheetRows sheet_rows_of(const State& state) {
+  const SelfContact& s = state.self_contact;
+  return {s.row.data(), s.start.data(), s.entry.data(), s.rows > 0};
+}
+
+/// Finds the pairs and makes their rows; those that the straight paths bring too near are in the
+/// system from the start. After linearise_cloth.
+void start_sheet_rows(State& state);
+
+/// Lets go the rows that pull by the solve that was made, takes in what came too near, and finds
+/// who sticks and who slides; the right sides follow. Whether anything changed.
+bool revise_sheet_rows(State& state, int round);
+
+/// Stops the vertices on their way to ClothState::next where they would take sheets through each
+/// other. What stops has the velocity that it came with.
+void guard_sheets(State& state);
+
+}  // namespace drench::sim::DRENCH_BACKEND
