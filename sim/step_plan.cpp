@@ -176,7 +176,8 @@ const Pass all_passes[] = {
      cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped | shell_system |
          shell_history | self_contact | sorting,
      settle_cloth_alone},
-    {"move_with_sheets", strong, moving | near_list | sheets | start | drift | cloth_system,
+    {"move_with_sheets", strong,
+     moving | near_list | sheets | start | drift | cloth_system | shell_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
          sorting | cloth_load | stopped | shell_history | self_contact,
      move_with_sheets},

@@ -98,11 +98,11 @@ TEST_F(ShotFile, AppliesOverridesAfterTheQuality) {
   const Shot shot = parse(
       full_shot(), {.quality = "preview",
                     .set = {"fluid.spacing=0.05", "cloth.flag.damping = 2", "light.1.radius=0.3",
-                            "coupling.scheme=paper", "camera.fov_deg=[[1, 20], [2, 30]]"}});
+                            "surface.smoothing=3", "camera.fov_deg=[[1, 20], [2, 30]]"}});
   EXPECT_EQ(shot.fluid.spacing, 0.05);
   EXPECT_EQ(shot.cloth[1].damping, 2);
   EXPECT_EQ(shot.light[1].radius, 0.3);
-  EXPECT_EQ(shot.coupling.scheme, CouplingScheme::paper);
+  EXPECT_EQ(shot.surface.smoothing, 3);
   EXPECT_EQ(shot.camera.fov_deg.keys.size(), 2u);
   EXPECT_EQ(shot.render.width, 96);
 }

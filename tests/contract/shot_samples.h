@@ -93,6 +93,9 @@ box = {min = [-1, 0, -1], max = [0, 2, 0]}
 [[cloth]]
 name = "flag"
 mesh = "flag.obj"
+model = "shell"
+fabric = "silk"
+young_weft = 9000
 
 [[cloth.pin]]
 vertices = [0]

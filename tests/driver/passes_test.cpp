@@ -25,7 +25,7 @@ struct Written {
   sim::ColumnSet changed, declared;
 };
 
-/// The shots whose bits are kept, which use every pass, and cloth alone in wind.
+/// The shots whose bits are kept, which use every pass, and cloth alone in wind, and as a shell.
 std::map<std::string, Shot> kept_shots() {
   std::map<std::string, Shot> shots;
   for (const auto& entry : std::filesystem::directory_iterator(DRENCH_SOURCE_DIR "/tests/bits"))
@@ -34,6 +34,9 @@ std::map<std::string, Shot> kept_shots() {
   Shot wind = shots.at("napkin");
   wind.wind.present = true, wind.wind.velocity = Animated<V3d>(V3d(3, 0, 0));
   shots["napkin in wind"] = wind;
+  Shot shell = shots.at("napkin");
+  shell.cloth[0].model = ClothModel::shell;
+  shots["napkin as a shell"] = shell;
   return shots;
 }
 

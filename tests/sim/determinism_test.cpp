@@ -27,6 +27,14 @@ Shot splash(double shift = 0) {
   return shot;
 }
 
+/// The same onto cotton that is a shell.
+Shot shell_splash(double shift = 0) {
+  Shot shot = splash(shift);
+  shot.fluid.solver = FluidSolver::incompressible;
+  shot.cloth[0].model = ClothModel::shell;
+  return shot;
+}
+
 TEST(Determinism, AnyNumberOfThreadsGivesTheSameBits) {
   for (int k = 0; k < 3; ++k) {
     Shot shot = splash();
@@ -67,6 +75,17 @@ TEST(Determinism, ALatticeShiftOfTenKilometresGivesTheSameBits) {
     here.fluid.solver = there.fluid.solver = solver;
     expect_same_state(after(here, 60), after(there, 60));
   }
+}
+
+TEST(Determinism, ShellsHaveTheSameBitsOnThreadsElsewhereAndResumed) {
+  const Shot here = shell_splash();
+  expect_same_bits_on_threads(here, 60);
+  expect_same_state(after(here, 60), after(shell_splash(1e4), 60));
+  expect_same_bits_when_resumed(here, 60, 0);
+  Shot alone = here;  // on its own step, without fluid
+  alone.fluid.box.clear(), alone.cloth[0].pin = {{.vertices = {0, 24}}};
+  expect_same_bits_on_threads(alone, 60);
+  expect_same_bits_when_resumed(alone, 60, 0);
 }
 
 // A spacing that is no binary fraction: rest lengths are rounded where the shot stands.
@@ -113,6 +132,10 @@ class Resume : public testing::TestWithParam<FluidSolver> {
     if (GetParam() == FluidSolver::incompressible) {
       shot.wind.present = true, shot.wind.gust = 2;
       shot.wind.velocity.keys = {{1001, V3d(0)}, {1004, V3d(6, 0, 1)}};
+      Cloth shell = shot.cloth[0];  // in the company of springs
+      shell.name = "shell", shell.model = ClothModel::shell;
+      shell.corner.y -= 0.1, shell.cells = V2i(8, 8);
+      shot.cloth.push_back(shell);
     }
     Sink sink;  // below the emitter
     sink.shape.type = ObstacleType::sphere, sink.shape.radius = 0.04;

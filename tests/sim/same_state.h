@@ -30,6 +30,12 @@ inline void expect_same_state(const sim::HostState& a, const sim::HostState& b) 
   expect_same_vectors(a.owed, b.owed);
   expect_same_vectors(a.cloth_position, b.cloth_position);
   expect_same_vectors(a.cloth_velocity, b.cloth_velocity);
+  expect_same_vectors(a.shell_landed, b.shell_landed);
+  expect_same_vectors(a.shell_rounding, b.shell_rounding);
+  expect_same_vectors(a.shell_left, b.shell_left);
+  expect_same_vectors(a.shell_acceleration, b.shell_acceleration);
+  expect_same_vectors(a.shell_internal, b.shell_internal);
+  EXPECT_EQ(a.shell_dt, b.shell_dt);
 }
 
 /// After so many steps of dt s; of the largest stable size if it is 0. @param start  Shot or Scene.

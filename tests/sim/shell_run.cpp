@@ -42,7 +42,7 @@ ShellStatics statics_of(const ShellSheet& sheet) {
                                          sheet.young / (2 * (1 + sheet.poisson)), sheet.poisson);
   ShellStatics statics(placed(sheet),
                        {sheet.areal_density, sim::rigidity_of_plate(sheet.bend, sheet.poisson)},
-                       {law, sim::cpu::strain_limit(100., 1.), 0.});
+                       {law, sim::cpu::strain_limit(sheet.stretch_limit, sheet.young), 0.});
   statics.add_gravity(sheet.gravity);
   return statics;
 }
@@ -50,8 +50,7 @@ ShellStatics statics_of(const ShellSheet& sheet) {
 }  // namespace
 
 std::string shell_text(const ShellSheet& sheet, const std::string& mesh) {
-  std::string text =
-      fmt::format(R"(
+  std::string text = fmt::format(R"(
 [shot]
 frames = [1, 100]
 gravity = {}
@@ -69,20 +68,21 @@ poisson = {}
 bend_warp = {}
 bend_weft = {}
 bend_bias = {}
-stretch_limit = 100
+stretch_limit = {}
 areal_density = {}
 damping = {}
 damping_time = {}
 )",
-                  numbers(sheet.gravity), mesh, sheet.young, sheet.young,
-                  sheet.young / (2 * (1 + sheet.poisson)), sheet.poisson, sheet.bend, sheet.bend,
-                  sheet.bend, sheet.areal_density, sheet.damping, sheet.damping_time);
+                                 numbers(sheet.gravity), mesh, sheet.young, sheet.young,
+                                 sheet.young / (2 * (1 + sheet.poisson)), sheet.poisson, sheet.bend,
+                                 sheet.bend, sheet.bend, sheet.stretch_limit, sheet.areal_density,
+                                 sheet.damping, sheet.damping_time);
   const sim::ShellSurface surface = placed(sheet);
   std::string pins;
   for (size_t v = 0; v < surface.held.size(); ++v)
     if (surface.held[v]) pins += fmt::format("{}{}", pins.empty() ? "" : ", ", v);
   if (!pins.empty()) text += "[[cloth.pin]]\nvertices = [" + pins + "]\n";
-  return text + sheet.more;
+  return text;
 }
 
 ShellRun::ShellRun(const ShellSheet& sheet)

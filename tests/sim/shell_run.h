@@ -9,17 +9,20 @@
 
 namespace drench::sim_tests {
 
+constexpr double shell_gravity = 9.81;  // m/s^2, downwards
+
 /// An isotropic sheet that spans size.length along `along` and size.width along `across`.
 struct ShellSheet {
   SheetMesh mesh = SheetMesh::diagonal;
   SheetSize size{1, 1, 8};
-  V3d corner{0}, along{1, 0, 0}, across{0, 0, 1};  // m; unit vectors
-  double young = 1000, bend = 1e-4, poisson = 0;   // N/m, N m
-  double areal_density = 0.2;                      // kg/m^2
-  double damping = 0, damping_time = 0;            // 1/s, s
-  V3d gravity{0, -9.81, 0};                        // m/s^2
-  std::function<bool(V3d)> held;                   // of a place in its plane; empty: nothing is
-  std::string more;                                // sections of the shot file after those above
+  V3d corner{0}, along{1, 0, 0}, across{0, 0, 1};   // m; unit vectors
+  double young = 1000, bend = 1e-4, poisson = 0;    // N/m, N m
+  double areal_density = 0.2, stretch_limit = 100;  // kg/m^2, 1
+  double damping = 0, damping_time = 0;             // 1/s, s
+  V3d gravity{0, -shell_gravity, 0};                // m/s^2
+  std::function<bool(V3d)> held = {};               // of a place in its plane; empty: nothing is
+
+  double weight() const { return areal_density * shell_gravity; }  // N/m^2
 };
 
 /// A shot file whose sheet is the OBJ file `mesh`.

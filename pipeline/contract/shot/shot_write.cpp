@@ -301,7 +301,8 @@ std::string commented(const char* name, const char* why, void* object = nullptr)
   std::string text = fmt::format("\n# {} {}\n# {}\n", section.description, why, header_of(section));
   for (const Parameter* p : shot_table::parameters_of(section.name)) {
     if (object && !shot_table::applies(*p, section, object)) continue;
-    const std::string value = object && p->fixed ? shown_value(*p, object) : default_text(*p);
+    const bool own = object && (p->fixed || p->key == section.type_key);
+    const std::string value = own ? shown_value(*p, object) : default_text(*p);
     text += fmt::format("# {} = {}  # {}{}: {}\n", p->key,
                         value.empty() || value[0] == '*' ? "..." : value,
                         p->required ? "required; " : "", value_column(*p), p->description);
@@ -324,8 +325,11 @@ std::string reference_shot(const std::string& name) {
       });
   FluidEmitter mesh;
   mesh.type = EmitterType::mesh;
+  Cloth shell;
+  shell.model = ClothModel::shell;
   return text + commented("fluid.emitter", "A mesh not without its file.", &mesh) +
          commented("fluid.volume", "Not without its file.") +
+         commented("cloth", "As a shell in place of springs.", &shell) +
          commented("obstacle", "At its defaults it would stand in the fluid above.") +
          commented("sink", "At its defaults it would take the fluid above.");
 }

@@ -13,11 +13,12 @@
 // once; forces inside sum to zero step by step, so that momentum is kept. A vertex that something
 // stopped takes up its path anew.
 //
-// f is linearised once, the membrane triangle by triangle: where the straight paths end if these
-// hardly strain it, so that turning costs no stretch, else at x_0. Its part of A are 3 x 3 blocks
-// of vertices that share a triangle (shell_membrane.h, stress projected), bending's a number for
-// every pair of vertices (shell_bending.h). Positions carry what they round off: a stiff sheet
-// feels a tenth of a micrometre.
+// f is linearised once, the membrane triangle by triangle: where the straight paths end as long as
+// these hardly strain it, so that turning costs no stretch, the farther back towards x_0 the more
+// they do. Its part of A are 3 x 3 blocks of vertices that share a triangle (shell_membrane.h, the
+// stress that pulls sideways projected and of x_0: with that of the end limp strips boil),
+// bending's a number for every pair of vertices (shell_bending.h). Positions carry what they round
+// off: a stiff sheet feels a tenth of a micrometre.
 
 #include "sim/passes/cloth/shell_membrane.h"
 #include "sim/passes/coupling/polygon_grid.h"
