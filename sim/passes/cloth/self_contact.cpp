@@ -127,7 +127,8 @@ BlockInverse blocks_without_rows(State& state) {
 void put_rows_in_blocks(State& state, Sides sides) {
   const SheetRows rows = sheet_rows_of(state);
   ConstraintProjection may = constraint_projection(state);
-  may.obstacles = may.obstacles && sides == Sides::all;  // before, normals are of the last step
+  const bool first = sides == Sides::base;
+  may.obstacles = may.obstacles && !first;  // before, normals are of the last step
   const BlockInverse block = block_inverse(state), free_block = free_block_inverse(state),
                      without = blocks_without_rows(state);
   const float *inertia = state.cloth_system.inertia.data(),
@@ -135,6 +136,7 @@ void put_rows_in_blocks(State& state, Sides sides) {
   parallel_for(
       state.queue, "self: blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
         if (rows.start[i] == rows.start[i + 1] || inverse_mass[i] == 0.f) return;
+        if (first && !rows.touches(i)) return;
         float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
         for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
           const SheetRow& r = rows.row[rows.entry[e] >> 2];
