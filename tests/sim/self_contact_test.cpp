@@ -96,10 +96,10 @@ class Watched {
   double energy_, least_energy_, most_energy_;
 };
 
-class Layers : public testing::TestWithParam<int> {};
-INSTANTIATE_TEST_SUITE_P(Stack, Layers, testing::Values(2, 10));
+class LayersOfCloth : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Stack, LayersOfCloth, testing::Values(2, 10));
 
-TEST_P(Layers, RestOnTheFloorApart) {
+TEST_P(LayersOfCloth, RestOnTheFloorApart) {
   Watched watch(stack(GetParam(), 0));
   watch.until(0.3);
   EXPECT_EQ(watch.crossings, 0);
@@ -108,7 +108,7 @@ TEST_P(Layers, RestOnTheFloorApart) {
   EXPECT_LT(watch.run.limits.max_speed, 0.01);
 }
 
-TEST_P(Layers, FallOnTheFloorAndStayApart) {
+TEST_P(LayersOfCloth, FallOnTheFloorAndStayApart) {
   Watched watch(stack(GetParam(), 0.1));
   watch.until(0.3);
   EXPECT_EQ(watch.crossings, 0);
