@@ -213,18 +213,17 @@ struct SheetPair {
 struct SheetRow {
   int vertex[4];
   float weight[4];
-  Vec3<float> normal;               // unit, from the second to the first
-  float gap;                        // m, at the end of the straight paths
-  float thickness;                  // m, that the pair keeps apart
-  float target;                     // m, gap that is asked for
-  Vec3<float> slip;                 // m, across the normal along the straight paths
-  Vec3<float> speed;                // m/s, across the normal at the start of the step
-  float mass;                       // kg, reduced; 0: no row
-  float friction;                   // Coulomb's coefficient
-  float stiffness, grip;            // kg, along the normal and across it; 0: none
-  float in_block, in_block_across;  // kg, what the blocks of the preconditioner hold of these
-  Vec3<float> rub;                  // kg m, friction of what slides
-  int released;                     // times that the row was let go in this step
+  Vec3<float> normal;     // unit, from the second to the first
+  float gap;              // m, at the end of the straight paths
+  float thickness;        // m, that the pair keeps apart
+  float target;           // m, gap that is asked for
+  Vec3<float> slip;       // m, across the normal along the straight paths
+  Vec3<float> speed;      // m/s, across the normal at the start of the step
+  float mass;             // kg, reduced; 0: no row
+  float friction;         // Coulomb's coefficient
+  float stiffness, grip;  // kg, along the normal and across it; 0: none
+  Vec3<float> rub;        // kg m, friction of what slides
+  int released;           // times that the row was let go in this step
 };
 
 /// Contact of shells with themselves and each other (passes/cloth/self_contact_pairs.h).
@@ -249,6 +248,7 @@ struct SelfContact {
   Column<SheetPair> pair;
   Column<SheetRow> row;
   Column<int> key, start, entry;       // of a vertex: 4 row + corner
+  Column<float> block;                 // as ClothSystem::factor, without rows; where there are any
   VecColumn load;                      // kg m, of the rows on a vertex, as it is in the right side
   VecColumn wanted;                    // m, ends of the paths that the guard shortens
   Column<float> portion, stop;         // of a vertex' path that it may go; of a pair's

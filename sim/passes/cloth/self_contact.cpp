@@ -118,44 +118,43 @@ void load_by_rows(State& state, Sides sides) {
       });
 }
 
-/// Brings the blocks of the preconditioner to the rows as they are, on the directions that a vertex
-/// may go.
+BlockInverse blocks_without_rows(State& state) {
+  return {state.self_contact.block.data(), state.cloth.padded};
+}
+
+/// Makes the blocks of the preconditioner anew, with the rows as they are, on the directions that a
+/// vertex may go.
 void put_rows_in_blocks(State& state, Sides sides) {
-  SelfContact& s = state.self_contact;
   const SheetRows rows = sheet_rows_of(state);
   ConstraintProjection may = constraint_projection(state);
-  may.obstacles = may.obstacles && sides == Sides::all;  // before, normals are of the last step
-  const BlockInverse block = block_inverse(state), free_block = free_block_inverse(state);
-  const float* inertia = state.cloth_system.inertia.data();
+  const bool first = sides == Sides::base;
+  may.obstacles = may.obstacles && !first;  // before, normals are of the last step
+  const BlockInverse block = block_inverse(state), free_block = free_block_inverse(state),
+                     without = blocks_without_rows(state);
+  const float *inertia = state.cloth_system.inertia.data(),
+              *inverse_mass = state.cloth.inverse_mass.data();
   parallel_for(
       state.queue, "self: blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (rows.start[i] == rows.start[i + 1]) return;
+        if (rows.start[i] == rows.start[i + 1] || inverse_mass[i] == 0.f) return;
+        if (first && !rows.touches(i)) return;
         float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
-        bool any = false;
         for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
           const SheetRow& r = rows.row[rows.entry[e] >> 2];
-          const float w = r.weight[rows.entry[e] & 3], across = r.grip - r.in_block_across,
-                      along_normal = r.stiffness - r.in_block - across;
-          if (across == 0.f && along_normal == 0.f) continue;
-          any = true;
-          const auto column = [&](Vec3<float> axis) {
-            const Vec3<float> p = may.project(i, axis);
-            return may.project(i, p * across + r.normal * (along_normal * dot(r.normal, p))) *
-                   (w * w);
-          };
-          const Vec3<float> x = column({1.f, 0.f, 0.f}), y = column({0.f, 1.f, 0.f}),
-                            z = column({0.f, 0.f, 1.f});
-          more[0] += x.x, more[1] += x.y, more[2] += x.z, more[3] += y.y, more[4] += y.z,
-              more[5] += z.z;
+          const float w = r.weight[rows.entry[e] & 3], across = r.grip * w * w,
+                      normal = (r.stiffness - r.grip) * w * w;
+          const Vec3<float> n = r.normal, m = n * normal;
+          more[0] += m.x * n.x + across, more[1] += m.x * n.y, more[2] += m.x * n.z;
+          more[3] += m.y * n.y + across, more[4] += m.y * n.z, more[5] += m.z * n.z + across;
         }
-        if (!any) return;
+        block.copy(i, without);
         block.add(i, more, inertia[i]);
-        if (may.obstacles) free_block.add(i, more, inertia[i]);
-      });
-  SheetRow* row = s.row.data();
-  parallel_for(
-      state.queue, "self: blocks hold", s.rows, DRENCH_LAMBDA(int k) {
-        row[k].in_block = row[k].stiffness, row[k].in_block_across = row[k].grip;
+        const Vec3<float> axes = may.axis[i];
+        if (axes.x * axes.y * axes.z == 0.f)
+          block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+        if (!may.obstacles) return;
+        const Vec3<float> held = may.normal[i];
+        free_block.copy(i, block);
+        if (length2(held) > 0.f) free_block.put_free(i, block, axes, held, inertia[i]);
       });
 }
 
@@ -259,6 +258,10 @@ void start_sheet_rows(State& state) {
   sort_rows(state);
   s.load.clear(state.queue);
   load_by_rows(state, Sides::base);
+  const BlockInverse block = block_inverse(state), without = blocks_without_rows(state);
+  parallel_for(
+      state.queue, "self: blocks without rows", c.vertices,
+      DRENCH_LAMBDA(int i) { without.copy(i, block); });
   put_rows_in_blocks(state, Sides::base);
 }
 

@@ -233,7 +233,7 @@ void load_self_contact(State& state, const ClothTopology& t) {
   for (VecColumn* column : {&s.low, &s.high, &s.sorted_low, &s.sorted_high})
     column->resize(t.triangles());
   s.to.resize(state.cloth.padded), s.wanted.resize(state.cloth.padded),
-      s.load.resize(state.cloth.padded);
+      s.load.resize(state.cloth.padded), s.block.resize(size_t(6) * state.cloth.padded);
   s.cell.resize(t.triangles()), s.count.resize(t.triangles()), s.first.resize(t.triangles());
   s.portion.resize(state.cloth.padded), s.point.resize(state.cloth.padded);
 }
