@@ -43,10 +43,10 @@ std::map<std::string, Shot> kept_shots() {
 /// By shot and pass: what launches in some steps changed.
 std::map<std::pair<std::string, std::string>, Written> written_in_kept_shots() {
   std::map<std::pair<std::string, std::string>, Written> written;
-  for (const auto& [name, shot] : kept_shots()) {
-    Stepper run(shot, make_level_set);
+  for (const auto& kept : kept_shots()) {
+    Stepper run(kept.second, make_level_set);
     run.solver->observe_passes([&](const sim::PassInfo& pass, sim::ColumnSet groups) {
-      Written& of = written[{name, pass.name}];
+      Written& of = written[{kept.first, pass.name}];
       of.changed |= groups, of.declared |= pass.writes;
     });
     for (int k = 0; k < 500; ++k) run.step();

@@ -109,7 +109,8 @@ std::vector<V3d> ShellRun::velocities() const {
 void ShellRun::start_from(const std::vector<V3d>& places, const std::vector<V3d>& velocities) {
   sim::HostState state = scene.start;
   for (size_t v = 0; v < size(); ++v) {
-    const V3d x = places[v] - origin_, u = velocities[v];
+    const V3d x = places[v] - origin_;
+    const V3d& u = velocities[v];
     state.cloth_position.x[v] = float(x.x), state.cloth_position.y[v] = float(x.y),
     state.cloth_position.z[v] = float(x.z);
     state.cloth_velocity.x[v] = float(u.x), state.cloth_velocity.y[v] = float(u.y),

@@ -109,7 +109,8 @@ struct ShellTension {
   template <class Index>
   DRENCH_HD auto times(const ConstVecView& view, Index i) const {
     const auto x = view.at(i);
-    auto y = x - x;
+    using T = decltype(x.x);
+    Vec3<T> y{T(0.f), T(0.f), T(0.f)};
     const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
     for (int k = 0; k < rows.ring_start[slice + 1] - ring; ++k) {
       y = y + (x - rows.at_end(view, i, rows.row_start[slice] + k)) *
@@ -117,10 +118,10 @@ struct ShellTension {
     }
     return y;
   }
-  /// @param like  says of which kind the sum is
+  /// The second says of which kind the sum is.
   template <class Index, class T>
-  DRENCH_HD T diagonal(Index i, T like) const {
-    T sum = like - like;
+  DRENCH_HD T diagonal(Index i, T) const {
+    T sum(0.f);
     const int slice = ShellRows::slice(i);
     for (int k = rows.ring_start[slice]; k < rows.ring_start[slice + 1]; ++k)
       sum = sum + load(tension, ShellRows::entry(k, i));
