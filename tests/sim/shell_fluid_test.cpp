@@ -98,9 +98,8 @@ TEST(ShellInWater, APlateUnderWaterSagsAsItsClosedForm) {
 
 struct Measured {
   std::vector<double> time, value;  // s, m
-  explicit Measured(const std::string& axis) : time{0}, value{0} {
-    for (const auto& row :
-         read_validation("elastic_gate_antoci_2007_experiment_" + axis + ".csv")) {
+  explicit Measured(const char* file) : time{0}, value{0} {
+    for (const auto& row : read_validation(file)) {
       if (row[0] == "t_s" || std::stod(row[0]) <= 0) continue;
       time.push_back(std::stod(row[0])), value.push_back(std::stod(row[1]));
     }
@@ -161,7 +160,8 @@ struct Opened {
   double most = 0, most_time = 0;  // m, s: of x
 };
 Opened opened_gate(double a) {
-  const Measured x("x"), y("y");
+  const Measured x("elastic_gate_antoci_2007_experiment_x.csv"),
+      y("elastic_gate_antoci_2007_experiment_y.csv");
   Stepper run(parse_shot(gate_text(a), "gate.toml"));
   Opened found;
   while (run.time < 0.3) {
