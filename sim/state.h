@@ -253,7 +253,6 @@ struct SelfContact {
   VecColumn wanted;                    // m, ends of the paths that the guard shortens
   Column<float> portion, stop;         // of a vertex' path that it may go; of a pair's
   Column<int> pair_start, pair_entry;  // of a vertex: 4 pair + corner
-  uint64_t rounds = 0, stops = 0;      // since the start: of the rows; vertices that were stopped
 };
 
 /// Contacts sorted by triangle.

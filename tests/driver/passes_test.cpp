@@ -25,7 +25,19 @@ struct Written {
   sim::ColumnSet changed, declared;
 };
 
-/// The shots whose bits are kept, which use every pass, and cloth alone in wind, and as a shell.
+/// Shells in place of a shot's sheets, each with another just above it.
+Shot with_layers(Shot shot) {
+  for (size_t k = shot.cloth.size(); k-- > 0;) {
+    shot.cloth[k].model = ClothModel::shell;
+    Cloth above = shot.cloth[k];
+    above.name += "_above", above.corner.y += 1.2 * above.thickness;
+    shot.cloth.push_back(above);
+  }
+  return shot;
+}
+
+/// The shots whose bits are kept, which use every pass, two of them with layers of shells, and
+/// cloth alone in wind.
 std::map<std::string, Shot> kept_shots() {
   std::map<std::string, Shot> shots;
   for (const auto& entry : std::filesystem::directory_iterator(DRENCH_SOURCE_DIR "/tests/bits"))
@@ -34,9 +46,8 @@ std::map<std::string, Shot> kept_shots() {
   Shot wind = shots.at("napkin");
   wind.wind.present = true, wind.wind.velocity = Animated<V3d>(V3d(3, 0, 0));
   shots["napkin in wind"] = wind;
-  Shot shell = shots.at("napkin");
-  shell.cloth[0].model = ClothModel::shell;
-  shots["napkin as a shell"] = shell;
+  shots["layers"] = with_layers(shots.at("napkin"));
+  shots["layers in water"] = with_layers(shots.at("splash"));
   return shots;
 }
 

@@ -211,9 +211,9 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// The solve of the sheets was made: on with friction and with other vertices held, until these are
-/// the right ones, or nearly. To a tenth of its tolerance, since no shift of the whole closes the
-/// momentum of a sheet that is held.
+/// The solve of the sheets was made: on with friction and with other vertices and pairs of sheets
+/// held (self_contact.h), until these are the right ones, or nearly. To a tenth of its tolerance,
+/// since no shift of the whole closes the momentum of a sheet that is held.
 void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,

@@ -275,7 +275,6 @@ bool revise_sheet_rows(State& state, int round) {
                            state.queue, "self: revise", s.rows, 0,
                            DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
   if (!changed) return false;
-  ++s.rounds;
   load_by_rows(state, Sides::all);
   put_rows_in_blocks(state, Sides::all);
   return true;

@@ -17,8 +17,8 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Of a row, over the pair's reduced mass: 50 layers at rest press the lowest by a fifth of a
-/// millimetre at most; and across the normal, where what is held creeps.
+/// Of a row, over the pair's reduced mass: 50 layers of cotton at rest stay 0.88 thicknesses apart,
+/// and what friction holds on a slope of 1 in 2 creeps by 0.04 mm/s.
 constexpr float row_stiffness = 100.f, row_grip = 100.f;
 
 /// The rows' part of A.

@@ -44,14 +44,14 @@ struct VertexStop {
   float* portion;
   Stop how;
 
-  DRENCH_HD bool operator()(int v) const {
+  DRENCH_HD void operator()(int v) const {
     float part = 2.f, nearest = 1e30f;
     for (int e = start[v]; e < start[v + 1]; ++e) {
       part = minimum(part, stop[entry[e] >> 2]);
       if (how == Stop::bounded) nearest = minimum(nearest, distance(pair[entry[e] >> 2]));
     }
     if (how == Stop::at_start) part = 0.f;
-    if (part >= 1.f || portion[v] == 0.f) return false;
+    if (part >= 1.f || portion[v] == 0.f) return;
     float may = portion[v] * part;
     const Vec3<float> x = position[v], way = wanted[v] - x;
     if (how == Stop::bounded)
@@ -59,7 +59,6 @@ struct VertexStop {
     if (may < 1e-3f) may = 0.f;
     portion[v] = may;
     next.set(v, may == 0.f ? x : x + way * may);
-    return true;
   }
   DRENCH_HD float distance(const SheetPair& p) const {
     Vec3<float> x[4];
@@ -117,9 +116,8 @@ void stop_vertices(State& state, Stop how) {
                         .next = state.cloth.next.view(),
                         .portion = s.portion.data(),
                         .how = how};
-  s.stops += uint64_t(parallel_reduce(
-      state.queue, "self: stop", state.cloth.vertices, 0,
-      DRENCH_LAMBDA(int v) { return int(stop(v)); }, Plus{}));
+  parallel_for(
+      state.queue, "self: stop", state.cloth.vertices, DRENCH_LAMBDA(int v) { stop(v); });
 }
 
 /// Without rebound.
