@@ -1,5 +1,7 @@
 #include "sim/passes/cloth/shell_columns.h"
 
+#include "sim/passes/cloth/shell_system.h"
+
 #include <algorithm>
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -27,7 +29,7 @@ void load_triangles(State& state, const ClothTopology& cloth) {
   }
   from_host(s.area, area), from_host(s.gradient, gradient), from_host(s.law, law);
   from_host(s.corner, corner), from_host(s.sheet, sheet);
-  s.element.resize(size_t(36) * padded);
+  s.element.resize(size_t(shell_element_fields) * padded);
   if (!state.cloth.joined) return;
   std::vector<float> shift[3];
   const std::vector<float>* from[3] = {&cloth.corner_shift.x, &cloth.corner_shift.y,

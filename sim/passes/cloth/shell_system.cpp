@@ -12,7 +12,8 @@ namespace {
 /// Fields of a triangle: minus the blocks of corners 0 1, 0 2 and 1 2 by rows, times dt^2 and what
 /// of the new force counts; forces on corners 1 and 2 where straight paths end; tensions of the
 /// sides 0 1, 0 2, 1 2.
-enum ElementFields { blocks = 0, forces = 27, tensions = 33, element_fields = 36 };
+enum ElementFields { blocks = 0, forces = 27, tensions = 33 };
+static_assert(tensions + 3 == shell_element_fields);
 
 /// What places the corners of triangles, where the step starts: positions with what they round off;
 /// or so much later on straight paths.

@@ -25,6 +25,9 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
+/// Of a triangle in ShellState::element.
+constexpr int shell_element_fields = 36;
+
 /// Entries of the rows of eight vertices follow each other slot by slot.
 struct ShellRows {
   const int *ring_start, *row_start, *end, *offset;
