@@ -69,8 +69,10 @@ TEST(Shots, AreValidInEveryQualityLockToTheSameAndStart) {
 // What init writes can be simulated, not only read.
 TEST(Shots, OfInitCanBeStarted) {
   for (const std::string& text : {starting_shot("first"), reference_shot("all")}) {
-    const sim::Scene scene = sim::build_scene(parse_shot(text, "init.toml"));
-    EXPECT_EQ(scene.sheet.size(), 1u);
+    const Shot shot = parse_shot(text, "init.toml");
+    const sim::Scene scene = sim::build_scene(shot);
+    EXPECT_FALSE(shot.cloth.empty());
+    EXPECT_EQ(scene.sheet.size(), shot.cloth.size());
     EXPECT_FALSE(scene.start.id.empty());
   }
 }
