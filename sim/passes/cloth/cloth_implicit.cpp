@@ -323,8 +323,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 }  // namespace
 
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
-                     float tolerance) {
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float between,
+                     float last) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();
@@ -339,8 +339,9 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
     if (sheets) changed |= revise_walls(state, round);
     if (sheets) changed |= revise_sheet_rows(state, round);
     if (!changed) break;
-    solve_cloth(state, change, right, most_iterations, 0.1f * tolerance);
+    solve_cloth(state, change, right, most_iterations, between);
   }
+  if (last < between) solve_cloth(state, change, right, most_iterations, last);
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

@@ -212,9 +212,11 @@ struct HoldRevision {
 };
 
 /// The solve of the sheets was made: on with friction and with other vertices and pairs of sheets
-/// held (self_contact.h), until these are the right ones, or nearly. To a tenth of its tolerance,
-/// since no shift of the whole closes the momentum of a sheet that is held.
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float tolerance);
+/// held (self_contact.h), until these are the right ones, or nearly.
+/// @param between  tolerance of the solves of which more may follow
+/// @param last  and of the last, where it is less
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float between,
+                     float last);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

@@ -194,18 +194,23 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
 void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
+  const bool meets = state.parameters.obstacles > 0 || state.self_contact.rows > 0;
+  const bool loosely = meets && state.shell.any;
+  const float first = loosely ? contact_tolerance : last_tolerance;
   if (state.contact.near > 0) {
-    respond_cloth(state, last_sweeps, last_tolerance);
+    respond_cloth(state, last_sweeps, first);
   } else {
     s.right.clear(state.queue);
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
                      state.shell.any ? quiet_speed : 0.);
-    solve_cloth(state, s.change.view(), given, last_sweeps, last_tolerance);
+    solve_cloth(state, s.change.view(), given, last_sweeps, first);
   }
-  if (state.parameters.obstacles > 0 || state.self_contact.rows > 0)
-    settle_contacts(state, given, last_sweeps, last_tolerance);
+  // No shift of the whole closes the momentum of a sheet that is held: a tenth.
+  const float between = loosely ? contact_tolerance : 0.1f * last_tolerance;
+  if (meets)
+    settle_contacts(state, given, last_sweeps, between, loosely ? last_tolerance : between);
   balance_loose_cloth(state, s.change.view(), given);
 }
 
