@@ -282,6 +282,26 @@ void for_each_shell_column(S& state, const Visit& visit) {
 }
 
 template <class S, class Visit>
+void for_each_cloth_level_column(S& state, const Visit& visit) {
+  using Group = ColumnGroup;
+  auto& s = state.cloth_levels;
+  visit({"leaf", "1", Group::cloth_fixed}, s.leaf, none);
+  visit({"leaf.vertex", "1", Group::cloth_fixed}, s.leaf_vertex, none);
+  visit({"leaf.weight", "1", Group::cloth_fixed}, s.leaf_weight, none);
+  visit({"levels.reach", "1", Group::cloth_fixed}, s.reach, none);
+  visit({"levels.rest", "m", Group::cloth_fixed}, s.rest, none);
+  visit({"levels.centre", "m", Group::cloth_fixed}, s.centre, none);
+  visit({"levels.local", "m", Group::cloth_fixed}, s.local, none);
+  visit({"levels.slot_local", "m", Group::cloth_fixed}, s.slot_local, none);
+  visit({"levels.partial", "", Group::cloth_system}, s.partial, none);
+  visit({"levels.strain", "", Group::cloth_system}, s.strain, none);
+  visit({"levels.held", "kg", Group::cloth_system}, s.held, none);
+  visit({"levels.inverse", "", Group::cloth_system}, s.inverse, none);
+  visit({"levels.moment", "", Group::cloth_system}, s.moment, none);
+  visit({"levels.answer", "", Group::cloth_system}, s.answer, none);
+}
+
+template <class S, class Visit>
 void for_each_self_contact_column(S& state, const Visit& visit) {
   using Group = ColumnGroup;
   auto& s = state.self_contact;
@@ -330,6 +350,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_cloth_column(state, visit);
   for_each_system_column(state, visit);
   for_each_shell_column(state, visit);
+  for_each_cloth_level_column(state, visit);
   for_each_self_contact_column(state, visit);
   for_each_solid_column(state.obstacles, ColumnGroup::obstacles, visit);
   for_each_solid_column(state.sinks, ColumnGroup::sinks, visit);

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
+#include "sim/passes/cloth/cloth_levels.h"
 #include "sim/passes/cloth/self_contact_pairs.h"
 #include "sim/passes/cloth/shell_columns.h"
 #include "sim/passes/motion/measure_limits.h"
@@ -336,6 +337,7 @@ class BackendSolver : public Solver {
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
     load_shell(state_, t);
+    load_cloth_levels(state_, t);
     load_self_contact(state_, t);
   }
 

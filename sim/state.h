@@ -186,6 +186,36 @@ struct ShellState {
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
 };
 
+/// Coarse levels of the sheets' solve (passes/cloth/cloth_levels.h). None without shells.
+struct ClothLevels {
+  static constexpr int most = 12, functions = 4;
+  struct Level {
+    int first, count;  // of its aggregates: a is the parent of 4 a to 4 a + 3 of the one before
+  };
+  int levels = 0, aggregates = 0;  // of all levels, each padded to a multiple of eight
+  Level level[most];
+  // fixed
+  Column<int> leaf;           // of a vertex: its aggregate of the finest level
+  Column<int> leaf_vertex;    // eight of these by slots: see slot()
+  Column<float> leaf_weight;  // 1, and 0 of slots that hold none
+  Column<int> reach;          // of a vertex: the coarsest level at which it has a neighbour in
+                              // another aggregate of the one before
+  VecColumn rest, centre;     // m, of vertices, and of aggregates
+  VecColumn local,
+      slot_local;  // m, of vertices from the centre of their finest aggregate, by slots
+  // rebuilt every step
+  Column<double> partial, strain;  // kg, kg m, kg m^2, of aggregates: sums of energies
+  Column<float> held;              // kg, of vertices: what holds them but moving neighbours
+  Column<float> inverse;           // 78 fields of aggregates: lower half of the inverse of B_l
+  Column<float> moment, answer;    // 12 fields of aggregates
+
+  /// Of the vertices of the finest aggregates those of eight stand slot by slot.
+  static DRENCH_HD int slot(int a, int k) { return (a >> 3) * 64 + 8 * k + (a & 7); }
+#if !defined(__CUDACC__)
+  static DRENCH_HD Lanes slot(Lanes a, int k) { return {8 * a.base + 8 * k}; }
+#endif
+};
+
 /// What contact among sheets asks of a vertex.
 struct SheetVertex {
   Vec3<float> rest;      // m
@@ -405,6 +435,7 @@ struct State {
   ClothState cloth;
   ClothSystem cloth_system;
   ShellState shell;
+  ClothLevels cloth_levels;
   SelfContact self_contact;
   ContactState contact;
   ObstacleState obstacles, sinks;

@@ -323,8 +323,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 }  // namespace
 
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float between,
-                     float last) {
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     const ContactTolerances& tolerance) {
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();
@@ -333,15 +333,17 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
       state.queue, "cloth: given", state.cloth.padded,
       DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
   const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
+  float reached = tolerance.first;
   for (int round = 0; round < most_rounds; ++round) {
     find_reactions(state, given);
     bool changed = obstacles && revise_holds(state, given, round);
     if (sheets) changed |= revise_walls(state, round);
     if (sheets) changed |= revise_sheet_rows(state, round);
     if (!changed) break;
-    solve_cloth(state, change, right, most_iterations, between);
+    solve_cloth(state, change, right, most_iterations, tolerance.between);
+    reached = tolerance.between;
   }
-  if (last < between) solve_cloth(state, change, right, most_iterations, last);
+  if (reached > tolerance.last) solve_cloth(state, change, right, most_iterations, tolerance.last);
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

@@ -11,6 +11,7 @@
 // holds up have the w that takes them there.
 
 #include "sim/backend/solve_control.h"
+#include "sim/passes/cloth/cloth_levels.h"
 #include "sim/passes/cloth/cloth_springs.h"
 #include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/shell_system.h"
@@ -268,6 +269,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
         residual.put(i, r);
         scaled.put(i, matrix.scaled(i, r));
       });
+  add_cloth_levels(state, matrix);
   for (int k = 0;; ++k) {
     sum_lanes_then(
         state.queue, "cloth: image", n,
@@ -280,6 +282,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
     if (ended(s.control, k, most_iterations)) break;
     for_each_lane(
         state.queue, "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
+    add_cloth_levels(state, matrix);
   }
 }
 void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,

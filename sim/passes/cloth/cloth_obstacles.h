@@ -211,12 +211,16 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// The solve of the sheets was made: on with friction and with other vertices and pairs of sheets
-/// held (self_contact.h), until these are the right ones, or nearly.
-/// @param between  tolerance of the solves of which more may follow
-/// @param last  and of the last, where it is less
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations, float between,
-                     float last);
+/// Tolerances of the first solve of a step, of those between which contacts change, and of the
+/// last, which is made where the one before it was to a larger one.
+struct ContactTolerances {
+  float first, between, last;
+};
+
+/// The first solve of the sheets was made: on with friction and with other vertices and pairs of
+/// sheets held (self_contact.h), until these are the right ones, or nearly.
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     const ContactTolerances& tolerance);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

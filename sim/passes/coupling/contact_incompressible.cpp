@@ -81,20 +81,27 @@ void sum_loads(State& state, Base base) {
 /// sweeps' tolerance counts from no less than this speed of the whole.
 constexpr double quiet_speed = 1e-3;
 
-/// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts, and with `speed`
-/// the kinetic energy, m (v dt)^2, of that.
+/// r . A_block^-1 r of the right side, from which the sweeps' tolerance counts, with the levels of
+/// the matrix, and with `speed` the kinetic energy, m (v dt)^2, of that. Into ClothSystem::residual
+/// and scaled.
 template <class Matrix>
 void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of, float keep,
                       double speed) {
   ClothControl* control = state.cloth_system.control.data();
   const float* inertia = state.cloth_system.inertia.data();
   const double least = speed * speed * state.dt * state.dt;  // m^2
+  const VecView residual = state.cloth_system.residual.view(),
+                scaled = state.cloth_system.scaled.view();
+  parallel_for(
+      state.queue, "cloth: scaled right side", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        if (i == 0) control->done = 0;
+        const Vec3<float> r = matrix.moving(i, of[i]);
+        residual.set(i, r), scaled.set(i, matrix.scaled(i, r));
+      });
+  add_cloth_levels(state, matrix);
   reduce_then(
       state.queue, "cloth: reference", state.cloth.vertices, 0.,
-      DRENCH_LAMBDA(int i) {
-        const Vec3<float> r = matrix.moving(i, of[i]);
-        return dot_double(r, matrix.scaled(i, r)) + least * inertia[i];
-      },
+      DRENCH_LAMBDA(int i) { return dot_double(residual[i], scaled[i]) + least * inertia[i]; },
       Plus{},
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
 }
@@ -179,6 +186,7 @@ void start_cloth(State& state) {
   if (state.parameters.obstacles > 0) hold_at_obstacles(state);
   add_cloth_to_diagonal(state);
   sum_loads(state, Base::none);
+  build_cloth_levels(state);
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   add_to_reference(state, matrix, s.right.view(), 0.f, state.shell.any ? quiet_speed : 0.);
   add_to_reference(state, matrix, s.base.view(), 1.f, 0.);
@@ -191,11 +199,28 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
   solve_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
 }
 
+namespace {
+
+/// Whether rows of sheets or obstacles hold any vertex, as far as known before the solve.
+bool something_holds(const State& state) {
+  const SheetRows rows = sheet_rows_of(state);
+  const int* grip = state.cloth_system.grip.data();
+  const bool obstacles = state.parameters.obstacles > 0;
+  return parallel_reduce(
+             state.queue, "cloth: held", state.cloth.vertices, 0,
+             DRENCH_LAMBDA(int i) {
+               return int((rows.any && rows.touches(i)) || (obstacles && grip[i] >= 0));
+             },
+             Larger{}) > 0;
+}
+
+}  // namespace
+
 void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
   const bool meets = state.parameters.obstacles > 0 || state.self_contact.rows > 0;
-  const bool loosely = meets && state.shell.any;
+  const bool loosely = state.shell.any && meets && something_holds(state);
   const float first = loosely ? contact_tolerance : last_tolerance;
   if (state.contact.near > 0) {
     respond_cloth(state, last_sweeps, first);
@@ -203,14 +228,18 @@ void settle_cloth(State& state) {
     s.right.clear(state.queue);
     hold_at_walls(state);
     if (state.parameters.obstacles > 0) hold_at_obstacles(state);
+    build_cloth_levels(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
                      state.shell.any ? quiet_speed : 0.);
+    // What falls freely needs no sweeps.
+    if (state.shell.any) balance_loose_cloth(state, s.change.view(), given);
     solve_cloth(state, s.change.view(), given, last_sweeps, first);
   }
-  // No shift of the whole closes the momentum of a sheet that is held: a tenth.
-  const float between = loosely ? contact_tolerance : 0.1f * last_tolerance;
+  // No shift of the whole closes the momentum of a sheet that is held: of springs to a tenth.
+  const float between = state.shell.any ? contact_tolerance : 0.1f * last_tolerance;
   if (meets)
-    settle_contacts(state, given, last_sweeps, between, loosely ? last_tolerance : between);
+    settle_contacts(state, given, last_sweeps,
+                    {.first = first, .between = between, .last = last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 

@@ -1,0 +1,486 @@
+#include "sim/passes/cloth/cloth_levels.h"
+
+#include <algorithm>
+
+#include "sim/passes/cloth/cloth_implicit.h"
+
+namespace drench::sim::DRENCH_BACKEND {
+
+namespace {
+
+/// Entries of a symmetric 3 x 3 block: xx xy xz yy yz zz.
+struct Symmetric3 {
+  float entry[6];
+
+  static DRENCH_HD Symmetric3 of(float isotropic) {
+    return {{isotropic, 0.f, 0.f, isotropic, 0.f, isotropic}};
+  }
+  static DRENCH_HD Symmetric3 of(Vec3<float> n, float along) {
+    const Vec3<float> m = n * along;
+    return {{m.x * n.x, m.x * n.y, m.x * n.z, m.y * n.y, m.y * n.z, m.z * n.z}};
+  }
+  friend DRENCH_HD Symmetric3 operator+(Symmetric3 a, const Symmetric3& b) {
+    for (int k = 0; k < 6; ++k) a.entry[k] += b.entry[k];
+    return a;
+  }
+  DRENCH_HD Symmetric3 scaled(float by) const {
+    Symmetric3 k = *this;
+    for (float& e : k.entry) e *= by;
+    return k;
+  }
+  DRENCH_HD void add(const Symmetric3& k) { *this = *this + k; }
+  DRENCH_HD void add(float k) { entry[0] += k, entry[3] += k, entry[5] += k; }
+  DRENCH_HD float trace() const { return entry[0] + entry[3] + entry[5]; }
+};
+
+/// Sums of energies of pairs of `count` functions by entries of their blocks.
+template <int count>
+struct Energies {
+  double block[count * (count + 1) / 2][6];
+
+  /// Of a spring between where functions have these values and a place that stands still.
+  DRENCH_HD void add(const float (&f)[count], const Symmetric3& k) {
+    for (int a = 0, pair = 0; a < count; ++a) {
+      for (int b = a; b < count; ++b, ++pair) {
+        const double both = double(f[a]) * f[b];
+        for (int e = 0; e < 6; ++e) block[pair][e] += both * k.entry[e];
+      }
+    }
+  }
+  DRENCH_HD void add(const float (&f)[count], float k) {
+    for (int a = 0, pair = 0; a < count; ++a) {
+      for (int b = a; b < count; ++b, ++pair) {
+        const double both = double(f[a]) * f[b] * k;
+        block[pair][0] += both, block[pair][3] += both, block[pair][5] += both;
+      }
+    }
+  }
+  DRENCH_HD void put(double* to) const {
+    for (int k = 0; k < 3 * count * (count + 1); ++k) to[k] = block[k / 6][k % 6];
+  }
+};
+
+struct LinkSums {
+  Energies<functions> all;
+  Energies<functions - 1> within;  // of differences, in which the first function has no part
+  // of one vertex, what it is held by:
+  Symmetric3 crossing;  // neighbours beyond the aggregate
+  Symmetric3 held;      // neighbours that do not move
+  float trace;          // all of them
+};
+
+/// What the vertices of one aggregate of the finest level give to its ancestor's energies at a
+/// level: first in all, then what two vertices have that no finer level had in one aggregate.
+struct LeafEnergies {
+  ClothMatrix matrix;
+  const SheetRow* row;
+  const int *row_start, *row_entry, *leaf, *leaf_vertex, *reach;
+  ConstVecView rest, centre;
+  const float *leaf_weight, *inverse_mass;
+  double* partial;
+  float* held;
+  int level, first;  // of the level's aggregates
+  bool obstacles;
+
+  DRENCH_HD bool moves(int v) const {
+    if (inverse_mass[v] == 0.f) return false;
+    return !obstacles || matrix.constraints.slides[v] > 0.f;
+  }
+  DRENCH_HD Vec3<float> from_centre(int a, int v) const {
+    return rest[v] - centre[first + (a >> (2 * level))];
+  }
+  template <class Stiffness>
+  DRENCH_HD void add_link(int a, int i, int j, const Stiffness& k, const Stiffness& half,
+                          LinkSums& to) const {
+    if (j == i) return;
+    if (!moves(j)) return to.held.add(k);
+    const int at = common_level(a, leaf[j]);
+    if (at > level) return to.crossing.add(k);
+    if (at < level) return;
+    const Vec3<float> d = rest[i] - rest[j];
+    to.within.add({d.x, d.y, d.z}, half);  // it comes from both
+  }
+  /// The row's energy once, by the first of its vertices in the aggregate.
+  DRENCH_HD void add_row(int a, const SheetRow& r, int corner, Energies<functions>& all) const {
+    if (!(r.stiffness > 0.f)) return;
+    float sum[functions] = {};
+    for (int k = 0; k < 4; ++k) {
+      const int v = r.vertex[k];
+      if (!moves(v) || common_level(a, leaf[v]) > level) continue;
+      if (k < corner) return;
+      const Vec3<float> x = from_centre(a, v) * r.weight[k];
+      sum[0] += r.weight[k], sum[1] += x.x, sum[2] += x.y, sum[3] += x.z;
+    }
+    all.add(sum, Symmetric3::of(r.grip) + Symmetric3::of(r.normal, r.stiffness - r.grip));
+  }
+  DRENCH_HD void add_shell(int a, int i, LinkSums& to) const {
+    const ShellRows& rows = matrix.shell.rows;
+    const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
+    const int begin = rows.row_start[slice], end = rows.row_start[slice + 1];
+    const int inner = begin + rows.ring_start[slice + 1] - ring;
+    for (int slot = begin; slot < inner; ++slot) {
+      const float* b = matrix.shell.block + ShellRows::entry(ring + slot - begin, i);
+      const int s = matrix.shell.stride;
+      const Symmetric3 k{{b[0], 0.5f * (b[s] + b[3 * s]), 0.5f * (b[2 * s] + b[6 * s]), b[4 * s],
+                          0.5f * (b[5 * s] + b[7 * s]), b[8 * s]}};
+      to.trace += k.trace();
+      add_link(a, i, rows.end[ShellRows::entry(slot, i)], k, k.scaled(0.5f), to);
+    }
+    for (int slot = inner; slot < end; ++slot) {
+      const int at = ShellRows::entry(slot, i);
+      const float k = matrix.shell.bend[at] * matrix.shell.dt2;
+      to.trace += 3.f * k;
+      add_link(a, i, rows.end[at], k, 0.5f * k, to);
+    }
+  }
+  DRENCH_HD void add_springs(int a, int i, LinkSums& to) const {
+    for (int s = 0; s < matrix.ends.slots; ++s) {
+      const int at = s * matrix.ends.stride + i;
+      const Symmetric3 k =
+          Symmetric3::of(matrix.tension[at]) + Symmetric3::of(matrix.axis[at], 1.f);
+      to.trace += k.trace();
+      add_link(a, i, matrix.ends.end[at], k, k.scaled(0.5f), to);
+    }
+  }
+  /// What holds a vertex that moves, beside neighbours that do; `stiff` is what all of them do.
+  DRENCH_HD Symmetric3 own(int i, float stiff) const {
+    const Vec3<float> free = matrix.constraints.axis[i];
+    Symmetric3 k = Symmetric3::of(matrix.inertia[i]);
+    k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
+    k.entry[5] += (1.f - free.z) * stiff;
+    if (obstacles) k = k + Symmetric3::of(matrix.constraints.normal[i], stiff);
+    if (!matrix.air.on) return k;
+    const Vec3<float> d = matrix.air.diagonal[i] * matrix.dt, c = matrix.air.cross[i] * matrix.dt;
+    return k + Symmetric3{{d.x, c.x, c.z, d.y, c.y, d.z}};
+  }
+  /// Beyond its reach a vertex has no neighbour in another aggregate.
+  DRENCH_HD void add_vertex(int a, int i, LinkSums& to) const {
+    float* kept = held + 6 * size_t(i);
+    if (level <= reach[i]) {
+      to.trace = 0.f, to.held = to.crossing = {};
+      if (matrix.shell.any) add_shell(a, i, to);
+      add_springs(a, i, to);
+    }
+    if (level == 0) {
+      const Symmetric3 all = own(i, to.trace) + to.held;
+      for (int e = 0; e < 6; ++e) kept[e] = all.entry[e];
+    }
+    Symmetric3 all{{kept[0], kept[1], kept[2], kept[3], kept[4], kept[5]}};
+    if (level <= reach[i]) all.add(to.crossing);
+    const Vec3<float> x = from_centre(a, i);
+    to.all.add({1.f, x.x, x.y, x.z}, all);
+  }
+  DRENCH_HD void operator()(int a) const {
+    LinkSums sum{};
+    for (int k = 0; k < most_vertices; ++k) {
+      const int at = ClothLevels::slot(a, k), i = leaf_vertex[at];
+      if (leaf_weight[at] == 0.f || !moves(i)) continue;
+      add_vertex(a, i, sum);
+      if (!matrix.contact.any) continue;
+      for (int e = row_start[i]; e < row_start[i + 1]; ++e)
+        add_row(a, row[row_entry[e] >> 2], row_entry[e] & 3, sum.all);
+    }
+    double* to = partial + size_t(sums) * a;
+    sum.all.put(to), sum.within.put(to + sums_of_all);
+  }
+};
+
+/// Inverse of a symmetric matrix by L D L^T, without the directions that have nothing.
+struct BlockOfFunctions {
+  double a[unknowns][unknowns];
+
+  DRENCH_HD void set(const double* all, const double* within) {
+    constexpr int at[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    for (int f = 0, pair = 0; f < functions; ++f) {
+      for (int g = f; g < functions; ++g, ++pair) {
+        const int apart = 6 * (pair - functions);  // of differences: none of the first function
+        for (int r = 0; r < 3; ++r) {
+          for (int c = 0; c < 3; ++c) {
+            const double more = f > 0 ? within[apart + at[r][c]] : 0.,
+                         value = all[6 * pair + at[r][c]] + more;
+            a[3 * f + r][3 * g + c] = a[3 * g + c][3 * f + r] = value;
+          }
+        }
+      }
+    }
+  }
+  DRENCH_HD void factor(double (&inverse_pivot)[unknowns]) {
+    for (int k = 0; k < unknowns; ++k) {
+      const double whole = a[k][k];
+      double pivot = whole;
+      for (int j = 0; j < k; ++j) pivot -= a[k][j] * a[k][j] * inverse_pivot[j];
+      inverse_pivot[k] = pivot > 1e-5 * whole && whole > 0. ? 1. / pivot : 0.;
+      for (int i = k + 1; i < unknowns; ++i) {  // L D below the diagonal
+        double sum = a[i][k];
+        for (int j = 0; j < k; ++j) sum -= a[i][j] * a[k][j] * inverse_pivot[j];
+        a[i][k] = sum;
+      }
+    }
+  }
+  /// The lower half by rows, from one entry to the next `stride`.
+  DRENCH_HD void invert(float* to, int stride) {
+    double d[unknowns];
+    factor(d);
+    for (int column = 0; column < unknowns; ++column) {
+      double x[unknowns] = {};
+      x[column] = 1.;
+      for (int k = column; k < unknowns; ++k)
+        for (int i = k + 1; i < unknowns; ++i) x[i] -= a[i][k] * d[k] * x[k];
+      for (int k = unknowns - 1; k >= 0; --k) {
+        x[k] *= d[k];
+        for (int i = k + 1; i < unknowns; ++i) x[k] -= a[i][k] * d[k] * x[i];
+      }
+      for (int k = column; k < unknowns; ++k) to[(k * (k + 1) / 2 + column) * stride] = float(x[k]);
+    }
+  }
+};
+
+/// Coefficients of an aggregate's functions, or what vertices have in them.
+template <class T>
+struct Coefficients {
+  Vec3<T> of[functions];
+
+  /// Of a child, whose centre is `off` from this one's, in this one's functions.
+  DRENCH_HD void take_moments(const Coefficients& child, Vec3<T> off) {
+    const Vec3<T> whole = child.of[0];
+    for (int k = 0; k < functions; ++k) of[k] = of[k] + child.of[k];
+    of[1] = of[1] + whole * off.x, of[2] = of[2] + whole * off.y, of[3] = of[3] + whole * off.z;
+  }
+  /// Of the parent, from whose centre this one's is `off`.
+  DRENCH_HD void take_answer(const Coefficients& parent, Vec3<T> off) {
+    for (int k = 0; k < functions; ++k) of[k] = of[k] + parent.of[k];
+    of[0] = of[0] + parent.at(off) - parent.of[0];
+  }
+  DRENCH_HD Vec3<T> at(Vec3<T> x) const { return of[0] + of[1] * x.x + of[2] * x.y + of[3] * x.z; }
+};
+
+/// Columns of coefficients, by fields.
+struct CoefficientFields {
+  float* field;
+  int stride;
+
+  template <class Index>
+  DRENCH_HD auto at(Index i) const {
+    const auto entry = [&](int k) { return load(field + k * stride, i); };
+    Coefficients<decltype(entry(0))> c;
+    for (int f = 0; f < functions; ++f)
+      c.of[f] = {entry(3 * f), entry(3 * f + 1), entry(3 * f + 2)};
+    return c;
+  }
+  template <class Index, class T>
+  DRENCH_HD void put(Index i, const Coefficients<T>& c) const {
+    for (int f = 0; f < functions; ++f) {
+      store(field + 3 * f * stride, i, c.of[f].x),
+          store(field + (3 * f + 1) * stride, i, c.of[f].y);
+      store(field + (3 * f + 2) * stride, i, c.of[f].z);
+    }
+  }
+};
+
+/// f of places first to first + count - 1, and of those that pad them.
+template <class F>
+DRENCH_HD void for_each_lane_of(int first, int count, const F& f) {
+#if defined(__CUDACC__)
+  for (int k = 0; k < count; ++k) f(first + k);
+#else
+  for (int k = 0; k < count; k += 8) f(Lanes{first + k});
+#endif
+}
+
+/// What levels make of a residual: moments of vertices and of children, B_l^-1 of these, and the
+/// way back.
+struct LevelAnswers {
+  ClothLevels::Level level[ClothLevels::most];
+  const float *inverse, *leaf_weight;
+  ConstVecView centre, local, slot_local, residual;
+  const int *leaf_vertex, *leaf;
+  CoefficientFields moment, answer;
+  const ClothControl* control;
+
+  template <class Index, class T>
+  DRENCH_HD void solve(Index at, const Coefficients<T>& m) const {
+    const T from[unknowns] = {m.of[0].x, m.of[0].y, m.of[0].z, m.of[1].x, m.of[1].y, m.of[1].z,
+                              m.of[2].x, m.of[2].y, m.of[2].z, m.of[3].x, m.of[3].y, m.of[3].z};
+    T to[unknowns];
+    const float* entry = inverse;
+    for (int k = 0; k < unknowns; ++k) {
+      T sum(0.f);
+      for (int j = 0; j < k; ++j, entry += moment.stride) {
+        const T both = load(entry, at);
+        sum = sum + both * from[j], to[j] = to[j] + both * from[k];
+      }
+      to[k] = sum + load(entry, at) * from[k], entry += moment.stride;
+    }
+    answer.put(at, Coefficients<T>{{{to[0], to[1], to[2]},
+                                    {to[3], to[4], to[5]},
+                                    {to[6], to[7], to[8]},
+                                    {to[9], to[10], to[11]}}});
+  }
+  template <class Index>
+  DRENCH_HD void restrict_to_leaf(Index a) const {
+    if (control->done) return;
+    using T = decltype(load(inverse, a));
+    const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
+    Coefficients<T> m{{none, none, none, none}};
+    for (int k = 0; k < most_vertices; ++k) {
+      const auto at = ClothLevels::slot(a, k);
+      const auto v = load(leaf_vertex, at);
+      const Vec3<T> r = residual.at(v) * load(leaf_weight, at), x = slot_local.at(at);
+      m.of[0] = m.of[0] + r, m.of[1] = m.of[1] + r * x.x, m.of[2] = m.of[2] + r * x.y,
+      m.of[3] = m.of[3] + r * x.z;
+    }
+    moment.put(a, m);
+    solve(a, m);
+  }
+  /// The children of aggregate a of a level end before.
+  DRENCH_HD int children_end(int l, int a) const {
+    const int count = level[l - 1].count;
+    return level[l - 1].first + (count < 4 * a + 4 ? count : 4 * a + 4);
+  }
+  DRENCH_HD void gather_moments(int l, int a) const {
+    const Vec3<float> none{0.f, 0.f, 0.f};
+    Coefficients<float> m{{none, none, none, none}};
+    const int at = level[l].first + a;
+    for (int c = level[l - 1].first + 4 * a; c < children_end(l, a); ++c)
+      m.take_moments(moment.at(c), centre[c] - centre[at]);
+    moment.put(at, m);
+  }
+  DRENCH_HD void restrict_to(int l, int a) const {
+    if (control->done) return;
+    gather_moments(l, a);
+    solve(level[l].first + a, moment.at(level[l].first + a));
+  }
+  /// All of a small level.
+  DRENCH_HD void restrict_to_all_of(int l) const {
+    for (int a = 0; a < level[l].count; ++a) gather_moments(l, a);
+    for_each_lane_of(level[l].first, level[l].count, [&](auto a) { solve(a, moment.at(a)); });
+  }
+  DRENCH_HD void give_to_children(int l, int a) const {
+    if (control->done) return;
+    const int at = level[l].first + a;
+    const Coefficients<float> parent = answer.at(at);
+    for (int c = level[l - 1].first + 4 * a; c < children_end(l, a); ++c) {
+      Coefficients<float> child = answer.at(c);
+      child.take_answer(parent, centre[c] - centre[at]);
+      answer.put(c, child);
+    }
+  }
+  /// What the levels give to a vertex, m.
+  template <class Index>
+  DRENCH_HD auto at_vertex(Index i) const {
+    return answer.at(load(leaf, i)).at(local.at(i));
+  }
+};
+
+LevelAnswers level_answers_of(State& state) {
+  ClothLevels& s = state.cloth_levels;
+  LevelAnswers all{.level = {},
+                   .inverse = s.inverse.data(),
+                   .leaf_weight = s.leaf_weight.data(),
+                   .centre = s.centre.view(),
+                   .local = s.local.view(),
+                   .slot_local = s.slot_local.view(),
+                   .residual = state.cloth_system.residual.view(),
+                   .leaf_vertex = s.leaf_vertex.data(),
+                   .leaf = s.leaf.data(),
+                   .moment = {s.moment.data(), s.aggregates},
+                   .answer = {s.answer.data(), s.aggregates},
+                   .control = state.cloth_system.control.data()};
+  std::copy(s.level, s.level + s.levels, all.level);
+  return all;
+}
+
+/// Aggregates of levels that are this small are one launch.
+constexpr int small_level = 256;
+
+}  // namespace
+
+void build_cloth_levels(State& state) {
+  ClothLevels& s = state.cloth_levels;
+  if (s.levels == 0) return;
+  const SelfContact& c = state.self_contact;
+  const int stride = s.aggregates;
+  double *partial = s.partial.data(), *strain = s.strain.data();
+  float* inverse = s.inverse.data();
+  for (int l = 0; l < s.levels; ++l) {
+    const LeafEnergies leaves{.matrix = cloth_matrix(state),
+                              .row = c.row.data(),
+                              .row_start = c.start.data(),
+                              .row_entry = c.entry.data(),
+                              .leaf = s.leaf.data(),
+                              .leaf_vertex = s.leaf_vertex.data(),
+                              .reach = s.reach.data(),
+                              .rest = s.rest.view(),
+                              .centre = s.centre.view(),
+                              .leaf_weight = s.leaf_weight.data(),
+                              .inverse_mass = state.cloth.inverse_mass.data(),
+                              .partial = partial,
+                              .held = s.held.data(),
+                              .level = l,
+                              .first = s.level[l].first,
+                              .obstacles = state.parameters.obstacles > 0};
+    parallel_for(
+        state.queue, "levels: leaves", s.level[0].count, DRENCH_LAMBDA(int a) { leaves(a); });
+    for (int k = 1; k <= l; ++k) {
+      const ClothLevels::Level from = s.level[k - 1], to = s.level[k];
+      parallel_for(
+          state.queue, "levels: sums", to.count, DRENCH_LAMBDA(int a) {
+            double* sum = partial + size_t(sums) * (to.first + a);
+            for (int e = 0; e < sums; ++e) sum[e] = 0.;
+            for (int c = 4 * a; c < 4 * a + 4 && c < from.count; ++c) {
+              const double* of = partial + size_t(sums) * (from.first + c);
+              for (int e = 0; e < sums; ++e) sum[e] += of[e];
+            }
+          });
+    }
+    const ClothLevels::Level now = s.level[l], below = s.level[l > 0 ? l - 1 : 0];
+    parallel_for(
+        state.queue, "levels: blocks", now.count, DRENCH_LAMBDA(int a) {
+          const int at = now.first + a;
+          const double *all = partial + size_t(sums) * at, *more = all + sums_of_all;
+          double* within = strain + size_t(sums - sums_of_all) * at;
+          for (int e = 0; e < sums - sums_of_all; ++e) within[e] = more[e];
+          for (int c = 4 * a; l > 0 && c < 4 * a + 4 && c < below.count; ++c) {
+            const double* of = strain + size_t(sums - sums_of_all) * (below.first + c);
+            for (int e = 0; e < sums - sums_of_all; ++e) within[e] += of[e];
+          }
+          BlockOfFunctions block;
+          block.set(all, within);
+          block.invert(inverse + at, stride);
+        });
+  }
+}
+
+void add_cloth_levels(State& state, const ScaledClothMatrix& matrix) {
+  const ClothLevels& s = state.cloth_levels;
+  if (s.levels == 0) return;
+  const LevelAnswers answers = level_answers_of(state);
+  for_each_lane(
+      state.queue, "levels: restrict", s.level[0].count,
+      DRENCH_LAMBDA(auto a) { answers.restrict_to_leaf(a); });
+  int l = 1;
+  for (; l < s.levels && s.level[l].count > small_level; ++l)
+    parallel_for(
+        state.queue, "levels: restrict further", s.level[l].count,
+        DRENCH_LAMBDA(int a) { answers.restrict_to(l, a); });
+  const int small = l, levels = s.levels;
+  parallel_for(
+      state.queue, "levels: coarse", 1, DRENCH_LAMBDA(int) {
+        if (answers.control->done) return;
+        for (int k = small; k < levels; ++k) answers.restrict_to_all_of(k);
+        for (int k = levels - 1; k >= small; --k)
+          for (int a = 0; a < answers.level[k].count; ++a) answers.give_to_children(k, a);
+      });
+  for (--l; l > 0; --l)
+    parallel_for(
+        state.queue, "levels: give", s.level[l].count,
+        DRENCH_LAMBDA(int a) { answers.give_to_children(l, a); });
+  const VecView scaled = state.cloth_system.scaled.view();
+  for_each_lane(
+      state.queue, "levels: prolong", state.cloth.vertices, DRENCH_LAMBDA(auto i) {
+        if (answers.control->done) return;
+        scaled.put(i, scaled.at(i) + matrix.moving(i, answers.at_vertex(i)));
+      });
+}
+
+}  // namespace drench::sim::DRENCH_BACKEND
