@@ -77,8 +77,9 @@ ClothPins::ClothPins(const Shot& shot, Scene& scene)
   HostVec& speed = scene.start.cloth_velocity;
   for (const Group& g : group_) {
     scene.cloth.pin_vertex.insert(scene.cloth.pin_vertex.end(), g.vertex.begin(), g.vertex.end());
+    const Moments at = moments(g, begin_, moment_length());
     for (size_t k = 0; k < g.vertex.size() && g.moves && g.stiffness == 0; ++k) {
-      const V3d u = velocity(g, k, scene.obstacles, begin_, 1e-3 / timeline_.fps);
+      const V3d u = velocity(g, k, scene.obstacles, at);
       const auto v = size_t(g.vertex[k]);
       speed.x[v] = float(u.x), speed.y[v] = float(u.y), speed.z[v] = float(u.z);
     }
@@ -118,18 +119,35 @@ ClothPins::Group ClothPins::group_of(const Shot& shot, Scene& scene, size_t shee
   return g;
 }
 
-V3d ClothPins::place(const Group& g, size_t k, ObstacleSet& obstacles, double time) const {
-  if (!g.moves) return g.start[k];
+ClothPins::Moment ClothPins::moment(const Group& g, double time) const {
   const double frame = film_frame(time);
-  const Pose pose = obstacle_pose(g.carrier, frame);
+  return {frame, obstacle_pose(g.carrier, frame)};
+}
+
+ClothPins::Moments ClothPins::moments(const Group& g, double time, double h) const {
+  return {{moment(g, time), moment(g, time + h), moment(g, time + 2 * h)}, h};
+}
+
+V3d ClothPins::place(const Group& g, size_t k, ObstacleSet& obstacles, double time) const {
+  return place(g, k, obstacles, moment(g, time));
+}
+
+V3d ClothPins::place(const Group& g, size_t k, ObstacleSet& obstacles, const Moment& when) const {
+  if (!g.moves) return g.start[k];
   V3d own = g.own[k];
   if (!g.on.empty()) {
     const OnTriangle& at = g.on[k];
-    const std::array<V3d, 3> corner = obstacles.triangle_at(g.obstacle, at.triangle, frame),
+    const std::array<V3d, 3> corner = obstacles.triangle_at(g.obstacle, at.triangle, when.frame),
                              axis = axes_of(corner);
     own = foot_on(corner, at) + axis[0] * at.off[0] + axis[1] * at.off[1] + axis[2] * at.off[2];
   }
-  return g.pivot + pose.to_world(own);
+  return g.pivot + when.pose.to_world(own);
+}
+
+V3d ClothPins::velocity(const Group& g, size_t k, ObstacleSet& obstacles,
+                        const Moments& now) const {
+  const auto at = [&](int n) { return place(g, k, obstacles, now.at[n]); };
+  return (at(1) * 4 - at(0) * 3 - at(2)) / (2 * now.h);
 }
 
 double ClothPins::snapped(double x) const {
@@ -137,22 +155,17 @@ double ClothPins::snapped(double x) const {
   return std::round(x / step) * step;
 }
 
-V3d ClothPins::velocity(const Group& g, size_t k, ObstacleSet& obstacles, double time,
-                        double h) const {
-  const auto at = [&](double t) { return place(g, k, obstacles, t); };
-  return (at(time + h) * 4 - at(time) * 3 - at(time + 2 * h)) / (2 * h);
-}
-
 PinsNow ClothPins::over(ObstacleSet& obstacles, double start, double end) const {
   PinsNow now;
+  // Within the step, so that of a sequence no other frame's mesh is asked for.
+  const double h = start < end ? -std::min(moment_length(), 0.25 * (end - start)) : moment_length();
   for (const Group& g : group_) {
     const bool holds = start < g.release;
+    const Moments at = moments(g, end, h);
     for (size_t k = 0; k < g.vertex.size(); ++k) {
-      V3d x = holds ? place(g, k, obstacles, end) : g.start[k];
+      V3d x = holds ? place(g, k, obstacles, at.at[0]) : g.start[k], u(0);
       for (int c = 0; c < 3 && g.obstacle >= 0; ++c) x[c] = snapped(x[c]);
-      const V3d u = holds && g.moves && g.stiffness == 0
-                        ? velocity(g, k, obstacles, end, -1e-3 / timeline_.fps)
-                        : V3d(0);
+      if (holds && g.moves && g.stiffness == 0) u = velocity(g, k, obstacles, at);
       const float high[3] = {float(x.x), float(x.y), float(x.z)};
       now.place.push(high[0], high[1], high[2]);
       now.low.push(float(x.x - high[0]), float(x.y - high[1]), float(x.z - high[2]));

@@ -53,13 +53,27 @@ class ClothPins {
   double fastest() const;
 
  private:
+  double moment_length() const { return 1e-3 / timeline_.fps; }  // s, to tell velocities by
   Group group_of(const Shot& shot, Scene& scene, size_t sheet, size_t index) const;
   double film_frame(double time) const { return timeline_.first + time * timeline_.fps; }
   /// As obstacles stand, so that their keys' places far from the origin tell no other bits.
   double snapped(double x) const;
   double travel(const Group& group, double begin, double end) const;
-  /// m/s, of the second order from one side: before `time` if h < 0.
-  V3d velocity(const Group& group, size_t k, ObstacleSet& obstacles, double time, double h) const;
+  /// A group's pose at a time.
+  struct Moment {
+    double frame;
+    Pose pose;
+  };
+  Moment moment(const Group& group, double time) const;
+  V3d place(const Group& group, size_t k, ObstacleSet& obstacles, const Moment& at) const;
+  /// A moment, and one and two of `h` s later or, below 0, before it.
+  struct Moments {
+    Moment at[3];
+    double h;
+  };
+  Moments moments(const Group& group, double time, double h) const;
+  /// m/s, at the first of three moments, to the second order.
+  V3d velocity(const Group& group, size_t k, ObstacleSet& obstacles, const Moments& now) const;
 
   Timeline timeline_;
   double spacing_ = 1, begin_ = 0;  // m; s, of the simulation

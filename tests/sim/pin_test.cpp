@@ -9,6 +9,7 @@
 #include "tests/sim/obstacle_scenes.h"
 #include "tests/sim/said.h"
 #include "tests/sim/same_state.h"
+#include "tests/sim/sheet_crossings.h"
 #include "tests/temporary_folder.h"
 
 namespace drench::sim_tests {
@@ -86,8 +87,8 @@ Shot hanging(ClothModel model, V3d velocity) {
   return shot;
 }
 
-// Galilei: what is carried along at constant velocity does what it does at rest, to rounding, 5e-8 m
-// in the first step and more as a limp strip swings: springs do not carry what they round off. At
+// Galilei: what is carried along at constant velocity does what it does at rest, to rounding, 5e-8
+// m in the first step and more as a limp strip swings: springs do not carry what they round off. At
 // rest a shell's pins are in no list of those that move.
 TEST(Pin, CarriesAtConstantVelocityWhatItHoldsAtRest) {
   const V3d velocity(0.7, 0.3, -0.2);
@@ -138,7 +139,7 @@ TEST(Pin, ShakesAHangingStripAsBernoullisChain) {
     }
   }
   EXPECT_GT(shape(0), 1.4);
-  EXPECT_LT(error, 0.02);
+  EXPECT_LT(error, 5e-4);  // keys 10 ms apart are 1e-4 off a sine
 }
 
 // By the rotation about the pivot, to rounding, with the velocity omega x r.
@@ -387,6 +388,47 @@ TEST(Pin, LiftsWaterWithAPlate) {
     ASSERT_NEAR(state.cloth_position.y[v], sheet + 0.1, 1e-6);
   EXPECT_NEAR(centre_of_mass(state).y, before + 0.1, 0.005);
   for (size_t i = 0; i < state.id.size(); ++i) ASSERT_GT(state.position.y[i], sheet + 0.1);
+}
+
+// A small plate that is held all over is pushed down into a sheet held at two edges, and goes as
+// far as its keys say: the sheet gives way and nothing crosses.
+TEST(Pin, PushesAnotherSheetAndDoesNotCrossIt) {
+  Shot shot = bare_shot();
+  Cloth& sheet = add_cloth(shot, V3d(-0.15, 0, -0.15), V3d(0.3, 0, 0), V3d(0, 0, 0.3), {16, 16});
+  sheet.young_warp = sheet.young_weft = 2000, sheet.shear_modulus = 500, sheet.damping_time = 0.005;
+  add_pin(sheet, V3d(-0.15, 0, 0), V3d(1e-3, 1, 1)),
+      add_pin(sheet, V3d(0.15, 0, 0), V3d(1e-3, 1, 1));
+  Cloth& plate =
+      add_cloth(shot, V3d(-0.04, 0.01, -0.05), V3d(0.08, 0, 0.01), V3d(0, 0, 0.08), {5, 5});
+  ClothPin& pin = pin_all(plate);
+  pin.position.keys = {{1001, V3d(0)}, {1004, V3d(0, -0.06, 0)}};
+  Stepper run(shot);
+  while (run.time < 0.2) {
+    run.step_towards(0.2, run.next_dt());
+    const sim::HostState state = run.solver->save();
+    ASSERT_EQ(count_sheet_crossings(run.scene.cloth, state.cloth_position), 0) << run.time;
+  }
+  const size_t last = run.scene.start.cloth_position.size() - 1;
+  EXPECT_NEAR(places(run)[last].y - run.scene.start.cloth_position.y[last], -0.06, 1e-6);
+}
+
+// A plate that spans two periodic axes slides along itself under a thick fluid, which goes with it:
+// what it lacks dies as exp(-pi^2 nu t / (4 h^2)), here to 0.3 %.
+TEST(Pin, DragsThickFluidAlongWithAPlate) {
+  Shot shot = bare_shot();
+  shot.fluid.solver = FluidSolver::incompressible, shot.fluid.spacing = 0.02;
+  shot.fluid.kinematic_viscosity = 0.05, shot.fluid.xsph = 0;
+  shot.domain.min = V3d(0), shot.domain.max = V3d(0.2, 0.4, 0.2);
+  shot.domain.axis = {Axis::periodic, Axis::walls, Axis::periodic};
+  add_box(shot, V3d(0, 0.1, 0), {10, 4, 10});
+  Cloth& c = add_cloth(shot, V3d(0, 0.1, 0), V3d(0.2, 0, 0), V3d(0, 0, 0.2), {10, 10});
+  pin_all(c).position = at_velocity(shot, V3d(0.2, 0, 0));
+  Stepper run(shot);
+  while (run.time < 0.3) run.step_towards(0.3, run.next_dt());
+  const sim::HostState state = run.solver->save();
+  double mean = 0;
+  for (const float u : state.velocity.x) mean += double(u) / double(state.velocity.size());
+  EXPECT_NEAR(mean, 0.2, 0.004);
 }
 
 TEST(Pin, OfTwoKindsOnOneVertexIsRefused) {

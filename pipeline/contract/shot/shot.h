@@ -154,8 +154,8 @@ struct ClothPin {
   std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
   Animated<V3d> position{V3d(0)};      // m: what its keys change since the start moves the group
   Animated<V3d> rotation_deg{V3d(0)};  // about x, then y, then z of the world through the pivot
-  std::optional<V3d> pivot;            // m, at the start; none: the middle of the group's box
-  std::string on;                      // name of an obstacle that carries it; or empty
+  std::optional<V3d> pivot{};          // m, at the start; none: the middle of the group's box
+  std::string on{};                    // name of an obstacle that carries it; or empty
   double release = never;              // s after the simulation's start
   double stiffness = 0;                // N/m of a spring to its place, a vertex; 0: held there
 
