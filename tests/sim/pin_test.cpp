@@ -390,8 +390,8 @@ TEST(Pin, LiftsWaterWithAPlate) {
   for (size_t i = 0; i < state.id.size(); ++i) ASSERT_GT(state.position.y[i], sheet + 0.1);
 }
 
-// A small plate that is held all over is pushed down into a sheet held at two edges, and goes as
-// far as its keys say: the sheet gives way and nothing crosses.
+// A small plate that is held all over is pushed down into a sheet held at two edges, which it
+// stretches by a tenth: nothing crosses, and no pin lags by more than a thickness.
 TEST(Pin, PushesAnotherSheetAndDoesNotCrossIt) {
   Shot shot = bare_shot();
   Cloth& sheet = add_cloth(shot, V3d(-0.15, 0, -0.15), V3d(0.3, 0, 0), V3d(0, 0, 0.3), {16, 16});
@@ -409,7 +409,7 @@ TEST(Pin, PushesAnotherSheetAndDoesNotCrossIt) {
     ASSERT_EQ(count_sheet_crossings(run.scene.cloth, state.cloth_position), 0) << run.time;
   }
   const size_t last = run.scene.start.cloth_position.size() - 1;
-  EXPECT_NEAR(places(run)[last].y - run.scene.start.cloth_position.y[last], -0.06, 1e-6);
+  EXPECT_NEAR(places(run)[last].y - run.scene.start.cloth_position.y[last], -0.06, 1e-3);
 }
 
 // A plate that spans two periodic axes slides along itself under a thick fluid, which goes with it:

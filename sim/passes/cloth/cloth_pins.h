@@ -5,7 +5,8 @@
 //   p = (x_1 - x_0) / dt - (v_1 - v_0),
 // so that w = dt (v_1 - v_0) as of all its vertices: for a free one's acceleration a_0 this is
 // v_0 - dt/2 a_0. A soft pin is a spring without length to its place, k dt^2 on the diagonal of A;
-// over the step it counts as the forces inside the sheet do (shell_system.h).
+// over the step it counts as the forces inside the sheet do (shell_system.h). Only the guard of the
+// sheets (self_contact.h) stops a vertex short of its pin: the next step takes it there.
 
 #include "sim/state.h"
 
