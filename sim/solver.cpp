@@ -227,6 +227,10 @@ class BackendSolver : public Solver {
   void hold(const PinsNow& now) override {
     PinState& p = state_.pins;
     upload(p.place, now.place), upload(p.low, now.low), upload(p.velocity, now.velocity);
+    const auto moves = [](float u) { return u != 0.f; };
+    p.drive = std::any_of(now.velocity.x.begin(), now.velocity.x.end(), moves) ||
+              std::any_of(now.velocity.y.begin(), now.velocity.y.end(), moves) ||
+              std::any_of(now.velocity.z.begin(), now.velocity.z.end(), moves);
     if (now.pull == pull_) return;
     pull_ = now.pull;
     upload(p.pull, pull_);
@@ -363,7 +367,7 @@ class BackendSolver : public Solver {
     state_.pins.count = int(t.pin_vertex.size());
     state_.pins.soft = std::any_of(pin_vertex_.begin(), pin_vertex_.end(),
                                    [&](int v) { return inverse_mass_[size_t(v)] > 0; });
-    from_host(state_.pins.vertex, t.pin_vertex);
+    if (state_.pins.count > 0) from_host(state_.pins.vertex, t.pin_vertex);
     std::map<int, std::pair<int, int>> sheet;  // first and last vertex, which follow each other
     for (size_t k = 0; k < t.corner.size(); ++k) {
       const int v = t.corner[k];

@@ -192,7 +192,8 @@ struct ShellState {
 /// of ClothTopology::pin_vertex, by PinsNow.
 struct PinState {
   int count = 0;
-  bool soft = false;  // any ever pulls
+  bool soft = false;   // any ever pulls
+  bool drive = false;  // any moves in this step
   Column<int> vertex;
   Column<float> pull;              // N/m; 0: held; -1: let go
   VecColumn place, low, velocity;  // m, m, m/s

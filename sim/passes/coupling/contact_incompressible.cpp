@@ -103,7 +103,7 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
 
 /// What pins drive counts as well: a sheet that nothing else moves is to follow them.
 void add_pins_to_reference(State& state) {
-  if (state.pins.count == 0) return;
+  if (!state.pins.drive) return;
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   const ConstVecView change = state.cloth_system.change.view();
   const VecView driven = state.cloth_system.image.view();
