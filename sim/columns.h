@@ -302,6 +302,19 @@ void for_each_cloth_level_column(S& state, const Visit& visit) {
 }
 
 template <class S, class Visit>
+void for_each_pin_column(S& state, const Visit& visit) {
+  using Group = ColumnGroup;
+  auto& p = state.pins;
+  visit({"pin.vertex", "1", Group::pins}, p.vertex, none);
+  visit({"pin.pull", "N/m", Group::pins}, p.pull, none);
+  visit({"pin.place", "m", Group::pins}, p.place, none);
+  visit({"pin.low", "m", Group::pins}, p.low, none);
+  visit({"pin.velocity", "m/s", Group::pins}, p.velocity, none);
+  visit({"anchor", "kg", Group::cloth_system}, state.cloth_system.anchor, none);
+  visit({"anchor_pull", "kg m", Group::cloth_system}, state.cloth_system.anchor_pull, none);
+}
+
+template <class S, class Visit>
 void for_each_self_contact_column(S& state, const Visit& visit) {
   using Group = ColumnGroup;
   auto& s = state.self_contact;
@@ -351,6 +364,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_system_column(state, visit);
   for_each_shell_column(state, visit);
   for_each_cloth_level_column(state, visit);
+  for_each_pin_column(state, visit);
   for_each_self_contact_column(state, visit);
   for_each_solid_column(state.obstacles, ColumnGroup::obstacles, visit);
   for_each_solid_column(state.sinks, ColumnGroup::sinks, visit);

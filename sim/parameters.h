@@ -43,6 +43,7 @@ struct Parameters {
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
   bool shells = false;           // any sheet is one
   bool self_contact = false;     // any sheet meets itself and others
+  bool ties = false;             // pins that do more than hold where a vertex starts, or seams
   bool paper = false;            // coupling scheme
   bool every_path = false;       // is tested, also of what cannot meet a sheet: for tests
   // air, which moves as WindNow says; 0: none
@@ -82,9 +83,9 @@ inline bool viscosity_is_implicit(const Parameters& p, double dt) {
 constexpr float cloth_wall_margin = 0.25f;
 
 /// Whether sheets make implicit steps (sim/passes/cloth/cloth_implicit.h), or explicit substeps:
-/// these have nothing that holds a vertex at an obstacle.
+/// these have nothing that holds a vertex at an obstacle, or takes it along.
 inline bool sheets_are_implicit(const Parameters& p) {
-  return p.fluid ? p.incompressible : p.obstacles > 0 || p.shells;
+  return p.fluid ? p.incompressible : p.obstacles > 0 || p.shells || p.ties;
 }
 
 /// Bounds that rule the next step, from the state at the end of a step.

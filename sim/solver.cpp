@@ -225,6 +225,27 @@ class BackendSolver : public Solver {
     o.stopped.resize(size_t(4) * (which == Solids::sinks ? p.sinks : p.obstacles));
     o.stopped.clear_bytes(state_.queue, 0);
   }
+  void hold(const PinsNow& now) override {
+    PinState& p = state_.pins;
+    upload(p.place, now.place), upload(p.low, now.low), upload(p.velocity, now.velocity);
+    const auto moves = [](float u) { return u != 0.f; };
+    p.drive = std::any_of(now.velocity.x.begin(), now.velocity.x.end(), moves) ||
+              std::any_of(now.velocity.y.begin(), now.velocity.y.end(), moves) ||
+              std::any_of(now.velocity.z.begin(), now.velocity.z.end(), moves);
+    if (now.pull == pull_) return;
+    pull_ = now.pull;
+    upload(p.pull, pull_);
+    for (size_t k = 0; k < pull_.size(); ++k) {
+      const auto v = size_t(pin_vertex_[k]);
+      inverse_mass_[v] = pull_[k] == 0 ? 0.f : 1 / mass_[v];
+    }
+    from_host(state_.cloth.inverse_mass, inverse_mass_);
+    find_loose_sheets();
+  }
+  void draw_seams(const std::vector<float>& rest_length) override {
+    for (size_t k = 0; k < seam_slot_.size(); ++k) rest_length_[seam_slot_[k]] = rest_length[k / 2];
+    from_host(state_.cloth.rest_length, rest_length_);
+  }
   void blow(const WindNow& wind) override { state_.wind = wind; }
   void drive(const FrameNow& frame) override {
     set_gravity(state_.parameters, frame.gravity);
@@ -332,8 +353,9 @@ class BackendSolver : public Solver {
     c.cell.resize(c.triangles);
     state_.contact.impulse.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
+    load_pins(t);
     if (allocated_.contains(ColumnGroup::cloth_system))
-      allocate_cloth_system(), find_loose_sheets(t);
+      allocate_cloth_system(), find_loose_sheets();
     c.held.resize(c.vertices);
     c.stop_sum.resize(size_t(4) * c.vertices);
     load_shell(state_, t);
@@ -341,19 +363,36 @@ class BackendSolver : public Solver {
     load_self_contact(state_, t);
   }
 
-  /// A sheet's vertices follow each other.
-  void find_loose_sheets(const ClothTopology& t) {
-    std::map<int, std::pair<int, int>> sheet;  // first and last vertex
+  void load_pins(const ClothTopology& t) {
+    mass_ = t.mass, inverse_mass_ = t.inverse_mass, pin_vertex_ = t.pin_vertex;
+    inverse_mass_.resize(size_t(state_.cloth.padded), 0.f);
+    state_.pins.count = int(t.pin_vertex.size());
+    state_.pins.soft = std::any_of(pin_vertex_.begin(), pin_vertex_.end(),
+                                   [&](int v) { return inverse_mass_[size_t(v)] > 0; });
+    if (state_.pins.count > 0) from_host(state_.pins.vertex, t.pin_vertex);
+    std::map<int, std::pair<int, int>> sheet;  // first and last vertex, which follow each other
     for (size_t k = 0; k < t.corner.size(); ++k) {
       const int v = t.corner[k];
       auto& [first, last] = sheet.try_emplace(t.sheet[k / 3], v, v).first->second;
       first = std::min(first, v), last = std::max(last, v);
     }
     for (const auto& [id, range] : sheet) {
-      const auto begin = t.inverse_mass.begin() + range.first,
-                 end = t.inverse_mass.begin() + range.second + 1;
-      if (std::find(begin, end, 0.f) == end)
-        state_.cloth.loose.push_back({range.first, int(end - begin)});
+      const auto within = [&](int v) { return v >= range.first && v <= range.second; };
+      if (std::none_of(t.seam.begin(), t.seam.end(),
+                       [&](const SeamSpring& s) { return within(s.a) || within(s.b); }))
+        free_sheet_.push_back({range.first, range.second - range.first + 1});
+    }
+  }
+
+  /// Of the sheets that no seam ties to others, those that nothing holds.
+  void find_loose_sheets() {
+    state_.cloth.loose.clear();
+    for (const VertexRange& range : free_sheet_) {
+      const auto within = [&](int v) { return v >= range.first && v < range.first + range.count; };
+      const auto begin = inverse_mass_.begin() + range.first;
+      bool held = std::find(begin, begin + range.count, 0.f) != begin + range.count;
+      for (size_t k = 0; k < pull_.size(); ++k) held |= pull_[k] > 0 && within(pin_vertex_[k]);
+      if (!held) state_.cloth.loose.push_back(range);
     }
   }
 
@@ -368,6 +407,7 @@ class BackendSolver : public Solver {
       v->resize(c.padded);
     s.control.resize(1);
     if (state_.parameters.no_slip_sheets) s.drag_factor.resize(size_t(6) * c.padded);
+    if (state_.pins.soft) s.anchor.resize(c.padded), s.anchor_pull.resize(c.padded);
     if (state_.parameters.obstacles > 0) {
       s.normal.resize(c.padded), s.rub.resize(c.padded);
       s.grip.resize(c.padded), s.slides.resize(c.padded);
@@ -393,9 +433,11 @@ class BackendSolver : public Solver {
     }
     if (int(count_of_offset.size()) > int(offset.size()) || int(offset.size()) > busiest)
       offset.clear();
-    c.spring_slots = busiest;
-    offset.resize(busiest, 0);
-    const size_t size = size_t(busiest) * c.padded;
+    std::vector<int> seams(size_t(c.vertices), 0);  // springs of seams have slots of their own
+    for (const SeamSpring& s : t.seam) ++seams[size_t(s.a)], ++seams[size_t(s.b)];
+    c.spring_slots = busiest + (t.seam.empty() ? 0 : *std::max_element(seams.begin(), seams.end()));
+    offset.resize(size_t(c.spring_slots), 0);
+    const size_t size = size_t(c.spring_slots) * c.padded;
     std::vector<int> end(size);
     std::vector<float> length(size, 0.f), stiffness(size, 0.f), damping(size, 0.f);
     for (size_t k = 0; k < size; ++k) end[k] = int(k % c.padded);
@@ -415,6 +457,15 @@ class BackendSolver : public Solver {
         stiffness[to] = t.stiffness[k], damping[to] = t.spring_damping[k];
       }
     }
+    std::fill(seams.begin(), seams.end(), busiest);
+    for (const SeamSpring& s : t.seam) {
+      for (const auto& [v, other] : {std::pair(s.a, s.b), std::pair(s.b, s.a)}) {
+        const size_t to = size_t(seams[size_t(v)]++) * c.padded + v;
+        end[to] = other, length[to] = s.rest_length, stiffness[to] = s.stiffness;
+        seam_slot_.push_back(to);
+      }
+    }
+    if (!t.seam.empty()) rest_length_ = length;
     from_host(c.slot_offset, offset), from_host(c.spring_end, end),
         from_host(c.rest_length, length);
     from_host(c.stiffness, stiffness), from_host(c.spring_damping, damping);
@@ -424,6 +475,11 @@ class BackendSolver : public Solver {
   State state_;
   std::vector<Pass> plan_;
   ColumnSet allocated_;
+  // of pins and seams, on the host
+  std::vector<float> mass_, inverse_mass_, pull_, rest_length_;
+  std::vector<int> pin_vertex_;
+  std::vector<VertexRange> free_sheet_;
+  std::vector<size_t> seam_slot_;  // two a seam's spring
   std::function<void(const PassInfo&, ColumnSet)> pass_observer_;
 };
 

@@ -2,6 +2,7 @@
 // The boundary between host code, compiled once, and the two backends: plain host arrays in and
 // out.
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,19 +14,12 @@
 #include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
 #include "sim/parameters.h"
+#include "sim/pins_now.h"
 #include "sim/probe_query.h"
 #include "sim/shell_topology.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim {
-
-/// Three floats a row; local frame.
-struct HostVec {
-  std::vector<float> x, y, z;
-  size_t size() const { return x.size(); }
-  void push(float a, float b, float c) { x.push_back(a), y.push_back(b), z.push_back(c); }
-  void resize(size_t n) { x.resize(n), y.resize(n), z.resize(n); }
-};
 
 /// Everything the next step reads: what a checkpoint holds.
 struct HostState {
@@ -40,6 +34,12 @@ struct HostState {
   Limits limits;        // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
   std::vector<uint64_t> removed;  // particles since the start: by each sink; last: left the domain
+};
+
+/// A spring that sews two vertices together.
+struct SeamSpring {
+  int a, b;
+  float rest_length, stiffness;  // m, once it is drawn; N/m
 };
 
 /// What never changes about the sheets, all in one.
@@ -64,9 +64,27 @@ struct ClothTopology {
   // periods it spans.
   HostVec corner_shift, spring_shift, rest_period;
   ShellTopology shell;
+  std::vector<int> pin_vertex;  // of pins that do more than hold where the vertex starts
+  std::vector<SeamSpring> seam;
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
 };
+
+/// Of every vertex the first of those that seams join it to, of chains of seams, too.
+inline std::vector<int> sewn_points(const ClothTopology& cloth) {
+  std::vector<int> first(size_t(cloth.vertices()));
+  for (int v = 0; v < cloth.vertices(); ++v) first[size_t(v)] = v;
+  const auto root = [&](int v) {
+    while (first[size_t(v)] != v) v = first[size_t(v)];
+    return v;
+  };
+  for (const SeamSpring& s : cloth.seam) {
+    const auto [low, high] = std::minmax({root(s.a), root(s.b)});
+    first[size_t(high)] = low;
+  }
+  for (int v = 0; v < cloth.vertices(); ++v) first[size_t(v)] = root(v);
+  return first;
+}
 
 /// What an obstacle received from fluid and sheets in one step.
 struct ObstacleImpulse {
@@ -128,6 +146,10 @@ class Solver {
   virtual void blow(const WindNow& wind) = 0;
   /// Gravity and the turning frame of the next step; without a call Parameters::gravity.
   virtual void drive(const FrameNow& frame) = 0;
+  /// The pins of ClothTopology::pin_vertex during the next step.
+  virtual void hold(const PinsNow& pins) = 0;
+  /// Rest lengths of ClothTopology::seam from the next step on, m; those of the topology at first.
+  virtual void draw_seams(const std::vector<float>& rest_length) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no

@@ -89,7 +89,7 @@ struct ClothState {
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
-  std::vector<VertexRange> loose;    // of the sheets without a pin
+  std::vector<VertexRange> loose;    // of the sheets without a pin or a seam
   // where a sheet is joined to itself across a seam, else empty (passes/coupling/polygon_grid.h)
   bool joined = false;
   VecColumn corner_shift;           // m, of a triangle's corner from its vertex
@@ -142,6 +142,8 @@ struct ClothSystem {
   VecColumn rub;              // kg m, friction of what slides on them. Only with obstacles
   VecColumn residual, scaled, image, direction, direction_image;
   Column<float> drag_factor;  // as factor, with the fluid's drag; only where sheets hold fluid
+  Column<float> anchor;       // kg, of soft pins; only where there are any
+  VecColumn anchor_pull;      // kg m, of soft pins where straight paths end; as anchor
   Column<ClothControl> control;
 };
 
@@ -216,12 +218,24 @@ struct ClothLevels {
 #endif
 };
 
+/// Pins that do more than hold where a vertex starts (passes/cloth/cloth_pins.h). Entries are those
+/// of ClothTopology::pin_vertex, by PinsNow.
+struct PinState {
+  int count = 0;
+  bool soft = false;   // any ever pulls
+  bool drive = false;  // any moves in this step
+  Column<int> vertex;
+  Column<float> pull;              // N/m; 0: held; -1: let go
+  VecColumn place, low, velocity;  // m, m, m/s
+};
+
 /// What contact among sheets asks of a vertex.
 struct SheetVertex {
   Vec3<float> rest;      // m
   float half_thickness;  // m
   float root_friction;   // of Coulomb's coefficient
   int sheet;
+  int point;  // the same of vertices that are sewn together: sewn_points
 };
 
 /// A vertex and its way in a step, as the search for pairs reads them.
@@ -436,6 +450,7 @@ struct State {
   ClothSystem cloth_system;
   ShellState shell;
   ClothLevels cloth_levels;
+  PinState pins;
   SelfContact self_contact;
   ContactState contact;
   ObstacleState obstacles, sinks;

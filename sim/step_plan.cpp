@@ -129,8 +129,10 @@ const Pass all_passes[] = {
     {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
     {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
-    {"linearise_shell", strong_shells, sheets, shell_system | shell_history, linearise_shell},
-    {"linearise_cloth", strong, sheets | cloth_load | cloth_air, cloth_system, linearise_cloth},
+    {"linearise_shell", strong_shells, sheets | pins, shell_system | shell_history,
+     linearise_shell},
+    {"linearise_cloth", strong, sheets | pins | cloth_load | cloth_air, cloth_system,
+     linearise_cloth},
     {"start_sheet_rows", strong_meeting, sheets | shell_system | shell_history,
      self_contact | cloth_system | sorting, start_sheet_rows},
     {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
@@ -172,12 +174,12 @@ const Pass all_passes[] = {
     {"paper_reaction", paper, impulse | near_cloth, contact | cloth_load | sorting, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
     {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
-    {"settle_cloth", implicit_alone, sheets,
+    {"settle_cloth", implicit_alone, sheets | pins,
      cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped | shell_system |
          shell_history | self_contact | sorting,
      settle_cloth_alone},
     {"move_with_sheets", strong,
-     moving | near_list | sheets | start | drift | cloth_system | shell_system,
+     moving | near_list | sheets | pins | start | drift | cloth_system | shell_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
          sorting | cloth_load | stopped | shell_history | self_contact,
      move_with_sheets},

@@ -16,6 +16,7 @@ void Stepper::load(const HostState& state, const Limits& limits_, double time_) 
   limits = limits_, time = time_;
   scene.obstacles.place(*solver, time, time);
   scene.sinks.place(*solver, time, time);
+  if (scene.pins.any()) solver->hold(scene.pins.over(scene.obstacles, time, time));
 }
 
 StepLimit Stepper::stable_limit() {
@@ -29,7 +30,9 @@ StepLimit Stepper::stable_limit() {
 
 StepLimit Stepper::limit() {
   const StepLimit stable = stable_limit();
-  const double moves = scene.obstacles.limit(time, stable.dt);
+  const double moves = scene.obstacles.limit(time, stable.dt),
+               pinned = scene.pins.limit(time, moves);
+  if (pinned < moves) return {pinned, "pin speed"};
   return moves < stable.dt ? StepLimit{moves, "obstacle speed"} : stable;
 }
 
@@ -39,7 +42,7 @@ int Stepper::cloth_substeps(double dt) const {
 }
 
 double Stepper::step_towards(double end, double longest) {
-  const double stop = scene.obstacles.stop(time, end), rest = stop - time;
+  const double stop = scene.pins.stop(time, scene.obstacles.stop(time, end)), rest = stop - time;
   const double parts = std::ceil(rest / longest - 1e-9);  // no step more for rounding
   const double dt = parts <= 1 ? rest : rest / parts;
   step_to(parts <= 1 ? stop : time + dt, dt);
@@ -49,6 +52,8 @@ double Stepper::step_towards(double end, double longest) {
 void Stepper::step_to(double end, double dt) {
   scene.obstacles.place(*solver, time, end);
   scene.sinks.place(*solver, time, end);
+  if (scene.pins.any()) solver->hold(scene.pins.over(scene.obstacles, time, end));
+  if (scene.sewing.draws(time)) solver->draw_seams(scene.sewing.lengths(end));
   if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(end));
   if (scene.motion.moves()) solver->drive(scene.motion.over(time, end));
   limits = solver->step(dt, cloth_substeps(dt));

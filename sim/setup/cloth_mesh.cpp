@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include "pipeline/contract/files/mesh_file.h"
 #include "pipeline/contract/geometry/weld.h"
 #include "pipeline/contract/log.h"
+#include "pipeline/contract/shot/pin_check.h"
 #include "sim/setup/scene.h"
 
 namespace drench::sim {
@@ -205,41 +207,78 @@ void check_triangles(const Sheet& sheet) {
   }
 }
 
+/// The vertex of the sheet that the shot gives by number; -1: the file's is left out.
+/// @param key  "pin 2", "seam 1"
+int vertex_here(const Sheet& sheet, const std::string& key, uint32_t v) {
+  const size_t vertices = sheet.of_file.empty() ? sheet.position.size() : sheet.of_file.size();
+  if (v >= vertices) {
+    throw Error(
+        fmt::format("cloth \"{}\": {} names vertex {}, but there are {} vertices, counted from 0",
+                    sheet.name, key, v, vertices));
+  }
+  return sheet.of_file.empty() ? int(v) : sheet.of_file[v];
+}
+
+/// Rising.
+std::vector<int> nodes_of_pin(const Sheet& sheet, const ClothPin& pin, size_t index) {
+  std::set<int> nodes;
+  for (const uint32_t v : pin.vertices) {
+    const int here = vertex_here(sheet, fmt::format("pin {}", index + 1), v);
+    if (here >= 0) nodes.insert(sheet.node[size_t(here)]);
+  }
+  for (size_t v = 0; pin.box && v < sheet.position.size(); ++v) {
+    const auto& [low, high] = *pin.box;
+    const V3d& p = sheet.position[v];
+    if (p.x >= low.x && p.y >= low.y && p.z >= low.z && p.x <= high.x && p.y <= high.y &&
+        p.z <= high.z)
+      nodes.insert(sheet.node[v]);
+  }
+  if (nodes.empty()) {
+    throw Error(fmt::format("cloth \"{}\": pin {} holds no vertex. Enlarge its box or remove it",
+                            sheet.name, index + 1));
+  }
+  return {nodes.begin(), nodes.end()};
+}
+
 void apply_pins(const Cloth& cloth, Sheet& sheet) {
   sheet.pinned.assign(sheet.point.size(), false);
+  sheet.held.assign(sheet.point.size(), false);
+  std::vector<int> first(sheet.point.size(), -1);
   for (size_t k = 0; k < cloth.pin.size(); ++k) {
-    size_t held = 0;
-    for (uint32_t v : cloth.pin[k].vertices) {
-      const size_t vertices = sheet.of_file.empty() ? sheet.position.size() : sheet.of_file.size();
-      if (v >= vertices) {
+    const ClothPin& pin = cloth.pin[k];
+    sheet.group.push_back(nodes_of_pin(sheet, pin, k));
+    for (const int node : sheet.group.back()) {
+      const auto at = size_t(node);
+      if (first[at] >= 0 && !(pin.stands() && cloth.pin[size_t(first[at])].stands())) {
         throw Error(fmt::format(
-            "cloth \"{}\": pin {} names vertex {}, but there are {} vertices, counted from 0",
-            sheet.name, k + 1, v, vertices));
+            "cloth \"{}\": pins {} and {} both hold vertex {}, and one of them does more than hold "
+            "it where it starts. Let each vertex have one pin",
+            sheet.name, first[at] + 1, k + 1, sheet.point[at]));
       }
-      const int here = sheet.of_file.empty() ? int(v) : sheet.of_file[v];
-      if (here < 0) continue;
-      sheet.pinned[size_t(sheet.node[size_t(here)])] = true;
-      ++held;
-    }
-    if (cloth.pin[k].box) {
-      const auto& [low, high] = *cloth.pin[k].box;
-      for (size_t v = 0; v < sheet.position.size(); ++v) {
-        const V3d p = sheet.position[v];
-        if (p.x < low.x || p.y < low.y || p.z < low.z || p.x > high.x || p.y > high.y ||
-            p.z > high.z)
-          continue;
-        sheet.pinned[size_t(sheet.node[v])] = true;
-        ++held;
-      }
-    }
-    if (held == 0) {
-      throw Error(fmt::format("cloth \"{}\": pin {} holds no vertex. Enlarge its box or remove it",
-                              sheet.name, k + 1));
+      first[at] = int(k);
+      if (pin.stiffness == 0) sheet.pinned[at] = true;
+      if (pin.stiffness == 0 && !pin.lets_go()) sheet.held[at] = true;
     }
   }
 }
 
 }  // namespace
+
+std::vector<int> nodes_of_seam(const Cloth& cloth, const Sheet& sheet, const std::string& key,
+                               GridEdge edge, const std::vector<uint32_t>& list) {
+  std::vector<int> nodes;
+  for (const uint32_t v : edge == GridEdge::none ? list : edge_vertices(edge, cloth.cells)) {
+    const int here = vertex_here(sheet, key, v);
+    if (here < 0) {
+      throw Error(
+          fmt::format("cloth \"{}\": {} sews vertex {}, which belongs to no triangle. Remove "
+                      "it from the list",
+                      sheet.name, key, v));
+    }
+    nodes.push_back(sheet.node[size_t(here)]);
+  }
+  return nodes;
+}
 
 Sheet build_sheet(const Cloth& cloth, const Seams& seams) {
   Sheet sheet;

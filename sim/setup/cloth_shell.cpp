@@ -30,7 +30,7 @@ ShellSurface surface_of(const Sheet& sheet, const Cloth& cloth, const LocalFrame
   s.node.assign(sheet.node.begin(), sheet.node.end());
   if (sheet.joined())
     for (const Imath::V3i& image : sheet.image) s.shift.push_back(V3d(image) * sheet.period);
-  for (const bool held : sheet.pinned) s.held.push_back(char(held));
+  for (const bool held : sheet.held) s.held.push_back(char(held));
   s.warp = cloth.mesh_file.empty() ? cloth.u : V3d(1, 0, 0);
   return s;
 }

@@ -332,6 +332,24 @@ ObstacleSet::Nearest ObstacleSet::nearest(const V3d& point, double time) {
   return nearest;
 }
 
+std::array<V3d, 3> ObstacleSet::triangle_at(int obstacle, size_t triangle, double frame) {
+  Entry& entry = obstacle_[size_t(obstacle)];
+  // The end of a frame's motion is known without the next one's.
+  const bool known =
+      entry.mesh_frame && frame >= *entry.mesh_frame && frame <= *entry.mesh_frame + 1;
+  if (entry.deforms && !known) read_meshes(entry, int(std::floor(frame)));
+  const double share = entry.deforms ? frame - *entry.mesh_frame : 0;
+  const auto& t = entry.before.triangle[triangle];
+  std::array<V3d, 3> corner;
+  for (int c = 0; c < 3; ++c) {
+    const auto v = size_t(t[c]);
+    corner[size_t(c)] = V3d(entry.before.position[v]);
+    if (entry.deforms)
+      corner[size_t(c)] += (V3d(entry.after.position[v]) - corner[size_t(c)]) * share;
+  }
+  return corner;
+}
+
 bool ObstacleSet::moves(int obstacle) const {
   const Entry& entry = obstacle_[size_t(obstacle)];
   return entry.deforms || has_keys(entry.obstacle);

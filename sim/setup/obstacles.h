@@ -2,6 +2,7 @@
 // The obstacles or sinks of a shot over time, for the solver: placements of a step, level sets of
 // meshes.
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -51,6 +52,9 @@ class ObstacleSet {
   double distance_to(int obstacle, const V3d& point, double time);
   /// Whether an obstacle moves by keys or deforms, and whether any does.
   bool moves(int obstacle) const;
+  bool deforms(int obstacle) const { return obstacle_[size_t(obstacle)].deforms; }
+  /// Corners of a triangle of a mesh at a film frame, own coordinates, m.
+  std::array<V3d, 3> triangle_at(int obstacle, size_t triangle, double frame);
   bool any_moves() const;
   const Obstacle& obstacle(int k) const { return obstacle_[size_t(k)].obstacle; }
   /// Bounds of an obstacle in its own coordinates, m; of a sequence as of the first frame.
@@ -58,6 +62,9 @@ class ObstacleSet {
   const V3d& high(int k) const { return obstacle_[size_t(k)].high; }
   /// Of meshes: triangles, and the bytes of the level sets that have been made.
   size_t triangles() const;
+  size_t triangles(int obstacle) const {
+    return obstacle_[size_t(obstacle)].before.triangle.size();
+  }
   size_t level_set_bytes() const;
   /// The largest speed of a surface by its keys, m/s: what a shot is to be ready for.
   double fastest() const;

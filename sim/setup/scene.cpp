@@ -14,6 +14,7 @@
 #include "sim/passes/coupling/geometry.h"
 #include "sim/setup/cloth_shell.h"
 #include "sim/setup/cloth_start.h"
+#include "sim/setup/pin_report.h"
 #include "sim/setup/probe_report.h"
 
 namespace drench::sim {
@@ -443,6 +444,48 @@ void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
   start.owed.resize(start.id.size());
 }
 
+/// Pins that do more than hold where a sheet starts, and what sews sheets.
+void tie_sheets(const Shot& shot, Scene& scene) {
+  scene.pins = ClothPins(shot, scene);
+  scene.sewing = Sewing(shot, scene);
+  Parameters& p = scene.parameters;
+  p.ties = scene.pins.any() || !scene.cloth.seam.empty();
+  // As automatic_sound_speed, which does not know the sheets yet.
+  const double speed = scene.pins.fastest();
+  if (speed > 0)
+    p.sound_speed = float(std::sqrt(double(p.sound_speed) * p.sound_speed + 50 * speed * speed));
+}
+
+void place_sheets(const Shot& shot, Scene& scene) {
+  double dt_limit = 1e30;
+  for (size_t s = 0; s < shot.cloth.size(); ++s) {
+    scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
+    scene.first_vertex.push_back(scene.cloth.vertices());
+    scene.first_triangle.push_back(scene.cloth.triangles());
+    append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, shot, scene);
+    if (scene.parameters.shells)
+      append_shell(scene.sheet.back(), shot.cloth[s], scene.frame, scene.cloth);
+    dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back(), shot.cloth[s]));
+  }
+  scene.first_vertex.push_back(scene.cloth.vertices());
+  scene.first_triangle.push_back(scene.cloth.triangles());
+  if (std::none_of(scene.sheet.begin(), scene.sheet.end(),
+                   [](const Sheet& sheet) { return sheet.joined(); })) {
+    ClothTopology& t = scene.cloth;
+    t.corner_shift = t.spring_shift = t.rest_period = {};
+    t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
+    t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
+  }
+  tie_sheets(shot, scene);
+  // Images across seams are not looked for.
+  scene.parameters.self_contact = std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
+                                  sheets_are_implicit(scene.parameters) &&
+                                  scene.cloth.corner_shift.size() == 0;
+  // The implicit step of the sheets has no limit.
+  scene.parameters.cloth_dt_limit =
+      sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
+}
+
 }  // namespace
 
 int obstacle_in_the_way(ObstacleSet& obstacles, const V3d& point, double time, double spacing) {
@@ -473,33 +516,9 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   note_sinks(shot, scene);
   note_probes(shot, scene);
   place_fluid(shot, fluid, scene);
-  double dt_limit = 1e30;
-  for (size_t s = 0; s < shot.cloth.size(); ++s) {
-    scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
-    scene.first_vertex.push_back(scene.cloth.vertices());
-    scene.first_triangle.push_back(scene.cloth.triangles());
-    append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, shot, scene);
-    if (scene.parameters.shells)
-      append_shell(scene.sheet.back(), shot.cloth[s], scene.frame, scene.cloth);
-    dt_limit = std::min(dt_limit, cloth_dt_limit(scene.sheet.back(), shot.cloth[s]));
-  }
-  scene.first_vertex.push_back(scene.cloth.vertices());
-  scene.first_triangle.push_back(scene.cloth.triangles());
-  if (std::none_of(scene.sheet.begin(), scene.sheet.end(),
-                   [](const Sheet& sheet) { return sheet.joined(); })) {
-    ClothTopology& t = scene.cloth;
-    t.corner_shift = t.spring_shift = t.rest_period = {};
-    t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
-    t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
-  }
-  // Images across seams are not looked for.
-  scene.parameters.self_contact = std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
-                                  sheets_are_implicit(scene.parameters) &&
-                                  scene.cloth.corner_shift.size() == 0;
-  // The implicit step of the sheets has no limit.
-  scene.parameters.cloth_dt_limit =
-      sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));
+  place_sheets(shot, scene);
   note_cloth(shot, scene);
+  note_pins(shot, scene);
   check_cloth_start(shot, scene);
   complete_report(shot, scene);
   return scene;

@@ -10,10 +10,12 @@
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/shot/shot.h"
 #include "sim/setup/births.h"
+#include "sim/setup/cloth_pins.h"
 #include "sim/setup/frame_motion.h"
 #include "sim/setup/mesh_emitter.h"
 #include "sim/setup/obstacles.h"
 #include "sim/setup/scene_report.h"
+#include "sim/setup/sewing.h"
 #include "sim/setup/wind.h"
 #include "sim/solver.h"
 
@@ -55,7 +57,9 @@ struct Sheet {
   std::vector<uint32_t> point;    // of a node: the vertex that stands where it does
   V3d period{0, 0, 0};            // m
   std::vector<double> mass;       // kg, of a node
-  std::vector<bool> pinned;       // nodes
+  std::vector<bool> pinned;       // nodes that do not move freely from the start
+  std::vector<bool> held;         // of these, that no pin ever lets go
+  std::vector<std::vector<int>> group;  // nodes of each pin, rising
   struct Spring {
     int a, b;          // nodes
     Imath::V3i image;  // periods from b to the end that a sees
@@ -89,6 +93,11 @@ void join_at_seams(Sheet& sheet, const Seams& seams);
 /// @throws Error for a degenerate or non-manifold triangle, a pin that holds nothing, or as
 ///         join_at_seams.
 Sheet build_sheet(const Cloth& cloth, const Seams& seams = {});
+
+/// Nodes of an edge of a grid, or of a list of vertices as the shot numbers them.
+/// @param key  "seam 1", for errors. @throws Error if a vertex of the list is not there.
+std::vector<int> nodes_of_seam(const Cloth& cloth, const Sheet& sheet, const std::string& key,
+                               GridEdge edge, const std::vector<uint32_t>& list);
 
 /// What leaves a disc or rectangle at once, again and again. A layer holds the volume that passes
 /// the inlet in one interval, so that the flow is area times speed. Its places are a spacing apart
@@ -149,6 +158,8 @@ struct Scene {
   ClothTopology cloth;
   ObstacleSet obstacles, sinks;
   std::vector<MeshEmitter> mesh_emitter;
+  ClothPins pins;
+  Sewing sewing;
   Wind wind;
   FrameMotion motion;
   HostState start;

@@ -67,7 +67,8 @@ double steps_a_frame(const Shot& shot, Scene& scene) {
   if (scene.parameters.incompressible)
     limits.max_speed = float(std::sqrt(2.0) * 0.1 * double(scene.parameters.sound_speed));
   const double dt = stable_step(scene.parameters, limits).dt;
-  return std::ceil(frame / std::min(frame, scene.obstacles.limit(0, std::min(dt, frame))));
+  const double moves = scene.obstacles.limit(0, std::min(dt, frame));
+  return std::ceil(frame / std::min(frame, scene.pins.limit(0, moves)));
 }
 
 /// @throws Error if there is never anything: no fluid, no cloth.

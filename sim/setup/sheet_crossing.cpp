@@ -24,15 +24,17 @@ struct Piece {
 
 std::vector<Piece> pieces_of(const ClothTopology& cloth, const HostVec& x) {
   std::vector<Piece> all;
+  const std::vector<int> point = sewn_points(cloth);  // what a seam joins may start at one place
   for (int t = 0; t < cloth.triangles(); ++t) {
     Piece p{t, {}, {}, {1e300, 1e300, 1e300}, {-1e300, -1e300, -1e300}, cloth.half_thickness[t]};
     for (size_t c = 0; c < 3; ++c) {
-      const int v = p.vertex[c] = cloth.corner[3 * size_t(t) + c];
+      const int v = cloth.corner[3 * size_t(t) + c];
+      p.vertex[c] = point[size_t(v)];
       const Point at = p.at[c] = {x.x[v], x.y[v], x.z[v]};
       p.low = {std::min(p.low.x, at.x), std::min(p.low.y, at.y), std::min(p.low.z, at.z)};
       p.high = {std::max(p.high.x, at.x), std::max(p.high.y, at.y), std::max(p.high.z, at.z)};
     }
-    if (cloth.meets_sheets[size_t(p.vertex[0])]) all.push_back(p);
+    if (cloth.meets_sheets[size_t(cloth.corner[3 * size_t(t)])]) all.push_back(p);
   }
   return all;
 }

@@ -81,6 +81,9 @@ void change(const Parameter& p, void* field, const std::filesystem::path& file) 
     case Kind::box:
       as<std::optional<std::pair<V3d, V3d>>>(field) = {{V3d(7), V3d(8)}};
       break;
+    case Kind::place:
+      as<std::optional<V3d>>(field) = V3d(7);
+      break;
     case Kind::grid_pins:
       FAIL() << "has no field";
   }
@@ -152,7 +155,7 @@ TEST_F(ShotDigest, FollowsWhatTheSectionsAreFor) {
   const std::set<std::string_view> looks{"camera", "light", "material", "ground", "render"};
   const std::set<std::string_view> physics{
       "domain", "fluid.box", "fluid.sphere", "fluid.emitter", "fluid.drops", "fluid.volume",
-      "wind",   "sink",      "cloth.pin",    "coupling",      "probe"};
+      "wind",   "sink",      "cloth.pin",    "cloth.seam",    "coupling",    "probe"};
   for (const Parameter& p : shot_table::parameters()) {
     const bool holds_water = p.section == "ground" && (p.key == "present" || p.key == "height");
     if (p.key == "denoise_frames" || p.key == "denoiser") {

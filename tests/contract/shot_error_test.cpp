@@ -218,6 +218,45 @@ TEST_F(ShotError, NamesImpossibleValues) {
   });
 }
 
+TEST_F(ShotError, NamesPinsAndSeamsThatCannotBe) {
+  const std::string explicit_fluid = "[fluid]\nsolver = \"weakly_compressible\"\n";
+  const std::string pin = "[[cloth]]\ncells = [2, 2]\n[[cloth.pin]]\nvertices = [0]\n";
+  const std::string seam = "[[cloth]]\ncells = [2, 3]\n[[cloth.seam]]\n";
+  expect_messages({
+      {pin + "on = \"hand\"\n", {"scene.toml:8", "cloth[0].pin[0].on", "\"hand\"", "none"}},
+      {pin + "on = \"hand\"\nposition = [[1, [0, 0, 0]], [2, [1, 0, 0]]]\n[[obstacle]]\nname = "
+             "\"hand\"\ntype = \"sphere\"\n",
+       {"scene.toml:8", "carries the group", "Remove one"}},
+      {pin + "position = [0, 1, 0]\n",
+       {"scene.toml:8", "cloth[0].pin[0].position is [0, 1, 0]", "Use [[frame, value], ...]"}},
+      {pin + "rotation_deg = [0, 90, 0]\n", {"scene.toml:8", "one value for all time"}},
+      {pin + "release = 0\n", {"scene.toml:8", "let go before it is held"}},
+      {pin + "release = -1\n", {"scene.toml:8", "between 0 and"}},
+      {pin + "release = 1\n" + explicit_fluid,
+       {"scene.toml:8", "weakly compressible", "Use fluid.solver = \"incompressible\""}},
+      {pin + "stiffness = 10\n" + explicit_fluid, {"scene.toml:8", "explicit steps"}},
+      {pin + "position = [[1, [0, 0, 0]], [2, [1, 0, 0]]]\n[coupling]\nscheme = \"paper\"\n",
+       {"scene.toml:8", "coupling.scheme = \"exact\""}},
+      {seam + "edge = \"u0\"\n",
+       {"scene.toml:6", "cloth[0].seam[0] needs either to_edge", "to_vertices = [...]"}},
+      {seam + "edge = \"u0\"\nvertices = [1]\nto_edge = \"u1\"\n",
+       {"scene.toml:6", "needs either edge", "not both"}},
+      {seam + "edge = \"u0\"\nto_edge = \"u0\"\n", {"scene.toml:6", "to themselves"}},
+      {seam + "edge = \"u0\"\nto_edge = \"v0\"\n",
+       {"scene.toml:6", "sews 4 vertices of \"cloth\" to 3", "as many cells"}},
+      {seam + "edge = \"u0\"\nto = \"cloht\"\nto_edge = \"u1\"\n",
+       {"scene.toml:8", "\"cloht\"", "the sheets of this shot: cloth"}},
+      {seam + "vertices = [12]\nto_vertices = [0]\n", {"scene.toml:7", "12", "0 to 11"}},
+      {seam + "edge = \"u0\"\nto_edge = \"u1\"\nrest_length = -0.5\n",
+       {"scene.toml:9", "-0.5 m", "-1 for what contact"}},
+      {seam + "edge = \"u0\"\nto = \"flag\"\nto_edge = \"u0\"\n[[cloth]]\nname = \"flag\"\nmesh = "
+              "\"flag.obj\"\n",
+       {"scene.toml:9", "\"flag\" is a mesh", "to_vertices"}},
+      {seam + "edge = \"u0\"\nto_edge = \"u1\"\n" + explicit_fluid,
+       {"scene.toml:6", "sews sheets", "explicit"}},
+  });
+}
+
 TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
   expect_messages({
       {"[[cloth]]\nmesh = \"none.ply\"\n",
@@ -228,7 +267,7 @@ TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
       {"[[cloth]]\nmesh = \"flag.obj\"\npins = \"corners\"\n", {"scene.toml:6", "is a mesh"}},
       {"[[cloth]]\n[[cloth.pin]]\n", {"scene.toml:5", "cloth[0].pin[0]", "either vertices"}},
       {"[[cloth]]\ncells = [2, 2]\n[[cloth.pin]]\nvertices = [9]\n",
-       {"scene.toml:6", "9", "0 to 8"}},
+       {"scene.toml:7", "9", "0 to 8"}},
       {"[[cloth]]\nname = \"a\"\n[[cloth]]\nname = \"a\"\n",
        {"scene.toml:7", "\"a\"", "scene.toml:5"}},
       {"[[light]]\ntype = \"sun\"\nname = \"k\"\n[[light]]\ntype = \"sun\"\nname = \"k\"\n",

@@ -163,6 +163,7 @@ std::map<std::string_view, void*> fresh_objects(Shot& shot) {
   shot.fluid.box.resize(1), shot.fluid.sphere.resize(1), shot.fluid.emitter.resize(1);
   shot.fluid.volume.resize(1), shot.sink.resize(1);
   shot.fluid.drops.resize(1), shot.cloth.resize(1), shot.cloth[0].pin.resize(1);
+  shot.cloth[0].seam.resize(1);
   shot.probe.resize(1), shot.light.resize(1), shot.material.resize(1);
   std::map<std::string_view, void*> objects;
   shot_table::for_each_object(shot, [&](const auto& section, void* object, const std::string&) {

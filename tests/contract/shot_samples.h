@@ -89,6 +89,17 @@ pins = ["corners", "edge_v0"]
 
 [[cloth.pin]]
 box = {min = [-1, 0, -1], max = [0, 2, 0]}
+position = [[1001, [0, 0, 0]], [1012, [0, 0.5, 0]]]
+rotation_deg = [[1001, [0, 0, 0]], [1024, [0, 45, 0]]]
+interp = "smooth"
+pivot = [0, 1, 0]
+release = 0.75
+stiffness = 20
+
+[[cloth.seam]]
+edge = "u0"
+to_edge = "u1"
+time = 0.5
 
 [[cloth]]
 name = "flag"

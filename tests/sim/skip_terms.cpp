@@ -27,6 +27,11 @@ Shot on_sheet(FluidSolver solver) {
   return shot;
 }
 
+void sew(Cloth& cloth, const std::vector<uint32_t>& from, const std::vector<uint32_t>& to) {
+  ClothSeam& seam = cloth.seam.emplace_back();
+  seam.vertices = from, seam.to_vertices = to;
+  seam.stiffness = 0.05;
+}
 void blow(Shot& shot) {
   shot.wind.present = true, shot.wind.velocity = V3d(9, 0, 0), shot.wind.fluid_drag = 0;
 }
@@ -260,6 +265,24 @@ const Term terms[] = {
       "implicit step of cloth", "nearest triangles", "remembered sides", "near list of cloth",
       "rows of cloth", "rows of cloth in the pressure solve", "loads of cloth", "starts of paths",
       "paths", "drift of paths"}},
+    {"moving_pin",
+     projected,
+     on_sheet,
+     [](Shot& s) {
+       s.cloth[0].pin[0].position.keys = {{1001, V3d(0)}, {1003, V3d(0, 2e-3, 0)}};
+     },
+     [](Shot& s) { s.cloth[0].pin[0].release = 100; },
+     Leaves::the_bits,
+     {},
+     {"pins that move"}},
+    {"seam",
+     projected,
+     on_sheet,
+     [](Shot& s) { sew(s.cloth[0], {30}, {31}); },
+     [](Shot& s) { sew(s.cloth[0], {0}, {1}); },  // of its pinned edge
+     Leaves::the_bits,
+     {},
+     {}},
     {"obstacle_under_cloth",
      projected,
      on_sheet,

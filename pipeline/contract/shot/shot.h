@@ -146,9 +146,41 @@ struct Fluid {
   }
 };
 
-struct ClothPin {  // vertices held where they start; exactly one of the two forms is given
+/// A group of vertices that is held; exactly one of `vertices` and `box` is given. It stays where
+/// it starts, moves as its keys do from there, or follows an obstacle.
+struct ClothPin {
+  static constexpr double never = 1e9;  // s
   std::vector<uint32_t> vertices;
   std::optional<std::pair<V3d, V3d>> box;  // every vertex inside at the start, m
+  Animated<V3d> position{V3d(0)};      // m: what its keys change since the start moves the group
+  Animated<V3d> rotation_deg{V3d(0)};  // about x, then y, then z of the world through the pivot
+  std::optional<V3d> pivot{};          // m, at the start; none: the middle of the group's box
+  std::string on{};                    // name of an obstacle that carries it; or empty
+  double release = never;              // s after the simulation's start
+  double stiffness = 0;                // N/m of a spring to its place, a vertex; 0: held there
+
+  bool moves() const {
+    return position.keys.size() > 1 || rotation_deg.keys.size() > 1 || !on.empty();
+  }
+  bool lets_go() const { return release < never; }
+  /// Whether its vertices are held where they start, for good.
+  bool stands() const { return !moves() && !lets_go() && stiffness == 0; }
+};
+
+/// An edge of a grid; u0 is the one where u starts.
+enum class GridEdge { none, u0, u1, v0, v1 };
+
+/// Springs from vertices of a sheet to as many of another one, or of its own: either side is an
+/// edge of a grid or a list.
+struct ClothSeam {
+  GridEdge edge = GridEdge::none;
+  std::vector<uint32_t> vertices;
+  std::string to;  // name of the other sheet; empty: its own
+  GridEdge to_edge = GridEdge::none;
+  std::vector<uint32_t> to_vertices;
+  double stiffness = 0;     // N/m, a pair; 0: ten times the stiffer sheet's modulus
+  double rest_length = -1;  // m; -1: what contact keeps the sheets apart
+  double time = 0;          // s from the start in which the seam is drawn to that length
 };
 
 /// automatic, which the shots of files have resolved: a shell where any of its constants is given,
@@ -165,6 +197,7 @@ struct Cloth {
   double weld =
       -1;  // m: vertices on free edges closer than this are one; < 0: 1e-5 of its diagonal
   std::vector<ClothPin> pin;
+  std::vector<ClothSeam> seam;
   V3d velocity{0, 0, 0};            // m/s at the start
   double areal_density = 0.2;       // kg/m^2
   double adjacent_stiffness = 400;  // N/m, the 2-D modulus k_adj

@@ -7,6 +7,7 @@
 #include "pipeline/contract/shot/check_base.h"
 #include "pipeline/contract/shot/light_check.h"
 #include "pipeline/contract/shot/picture_check.h"
+#include "pipeline/contract/shot/pin_check.h"
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/contract/shot/probe_check.h"
 #include "pipeline/contract/shot/seam_check.h"
@@ -38,6 +39,7 @@ class Checker : CheckBase {
     check_obstacles_at_seams(shot_, sources_);
     check_sources(shot_, sources_);
     check_names();
+    check_pins(shot_, sources_);
     check_probes(shot_, sources_);
     if (!shot_.fluid.present() && shot_.cloth.empty()) {
       fail("fluid",
@@ -398,25 +400,6 @@ class Checker : CheckBase {
            fmt::format("{}.retardation_time is {} s, but only sheets beside incompressible fluid "
                        "take implicit steps; explicit ones would be too short to end. Use 0",
                        path, cloth.retardation_time));
-    }
-    for (size_t k = 0; k < cloth.pin.size(); ++k) {
-      check_pin(cloth, fmt::format("{}.pin[{}]", path, k), cloth.pin[k], vertices);
-    }
-  }
-
-  void check_pin(const Cloth& cloth, const std::string& path, const ClothPin& pin,
-                 double vertices) const {
-    if (pin.vertices.empty() != pin.box.has_value()) {
-      fail(path, fmt::format("{} needs either vertices = [...] or box = {{min, max}}, and not both",
-                             path));
-    }
-    for (const uint32_t vertex : pin.vertices) {
-      if (cloth.mesh_file.empty() && vertex >= vertices) {
-        fail(path,
-             fmt::format("{}.vertices holds {}, but the {} x {} grid of \"{}\" has vertices 0 "
-                         "to {:.0f}",
-                         path, vertex, cloth.cells.x, cloth.cells.y, cloth.name, vertices - 1));
-      }
     }
   }
 

@@ -259,6 +259,10 @@ class Reader {
       Obstacle& obstacle = *static_cast<Obstacle*>(object);
       obstacle.rotation_deg.interpolation = obstacle.position.interpolation;
     }
+    if (section.name == "cloth.pin") {
+      ClothPin& pin = *static_cast<ClothPin*>(object);
+      pin.rotation_deg.interpolation = pin.position.interpolation;
+    }
     if (section.name == "sink") {
       Obstacle& shape = static_cast<Sink*>(object)->shape;
       shape.rotation_deg.interpolation = shape.position.interpolation;
@@ -452,6 +456,16 @@ void resolve_pins(Draft& draft) {
             fmt::format("{}: {} is overridden, but {}.pin[{}] names vertices by number, which "
                         "another grid numbers differently. Use pins = \"corners\" or a pin "
                         "box",
+                        draft.sources.at(cells), cells, path, k));
+      }
+    }
+    for (size_t k = 0; k < cloth.seam.size(); ++k) {
+      const ClothSeam& seam = cloth.seam[k];
+      if (draft.overridden.contains(cells) &&
+          !(seam.vertices.empty() && seam.to_vertices.empty())) {
+        throw Error(
+            fmt::format("{}: {} is overridden, but {}.seam[{}] names vertices by number, which "
+                        "another grid numbers differently. Use edge and to_edge",
                         draft.sources.at(cells), cells, path, k));
       }
     }

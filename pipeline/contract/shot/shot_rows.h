@@ -48,6 +48,7 @@ constexpr Kind kind_of() {
   if constexpr (std::is_same_v<T, Animated<V3d>>) return Kind::vector_track;
   if constexpr (std::is_same_v<T, std::vector<uint32_t>>) return Kind::vertices;
   if constexpr (std::is_same_v<T, std::optional<std::pair<V3d, V3d>>>) return Kind::box;
+  if constexpr (std::is_same_v<T, std::optional<V3d>>) return Kind::place;
   return Kind::choice;
 }
 

@@ -115,10 +115,52 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::matte>("cloth", "matte", "", none, render, matte_text),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
-                               "indices of vertices held where they start"),
+                               "indices of vertices that are held"),
       row<&ClothPin::box>(
           "cloth.pin", "box", "m", coordinate, simulate,
           "{min = [x, y, z], max = [x, y, z]}: every vertex inside it at the start"),
+      row<&ClothPin::position>("cloth.pin", "position", "m", coordinate, simulate,
+                               "keys that move the group off where it starts: what they change by "
+                               "since the start of the simulation counts"),
+      row<&ClothPin::rotation_deg>("cloth.pin", "rotation_deg", "deg", turns, simulate,
+                                   "keys that turn it, about x, then y, then z through pivot"),
+      row<&ClothPin::position>("cloth.pin", "interp", "", none, simulate,
+                               "between the keys of position and rotation_deg")
+          .interpolation({Interpolation::linear, Interpolation::smooth}),
+      row<&ClothPin::pivot>("cloth.pin", "pivot", "m", coordinate, simulate,
+                            "what the group turns about, as it stands at the start; without it the "
+                            "middle of the group's box"),
+      row<&ClothPin::on>("cloth.pin", "on", "", none, simulate,
+                         "an obstacle by name that carries the group along, as it moves, turns and "
+                         "deforms; in place of keys")
+          .as(Kind::label),
+      row<&ClothPin::release>("cloth.pin", "release", "s", {0, ClothPin::never}, simulate,
+                              "after the simulation's start the group is let go"),
+      row<&ClothPin::stiffness>("cloth.pin", "stiffness", "N/m", {0, 1e9}, simulate,
+                                "of a spring that pulls each vertex to its place; 0 holds it "
+                                "there"),
+
+      row<&ClothSeam::edge>("cloth.seam", "edge", "", none, simulate,
+                            "edge of this grid that is sewn; u0 is the one where u starts"),
+      row<&ClothSeam::vertices>("cloth.seam", "vertices", "", {0, 4294967294.0}, simulate,
+                                "or indices of its vertices"),
+      row<&ClothSeam::to>("cloth.seam", "to", "", none, simulate,
+                          "name of the other sheet; without it the seam joins the sheet to itself"),
+      row<&ClothSeam::to_edge>("cloth.seam", "to_edge", "", none, simulate,
+                               "edge of the other grid, of as many vertices, whichever end is "
+                               "nearer first"),
+      row<&ClothSeam::to_vertices>("cloth.seam", "to_vertices", "", {0, 4294967294.0}, simulate,
+                                   "or indices of its vertices, each for the one in the same place "
+                                   "of the other list"),
+      row<&ClothSeam::stiffness>("cloth.seam", "stiffness", "N/m", {0, 1e9}, simulate,
+                                 "of the spring between a pair of vertices; 0 is ten times the "
+                                 "modulus of the stiffer sheet"),
+      row<&ClothSeam::rest_length>("cloth.seam", "rest_length", "m", {-1, 1e4}, simulate,
+                                   "of these springs; -1 is what contact keeps the sheets apart, "
+                                   "half of both thicknesses"),
+      row<&ClothSeam::time>("cloth.seam", "time", "s", {0, 1e6}, simulate,
+                            "in which they are drawn from their length at the start to that; 0 "
+                            "draws at once"),
 
       row<&Coupling::scheme>("coupling", "scheme", "", none, simulate,
                              "exact, or paper: Harada, Koshizuka, Kawaguchi 2007 as published"),

@@ -104,7 +104,11 @@ const std::vector<Section>& sections() {
                                "A closed mesh full of fluid at the start."),
       modelled(repeated<&Shot::cloth>("cloth", "", "A sheet of cloth: a grid or a mesh file.")),
       repeated<&Cloth::pin>("cloth.pin", "cloth",
-                            "Vertices held where they start: a list or a box."),
+                            "Vertices that are held, a list or a box: where they start, as keys "
+                            "move them, or on an obstacle."),
+      repeated<&Cloth::seam>("cloth.seam", "cloth",
+                             "Springs that sew vertices of the sheet to another one, or its own: "
+                             "edges of grids, or lists."),
       typed<Obstacle>(repeated<&Shot::obstacle>(
           "obstacle", "", "A solid in the fluid, standing or moving as its keys say.")),
       sinks(repeated<&Shot::sink>(

@@ -32,6 +32,7 @@ enum class Kind {
   track_mode,    // the interpolation of all tracks of a camera or obstacle
   vertices,      // std::vector<uint32_t>
   box,           // std::optional<std::pair<V3d, V3d>>
+  place,         // std::optional<V3d>
   grid_pins,     // no field: becomes ClothPin::vertices once the grid is known
 };
 

@@ -128,6 +128,10 @@ std::string value_text(const Parameter& parameter, const void* field) {
                                vector_text(box->second))
                  : "";
     }
+    case Kind::place: {
+      const auto& place = as<std::optional<V3d>>(field);
+      return place ? vector_text(*place) : "";
+    }
     case Kind::grid_pins:
       return "";
   }
@@ -156,6 +160,7 @@ std::string kind_text(const Parameter& parameter) {
     case Kind::choice:
       return fmt::format("one of \"{}\"", fmt::join(parameter.choices, "\", \""));
     case Kind::vector:
+    case Kind::place:
       return "an array of 3 numbers" + in;
     case Kind::colour:
       return "a colour" + in;

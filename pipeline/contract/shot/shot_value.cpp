@@ -51,6 +51,7 @@ const char* example_of(Kind kind) {
     case Kind::number:
       return "0.5";
     case Kind::vector:
+    case Kind::place:
       return "[0.0, 1.0, 0.0]";
     case Kind::colour:
       return "[0.8, 0.4, 0.1] or \"srgb(230, 170, 90)\"";
@@ -366,6 +367,8 @@ void read_value(const Parameter& parameter, void* field, const toml::node& value
       return put<std::vector<uint32_t>>(field, reader.vertices(value));
     case Kind::box:
       return put<std::optional<std::pair<V3d, V3d>>>(field, reader.box(value));
+    case Kind::place:
+      return put<std::optional<V3d>>(field, reader.vector(value));
     case Kind::grid_pins:
       break;
   }

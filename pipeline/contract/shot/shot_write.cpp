@@ -46,7 +46,7 @@ std::string default_text(const Parameter& parameter) {
     fresh.fluid.volume.resize(1);
     fresh.sink.resize(1);
     fresh.cloth.resize(1);
-    fresh.cloth[0].pin.resize(1);
+    fresh.cloth[0].pin.resize(1), fresh.cloth[0].seam.resize(1);
     fresh.obstacle.resize(1);
     fresh.probe.resize(1);
     fresh.light.resize(1);
@@ -330,6 +330,7 @@ std::string reference_shot(const std::string& name) {
   return text + commented("fluid.emitter", "A mesh not without its file.", &mesh) +
          commented("fluid.volume", "Not without its file.") +
          commented("cloth", "As a shell in place of springs.", &shell) +
+         commented("cloth.seam", "Not without two edges.") +
          commented("obstacle", "At its defaults it would stand in the fluid above.") +
          commented("sink", "At its defaults it would take the fluid above.");
 }

@@ -1,6 +1,7 @@
 #include "sim/passes/cloth/cloth_implicit.h"
 
 #include "sim/passes/cloth/cloth_obstacles.h"
+#include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/cloth_springs.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -67,7 +68,9 @@ void linearise_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const Parameters& p = state.parameters;
   const float dt = float(state.dt);
-  const ConstVecView x = c.position.view(), v = c.velocity.view();
+  const bool anchored = state.pins.soft;
+  if (anchored) find_anchors(state);
+  const ConstVecView x = c.position.view(), v = c.velocity.view(), path = path_velocity_of(state);
   const VecView axis = s.axis.view(), base = s.base.view(), free = s.free.view(),
                 change = s.change.view();
   const ConstVecView owed = c.force.view();
@@ -83,6 +86,8 @@ void linearise_cloth(State& state) {
   const bool shells = state.shell.any;
   const ConstVecView shell_base = state.shell.base.view();
   const float* shell_diagonal = state.shell.diagonal.data();
+  const float* anchor = s.anchor.data();
+  const ConstVecView anchor_pull = s.anchor_pull.view();
   const int padded = c.padded;
   ClothControl* control = s.control.data();
   parallel_for(
@@ -90,7 +95,8 @@ void linearise_cloth(State& state) {
   for_each_lane(
       state.queue, "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(mass, i));
-        const Vec3<T> here = x.at(i), speed = v.at(i), none{T(0.f), T(0.f), T(0.f)};
+        const Vec3<T> here = x.at(i), speed = v.at(i), straight = path.at(i),
+                      none{T(0.f), T(0.f), T(0.f)};
         const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
         Vec3<T> force =
             Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
@@ -103,7 +109,7 @@ void linearise_cloth(State& state) {
           const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
           const T t = stiff * max0(excess * inverse);
           const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
-          const Vec3<T> away = speed - ends.at_end(v, i, k);
+          const Vec3<T> away = straight - ends.at_end(path, i, k);
           force = force + n * (load(stiffness, at) * excess);
           held = held + away * t + e * dot(e, away);
           store(tension, at, t), axis.put(at, e);
@@ -121,6 +127,11 @@ void linearise_cloth(State& state) {
           inner = shell_base.at(i);
           for (int k = 0; k < 6; ++k) b[k] = b[k] + load(shell_diagonal + k * padded, i);
         }
+        if (anchored) {
+          inner = inner + anchor_pull.at(i);
+          const T more = load(anchor, i);
+          b[0] = b[0] + more, b[3] = b[3] + more, b[5] = b[5] + more;
+        }
         store(inertia, i, heavy);
         block.put(i, b, maximum(heavy, T(1e-20f)));
         const T moves = select(load(inverse_mass, i) > T(0.f), T(1.f), T(0.f));
@@ -128,6 +139,7 @@ void linearise_cloth(State& state) {
         base.put(i, force * T(dt * dt) - held * T(dt) + inner);
         change.put(i, none);
       });
+  if (state.pins.count > 0) place_pins(state);
 }
 
 void hold_at_walls(State& state) {

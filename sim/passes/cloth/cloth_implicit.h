@@ -7,8 +7,8 @@
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
 // pressures give (contact_incompressible.h). Solved by conjugate gradients scaled by the 3 x 3
 // blocks of the vertices. B is the drag of the air (wind_on_cloth.h), whose force joins f. Pinned
-// vertices stay at w = 0, and vertices that a wall of the domain or an obstacle (cloth_obstacles.h)
-// holds up have the w that takes them there.
+// vertices stay at w = 0, and vertices that a moving pin (cloth_pins.h), a wall of the domain or an
+// obstacle (cloth_obstacles.h) holds have the w that takes them there.
 
 #include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_levels.h"
@@ -54,6 +54,8 @@ struct ClothMatrix {
   ConstVecView axis;
   ConstraintProjection constraints;
   AirDrag air;
+  const float* anchor;  // kg, of soft pins
+  bool anchored;
   float dt;  // s
 
   template <class Index>
@@ -67,6 +69,7 @@ struct ClothMatrix {
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
     if (air.on) y = y + air.times(i, x) * T(dt);
+    if (anchored) y = y + x * load(anchor, i);
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);
@@ -87,6 +90,8 @@ inline ClothMatrix cloth_matrix(const State& state) {
           .axis = s.axis.view(),
           .constraints = constraint_projection(state),
           .air = air_drag_of(state),
+          .anchor = s.anchor.data(),
+          .anchored = state.pins.soft,
           .dt = float(state.dt)};
 }
 

@@ -76,14 +76,15 @@ struct LeafEnergies {
   const SheetRow* row;
   const int *row_start, *row_entry, *leaf, *leaf_vertex, *reach;
   ConstVecView rest, centre;
-  const float *leaf_weight, *inverse_mass;
+  const float* leaf_weight;
   double* partial;
   float* held;
   int level, first;  // of the level's aggregates
   bool obstacles;
 
   DRENCH_HD bool moves(int v) const {
-    if (inverse_mass[v] == 0.f) return false;
+    const Vec3<float> free = matrix.constraints.axis[v];
+    if (free.x + free.y + free.z == 0.f) return false;
     return !obstacles || matrix.constraints.slides[v] > 0.f;
   }
   DRENCH_HD Vec3<float> from_centre(int a, int v) const {
@@ -149,6 +150,7 @@ struct LeafEnergies {
     k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
     k.entry[5] += (1.f - free.z) * stiff;
     if (obstacles) k = k + Symmetric3::of(matrix.constraints.normal[i], stiff);
+    if (matrix.anchored) k.add(matrix.anchor[i]);
     if (!matrix.air.on) return k;
     const Vec3<float> d = matrix.air.diagonal[i] * matrix.dt, c = matrix.air.cross[i] * matrix.dt;
     return k + Symmetric3{{d.x, c.x, c.z, d.y, c.y, d.z}};
@@ -413,7 +415,6 @@ void build_cloth_levels(State& state) {
                               .rest = s.rest.view(),
                               .centre = s.centre.view(),
                               .leaf_weight = s.leaf_weight.data(),
-                              .inverse_mass = state.cloth.inverse_mass.data(),
                               .partial = partial,
                               .held = s.held.data(),
                               .level = l,

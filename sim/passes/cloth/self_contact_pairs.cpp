@@ -139,7 +139,7 @@ struct PairSearch {
     const float nearer = approach_of_pieces(edges, way) + 2.f * slack,
                 distance = length(distance_of_pieces(edges, x).apart);
     if (distance > a.half_thickness + d.half_thickness + nearer) return;
-    if (distance <= pieces.thickness(pair) + nearer) visit(pair);
+    if (distance <= pieces.thickness(pair) + nearer && !pieces.sewn(pair)) visit(pair);
   }
 };
 
@@ -215,12 +215,14 @@ void load_self_contact(State& state, const ClothTopology& t) {
   s.any = state.parameters.self_contact;
   if (!s.any) return;
   std::vector<SheetVertex> vertex(size_t(state.cloth.padded), SheetVertex{});
+  const std::vector<int> point = sewn_points(t);
   for (int k = 0; k < int(t.corner.size()); ++k) {
     const size_t v = size_t(t.corner[k]);
     vertex[v] = {.rest = {t.rest.x[v], t.rest.y[v], t.rest.z[v]},
                  .half_thickness = t.half_thickness[k / 3],
                  .root_friction = std::sqrt(t.friction[v]),
-                 .sheet = t.sheet[k / 3]};
+                 .sheet = t.sheet[k / 3],
+                 .point = point[v]};
     if (t.meets_sheets[v]) s.thickness = std::max(s.thickness, 2 * t.half_thickness[k / 3]);
   }
   double edges = 0;

@@ -23,6 +23,14 @@ struct SheetPieces {
                         Vec3<float> (&to)[4]) const {
     for (int k = 0; k < 4; ++k) to[k] = from[pair.vertex[k]];
   }
+  /// Whether a seam joins the pieces: they are neighbours, as pieces that share a vertex are.
+  DRENCH_HD bool sewn(const SheetPair& pair) const {
+    const int first = edges(pair) ? 2 : 1;
+    for (int a = 0; a < first; ++a)
+      for (int b = first; b < 4; ++b)
+        if (vertex[pair.vertex[a]].point == vertex[pair.vertex[b]].point) return true;
+    return false;
+  }
   /// m, that two pieces keep apart: half the thickness of either, and at rest there is a tenth of
   /// their distance to spare, or a fine mesh of thick cloth would push itself apart.
   DRENCH_HD float thickness(const SheetPair& pair) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/shell_bending.h"
 
@@ -304,6 +305,7 @@ void linearise_shell(State& state) {
   ShellState& s = state.shell;
   const ClothState& c = state.cloth;
   find_paths(state);
+  if (state.pins.count > 0) find_pin_paths(state);
   const ShellCorners corners{.position = c.position.view(),
                              .rounding = s.rounding.view(),
                              .path = s.path.view(),
@@ -366,13 +368,17 @@ void keep_shell_step(State& state) {
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
   const ConstVecView free = state.cloth_system.free.view(),
                      normal = state.cloth_system.normal.view();
-  const bool obstacles = state.parameters.obstacles > 0;
+  const bool obstacles = state.parameters.obstacles > 0, anchored = state.pins.soft;
+  const ConstVecView anchor_pull = state.cloth_system.anchor_pull.view();
+  const float* anchor = state.cloth_system.anchor.data();
   const SheetRows contact = sheet_rows_of(state);
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
         landed.set(i, next[i]), left.set(i, next_velocity[i]);
-        internal.set(i, (base[i] - matrix.times(change, i)) * (inverse_dt * inverse_dt));
+        Vec3<float> inner = base[i] - matrix.times(change, i);
+        if (anchored) inner = inner + anchor_pull[i] - change[i] * anchor[i];
+        internal.set(i, inner * (inverse_dt * inverse_dt));
         const bool shell = fan_slot[2 * fan_start[i]] >= 0,
                    held = length2(free[i] - Vec3<float>{1.f, 1.f, 1.f}) > 0.f ||
                           (obstacles && length2(normal[i]) > 0.f) ||

@@ -143,7 +143,7 @@ void hold_cloth(State& state, const ContinuousCollision& test, const Tested& tes
           next_v.set(v, test.stop_velocity(v, next_v[v]));
         for (int k = 0; k < 4; ++k) test.stop_sum[4 * v + k] = 0;
         hold[v] = 1;
-        next.set(v, x[v]);
+        if (all || test.inverse_mass[v] > 0.f) next.set(v, x[v]);  // a pin goes its way
       });
   if (state.parameters.obstacles > 0) carry_held_vertices(state);
   guard_sheets(state);  // others may go through what is held

@@ -1,5 +1,7 @@
 #include "sim/passes/coupling/contact_incompressible.h"
 
+#include "sim/passes/cloth/cloth_pins.h"
+
 namespace drench::sim::DRENCH_BACKEND {
 
 void add_cloth_to_walls(State& state) {
@@ -106,6 +108,18 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
       DRENCH_LAMBDA(double energy) { control->reference = keep * control->reference + energy; });
 }
 
+/// What pins drive counts as well: a sheet that nothing else moves is to follow them.
+void add_pins_to_reference(State& state) {
+  if (!state.pins.drive) return;
+  const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
+  const ConstVecView change = state.cloth_system.change.view();
+  const VecView driven = state.cloth_system.image.view();
+  parallel_for(
+      state.queue, "pins: drive", state.cloth.vertices,
+      DRENCH_LAMBDA(int i) { driven.set(i, matrix.times(change, i)); });
+  add_to_reference(state, matrix, driven, 1.f, 0.);
+}
+
 /// What the rows take from the particles at the pressures beside the positions.
 void load_by_pressures(State& state) {
   const ClothRows c = cloth_rows(state);
@@ -190,6 +204,7 @@ void start_cloth(State& state) {
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   add_to_reference(state, matrix, s.right.view(), 0.f, state.shell.any ? quiet_speed : 0.);
   add_to_reference(state, matrix, s.base.view(), 1.f, 0.);
+  add_pins_to_reference(state);
 }
 
 void respond_cloth(State& state, int sweeps, float tolerance) {
@@ -231,6 +246,7 @@ void settle_cloth(State& state) {
     build_cloth_levels(state);
     add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
                      state.shell.any ? quiet_speed : 0.);
+    add_pins_to_reference(state);
     // What falls freely needs no sweeps.
     if (state.shell.any) balance_loose_cloth(state, s.change.view(), given);
     solve_cloth(state, s.change.view(), given, last_sweeps, first);
@@ -302,6 +318,7 @@ void finish_cloth(State& state) {
         next_velocity.put(i, velocity);
         predicted.put(i, velocity);
       });
+  if (state.pins.count > 0) finish_pins(state);
   if (state.parameters.obstacles > 0) finish_at_obstacles(state, near ? right : base);
   guard_sheets(state);
   if (shells) keep_shell_step(state);
