@@ -229,6 +229,7 @@ void for_each_system_column(S& state, const Visit& visit) {
   visit({"free_factor", "kg", Group::cloth_obstacles}, s.free_factor, none);
   visit({"slides", "1", Group::cloth_obstacles}, s.slides, none);
   visit({"rub", "kg m", Group::cloth_obstacles}, s.rub, none);
+  visit({"cling", "kg", Group::cloth_obstacles}, s.cling, none);
   visit({"system.residual", "kg m", Group::cloth_system}, s.residual, none);
   visit({"scaled", "m", Group::cloth_system}, s.scaled, none);
   visit({"image", "kg m", Group::cloth_system}, s.image, none);
@@ -345,6 +346,22 @@ void for_each_self_contact_column(S& state, const Visit& visit) {
   visit({"pair.entry", "1", Group::self_contact}, s.pair_entry, none);
 }
 
+template <class S, class Visit>
+void for_each_triangle_obstacle_column(S& state, const Visit& visit) {
+  using Group = ColumnGroup;
+  auto& s = state.triangle_obstacles;
+  visit({"side", "1", Group::cloth_fixed}, s.side, none);
+  visit({"triangle.count", "1", Group::self_contact}, s.count, none);
+  visit({"triangle.first", "1", Group::self_contact}, s.first, none);
+  visit({"triangle.pair", "", Group::self_contact}, s.pair, none);
+  visit({"touch.count", "1", Group::self_contact}, s.touch_count, none);
+  visit({"touch.first", "1", Group::self_contact}, s.touch_first, none);
+  visit({"touch.found", "", Group::self_contact}, s.found, none);
+  visit({"touch", "", Group::self_contact}, s.touch, none);
+  visit({"triangle.stop", "1", Group::self_contact}, s.stop, none);
+  visit({"carrier", "1", Group::self_contact}, s.carrier, none);
+}
+
 template <class Solids, class Visit>
 void for_each_solid_column(Solids& solids, ColumnGroup group, const Visit& visit) {
   visit({"view", "", group}, solids.view, none);
@@ -366,6 +383,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_cloth_level_column(state, visit);
   for_each_pin_column(state, visit);
   for_each_self_contact_column(state, visit);
+  for_each_triangle_obstacle_column(state, visit);
   for_each_solid_column(state.obstacles, ColumnGroup::obstacles, visit);
   for_each_solid_column(state.sinks, ColumnGroup::sinks, visit);
   visit({"stopped", "kg m/s", ColumnGroup::stopped}, state.obstacles.stopped, none);

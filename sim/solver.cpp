@@ -11,6 +11,7 @@
 #include "sim/passes/cloth/cloth_levels.h"
 #include "sim/passes/cloth/self_contact_pairs.h"
 #include "sim/passes/cloth/shell_columns.h"
+#include "sim/passes/cloth/triangle_obstacles.h"
 #include "sim/passes/motion/measure_limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
@@ -360,6 +361,7 @@ class BackendSolver : public Solver {
     c.stop_sum.resize(size_t(4) * c.vertices);
     load_shell(state_, t);
     load_cloth_levels(state_, t);
+    load_triangle_obstacles(state_, t);
     load_self_contact(state_, t);
   }
 
@@ -410,7 +412,7 @@ class BackendSolver : public Solver {
     if (state_.pins.soft) s.anchor.resize(c.padded), s.anchor_pull.resize(c.padded);
     if (state_.parameters.obstacles > 0) {
       s.normal.resize(c.padded), s.rub.resize(c.padded);
-      s.grip.resize(c.padded), s.slides.resize(c.padded);
+      s.grip.resize(c.padded), s.slides.resize(c.padded), s.cling.resize(c.padded);
       s.free_factor.resize(size_t(6) * c.padded);
     }
   }

@@ -140,6 +140,7 @@ struct ClothSystem {
   Column<float> free_factor;  // as factor, of what may move. Only with obstacles
   Column<float> slides;       // 0 where friction holds a vertex, else 1. Only with obstacles
   VecColumn rub;              // kg m, friction of what slides on them. Only with obstacles
+  Column<float> cling;  // kg, across the normal, of shells that friction holds. Only with obstacles
   VecColumn residual, scaled, image, direction, direction_image;
   Column<float> drag_factor;  // as factor, with the fluid's drag; only where sheets hold fluid
   Column<float> anchor;       // kg, of soft pins; only where there are any
@@ -253,10 +254,12 @@ struct SheetPair {
 };
 
 /// A pair in the sheets' system (passes/cloth/self_contact.h). Vectors of weights w_j: sum w_j x_j
-/// is from the second piece to the first.
+/// is from the second piece to the first. Of a triangle at an obstacle the second is the obstacle:
+/// the fourth weight is 0.
 struct SheetRow {
   int vertex[4];
   float weight[4];
+  int obstacle;           // -1: none
   Vec3<float> normal;     // unit, from the second to the first
   float gap;              // m, at the end of the straight paths
   float thickness;        // m, that the pair keeps apart
@@ -272,7 +275,7 @@ struct SheetRow {
 
 /// Contact of shells with themselves and each other (passes/cloth/self_contact_pairs.h).
 struct SelfContact {
-  bool any = false;     // sheets take part
+  bool any = false;     // sheets take part, or triangles meet obstacles
   float thickness = 0;  // m, of the thickest pair
   float edge = 0;       // m, mean
   float slack = 0;      // m, that a vertex may end off the path that the pairs were found for
@@ -297,6 +300,33 @@ struct SelfContact {
   VecColumn wanted;                    // m, ends of the paths that the guard shortens
   Column<float> portion, stop;         // of a vertex' path that it may go; of a pair's
   Column<int> pair_start, pair_entry;  // of a vertex: 4 pair + corner
+};
+
+/// A triangle and an obstacle that may meet.
+struct TrianglePair {
+  int triangle, obstacle;
+  float distance;  // m, at the start of the step
+};
+
+/// A point of a triangle that an obstacle is nearest to.
+struct TriangleTouch {
+  int triangle, obstacle;
+  float weight[3];
+  float distance;  // m, at the start of the step
+};
+
+/// Triangles of shells at obstacles (passes/cloth/triangle_obstacles.h).
+struct TriangleObstacles {
+  bool any = false;  // there are shells and obstacles
+  int pairs = 0, touches = 0;
+  Column<int> side;  // of a triangle, bits: sides 01, 12, 20 that it stands for; -1: of springs
+  // rebuilt every step
+  Column<int> count, first;  // of a triangle: its pairs
+  Column<TrianglePair> pair;
+  Column<int> touch_count, touch_first;  // of a pair
+  Column<TriangleTouch> found, touch;    // 4 a pair; those of all pairs
+  Column<float> stop;                    // of a pair: how much of their paths its vertices may go
+  Column<int> carrier;  // of a vertex: the obstacle that takes along what it stops; -1: none
 };
 
 /// Contacts sorted by triangle.
@@ -452,6 +482,7 @@ struct State {
   ClothLevels cloth_levels;
   PinState pins;
   SelfContact self_contact;
+  TriangleObstacles triangle_obstacles;
   ContactState contact;
   ObstacleState obstacles, sinks;
   WindNow wind;

@@ -91,7 +91,9 @@ bool coupled_exactly(const Parameters& p, bool cloth) {
 }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_shells(const Parameters& p, bool cloth) { return strong(p, cloth) && p.shells; }
-bool strong_meeting(const Parameters& p, bool cloth) { return strong(p, cloth) && p.self_contact; }
+bool strong_meeting(const Parameters& p, bool cloth) {
+  return strong(p, cloth) && (p.self_contact || (p.shells && p.obstacles > 0));
+}
 bool strong_in_wind(const Parameters& p, bool cloth) {
   return strong(p, cloth) && p.air_density > 0;
 }

@@ -332,8 +332,9 @@ void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) 
   }
 }
 
-bool meets_sheets(const Cloth& cloth) {
-  return cloth.model == ClothModel::shell && cloth.self_collision;
+/// Images across seams are not looked for: a sheet that is joined to itself meets none.
+bool meets_sheets(const Cloth& cloth, const Sheet& sheet) {
+  return cloth.model == ClothModel::shell && cloth.self_collision && !sheet.joined();
 }
 
 void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const LocalFrame& frame,
@@ -379,7 +380,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     }
     const V3d& rest = sheet.rest[sheet.point[v]];
     t.rest.push(frame.to_local(0, rest.x), frame.to_local(1, rest.y), frame.to_local(2, rest.z));
-    t.meets_sheets.push_back(meets_sheets(cloth));
+    t.meets_sheets.push_back(meets_sheets(cloth, sheet));
     t.friction.push_back(float(cloth.friction));
     t.air_share.push_back(float(sheet.mass[v] / (cloth.areal_density * third)));
     t.mass.push_back(float(sheet.mass[v]));
@@ -478,9 +479,10 @@ void place_sheets(const Shot& shot, Scene& scene) {
   }
   tie_sheets(shot, scene);
   // Images across seams are not looked for.
-  scene.parameters.self_contact = std::any_of(shot.cloth.begin(), shot.cloth.end(), meets_sheets) &&
-                                  sheets_are_implicit(scene.parameters) &&
-                                  scene.cloth.corner_shift.size() == 0;
+  const std::vector<char>& meets = scene.cloth.meets_sheets;
+  scene.parameters.self_contact =
+      std::any_of(meets.begin(), meets.end(), [](char c) { return c != 0; }) &&
+      sheets_are_implicit(scene.parameters);
   // The implicit step of the sheets has no limit.
   scene.parameters.cloth_dt_limit =
       sheets_are_implicit(scene.parameters) ? 1e30f : float(std::min(dt_limit, 1e-3));

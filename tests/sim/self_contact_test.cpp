@@ -273,6 +273,21 @@ TEST(SelfContact, LayersOnABallDoNotCross) {
   EXPECT_GE(watch.nearest, 0.5 * thickness);
 }
 
+// Loose layers meet where another sheet goes around a periodic axis, which meets none.
+TEST(SelfContact, LayersBesideAJoinedSheetStayApart) {
+  Shot shot = stack(2, 0.1);
+  shot.domain.axis[0] = Axis::periodic;
+  const double length = shot.domain.max.x - shot.domain.min.x;
+  Cloth& endless = add_shell(shot, length, 0.5, 8);
+  endless.corner.x = shot.domain.min.x;
+  pin_edges(endless);
+  const sim::Scene scene = sim::build_scene(shot);
+  EXPECT_GT(scene.cloth.corner_shift.size(), 0u);
+  Watched watch(scene);
+  watch.until(0.3);
+  EXPECT_GE(watch.nearest, 0.5 * thickness);  // crossings are not counted across seams
+}
+
 // What collisions of particles hold back does not let the layer above through.
 TEST(SelfContact, LayersUnderWaterDoNotCross) {
   Shot shot = shells_alone();

@@ -3,6 +3,7 @@
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/cloth_springs.h"
+#include "sim/passes/cloth/triangle_obstacles.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -217,7 +218,7 @@ void hold_at_obstacles(State& state) {
   const ConstVecView base = s.base.view(), right = s.right.view();
   const VecView change = s.change.view();
   const float dt = float(state.dt), *inverse_mass = c.inverse_mass.data();
-  float* slides = s.slides.data();
+  float *slides = s.slides.data(), *cling = s.cling.data();
   const BlockInverse block = block_inverse(state);
   const ClothHold hold = cloth_hold_of(state);
   state.cloth_system.normal.clear(state.queue);
@@ -225,7 +226,7 @@ void hold_at_obstacles(State& state) {
   state.cloth_system.rub.clear(state.queue);
   parallel_for(
       state.queue, "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
-        hold.grip[i] = -1, slides[i] = 1.f;
+        hold.grip[i] = -1, slides[i] = 1.f, cling[i] = 0.f;
         hold.free_block.copy(i, hold.block);
         if (inverse_mass[i] == 0.f) return;
         const Vec3<float> straight = x[i] + v[i] * dt;
@@ -324,6 +325,7 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
                             .reaction = s.residual.view(),
                             .rub = s.rub.view(),
                             .slides = s.slides.data(),
+                            .cling = s.cling.data(),
                             .mass = c.mass.data(),
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),
@@ -368,6 +370,7 @@ void finish_at_obstacles(State& state, const ConstVecView& given) {
               *inverse_mass = c.inverse_mass.data();
   const ClothMatrix matrix = cloth_matrix(state);
   const ClothHold hold = cloth_hold_of(state);
+  react_to_touch_rows(state);
   parallel_for(
       state.queue, "cloth: at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
         if (inverse_mass[i] == 0.f) return;

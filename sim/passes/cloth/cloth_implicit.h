@@ -28,8 +28,8 @@ DRENCH_HD Vec3<T> along(Vec3<T> free, Vec3<T> v) {
 /// axes, and of these not along the normal of an obstacle, nor across it where friction holds it.
 struct ConstraintProjection {
   ConstVecView axis, normal;
-  const float* slides;
-  bool obstacles;
+  const float *slides, *cling;
+  bool obstacles, shells;
 
   template <class Index, class T>
   DRENCH_HD Vec3<T> project(Index i, Vec3<T> v) const {
@@ -38,11 +38,23 @@ struct ConstraintProjection {
     const Vec3<T> n = normal.at(i);
     return (free - n * dot(n, free)) * load(slides, i);
   }
+  /// What friction adds to A where it holds shells: a stiffness across the normal.
+  template <class Index, class T>
+  DRENCH_HD Vec3<T> clung(Index i, Vec3<T> x) const {
+    const Vec3<T> n = normal.at(i);
+    return (x - n * dot(n, x)) * load(cling, i);
+  }
 };
 
 inline ConstraintProjection constraint_projection(const State& state) {
   const ClothSystem& s = state.cloth_system;
-  return {s.free.view(), s.normal.view(), s.slides.data(), state.parameters.obstacles > 0};
+  const bool obstacles = state.parameters.obstacles > 0;
+  return {.axis = s.free.view(),
+          .normal = s.normal.view(),
+          .slides = s.slides.data(),
+          .cling = s.cling.data(),
+          .obstacles = obstacles,
+          .shells = obstacles && state.shell.any};
 }
 
 /// The matrix A, by slots of springs and rows of shells, on free directions alone.
@@ -60,7 +72,9 @@ struct ClothMatrix {
 
   template <class Index>
   DRENCH_HD auto times(const ConstVecView& view, Index i) const {
-    return constraints.project(i, whole(view, i));
+    auto y = whole(view, i);
+    if (constraints.shells) y = y + constraints.clung(i, view.at(i));
+    return constraints.project(i, y);
   }
   /// On all axes: less the right side it is what holds a vertex.
   template <class Index>

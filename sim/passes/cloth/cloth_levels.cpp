@@ -149,7 +149,9 @@ struct LeafEnergies {
     Symmetric3 k = Symmetric3::of(matrix.inertia[i]);
     k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
     k.entry[5] += (1.f - free.z) * stiff;
-    if (obstacles) k = k + Symmetric3::of(matrix.constraints.normal[i], stiff);
+    if (obstacles)
+      k = k + Symmetric3::of(matrix.constraints.normal[i], stiff) +
+          Symmetric3::of(matrix.constraints.cling[i]);
     if (matrix.anchored) k.add(matrix.anchor[i]);
     if (!matrix.air.on) return k;
     const Vec3<float> d = matrix.air.diagonal[i] * matrix.dt, c = matrix.air.cross[i] * matrix.dt;

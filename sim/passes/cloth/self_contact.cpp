@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "sim/backend/sort.h"
-#include "sim/passes/cloth/cloth_implicit.h"
+#include "sim/passes/cloth/triangle_obstacles.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -22,6 +22,7 @@ struct RowMaker {
 
   DRENCH_HD SheetRow operator()(const SheetPair& pair) const {
     SheetRow r{};
+    r.obstacle = -1;
     Vec3<float> x[4];
     const Vec3<float> from = position[pair.vertex[0]], low = rounding[pair.vertex[0]];
     for (int k = 0; k < 4; ++k) {
@@ -72,12 +73,6 @@ struct RowMaker {
   }
 };
 
-/// What a row gives beside its part of A: kg m.
-DRENCH_HD Vec3<float> push_of(const SheetRow& r) {
-  if (r.stiffness == 0.f) return {0.f, 0.f, 0.f};
-  return r.normal * (r.stiffness * (r.target - r.gap)) + r.rub - r.slip * r.grip;
-}
-
 /// Rows of vertices.
 void sort_rows(State& state) {
   SelfContact& s = state.self_contact;
@@ -88,7 +83,8 @@ void sort_rows(State& state) {
   parallel_for(
       state.queue, "self: keys of rows", entries, DRENCH_LAMBDA(int e) {
         const SheetRow& r = row[e >> 2];
-        key[e] = r.mass > 0.f ? r.vertex[e & 3] : padded;
+        const bool counts = r.mass > 0.f && (r.obstacle < 0 || (e & 3) < 3);
+        key[e] = counts ? r.vertex[e & 3] : padded;
       });
   stable_sort_keys(state.queue, s.key, entries, padded, s.entry, s.start);
 }
@@ -154,7 +150,10 @@ void put_rows_in_blocks(State& state, Sides sides) {
         if (!may.obstacles) return;
         const Vec3<float> held = may.normal[i];
         free_block.copy(i, block);
-        if (length2(held) > 0.f) free_block.put_free(i, block, axes, held, inertia[i]);
+        if (length2(held) == 0.f) return;
+        const float cling = may.cling[i], clung[6] = {cling, 0.f, 0.f, cling, 0.f, cling};
+        if (cling > 0.f) free_block.add(i, clung, inertia[i]);
+        free_block.put_free(i, free_block, axes, held, inertia[i]);
       });
 }
 
@@ -177,6 +176,11 @@ struct RowRevision {
       return true;
     }
     const float force = r.stiffness * (r.target - gap);
+    if (r.obstacle >= 0 && gap < r.target - 0.05f * r.thickness &&
+        r.stiffness < 99.f * row_stiffness * r.mass) {
+      r.stiffness *= 10.f;
+      return true;
+    }
     if (force < 0.f) {
       r.stiffness = r.grip = 0.f, r.rub = {0.f, 0.f, 0.f};
       ++r.released;
@@ -239,8 +243,9 @@ void start_sheet_rows(State& state) {
       state.queue, "self: paths", c.vertices,
       DRENCH_LAMBDA(int i) { to.set(i, x[i] + path[i] * dt); });
   find_sheet_pairs(state, slack_of(state, gravity));
-  if (s.pairs == 0) return;
-  s.rows = s.pairs;
+  find_triangles_at_obstacles(state);
+  s.rows = s.pairs + state.triangle_obstacles.touches;
+  if (s.rows == 0) return;
   s.row.resize(s.rows);
   const RowMaker make{.pieces = sheet_pieces_of(state),
                       .owned = s.owned.data(),
@@ -254,7 +259,8 @@ void start_sheet_rows(State& state) {
   const SheetPair* pair = s.pair.data();
   SheetRow* row = s.row.data();
   parallel_for(
-      state.queue, "self: rows", s.rows, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
+      state.queue, "self: rows", s.pairs, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
+  put_touch_rows(state, s.pairs);
   sort_rows(state);
   s.load.clear(state.queue);
   load_by_rows(state, Sides::base);

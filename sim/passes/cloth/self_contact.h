@@ -9,7 +9,8 @@
 // in a few rounds (revise_sheet_rows); the same rounds find who sticks and who slides by Coulomb's
 // law. Within a pressure solve the rows stay as they are. Where a pair's closest points lie on a
 // side or a corner of a triangle, the one that owns these has the row, so that contact is not
-// counted by how many triangles meet there (the blocks of Chen et al. 2025).
+// counted by how many triangles meet there (the blocks of Chen et al. 2025). Triangles at obstacles
+// have rows of the same kind (triangle_obstacles.h).
 //
 // What the solve leaves is no proof: guard_sheets, last of all, stops vertices short of crossing.
 
@@ -20,6 +21,12 @@ namespace drench::sim::DRENCH_BACKEND {
 /// Of a row, over the pair's reduced mass: 50 layers of cotton at rest stay 0.88 thicknesses apart,
 /// and what friction holds on a slope of 1 in 2 creeps by 0.04 mm/s.
 constexpr float row_stiffness = 100.f, row_grip = 100.f;
+
+/// What a row gives beside its part of A: kg m.
+DRENCH_HD Vec3<float> push_of(const SheetRow& r) {
+  if (r.stiffness == 0.f) return {0.f, 0.f, 0.f};
+  return r.normal * (r.stiffness * (r.target - r.gap)) + r.rub - r.slip * r.grip;
+}
 
 /// The rows' part of A.
 struct SheetRows {
@@ -56,11 +63,12 @@ struct SheetRows {
       if (row[entry[e] >> 2].stiffness > 0.f) return true;
     return false;
   }
-  /// Whether another sheet does: a shift of the whole meets resistance.
+  /// Whether another sheet or an obstacle does: a shift of the whole meets resistance.
   DRENCH_HD bool touches_another(int i, const SheetVertex* vertex) const {
     for (int e = start[i]; e < start[i + 1]; ++e) {
       const SheetRow& r = row[entry[e] >> 2];
-      if (r.stiffness > 0.f && vertex[r.vertex[0]].sheet != vertex[r.vertex[3]].sheet) return true;
+      if (r.stiffness == 0.f) continue;
+      if (r.obstacle >= 0 || vertex[r.vertex[0]].sheet != vertex[r.vertex[3]].sheet) return true;
     }
     return false;
   }

@@ -1,5 +1,5 @@
 #include "sim/backend/sort.h"
-#include "sim/passes/cloth/self_contact.h"
+#include "sim/passes/cloth/triangle_obstacles.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -31,7 +31,8 @@ struct PairTest {
 enum class Stop {
   at_part,   // where it is safe if the others keep their paths
   bounded,   // within less than half the least distance to what may meet it (Chen et al. 2025)
-  at_start,  // all of it
+  at_base,   // what is not safe where it started, or the obstacle that stops it takes it
+  at_start,  // all of it where it started
 };
 
 struct VertexStop {
@@ -42,6 +43,7 @@ struct VertexStop {
   ConstVecView position, wanted;
   VecView next;
   float* portion;
+  TriangleStops at_obstacles;
   Stop how;
 
   DRENCH_HD void operator()(int v) const {
@@ -50,15 +52,28 @@ struct VertexStop {
       part = minimum(part, stop[entry[e] >> 2]);
       if (how == Stop::bounded) nearest = minimum(nearest, distance(pair[entry[e] >> 2]));
     }
-    if (how == Stop::at_start) part = 0.f;
-    if (part >= 1.f || portion[v] == 0.f) return;
+    const TriangleStops::Stop met = at_obstacles(v);
+    part = minimum(part, met.part);
+    if (how == Stop::at_start || (how == Stop::at_base && part < 1.f)) part = 0.f;
+    if (part >= 1.f) return;
+    const Vec3<float> base = base_of(v, met.obstacle);
     float may = portion[v] * part;
-    const Vec3<float> x = position[v], way = wanted[v] - x;
+    const Vec3<float> way = wanted[v] - base;
     if (how == Stop::bounded)
-      may = minimum(portion[v], 0.4f * nearest / maximum(length(way), 1e-30f));
+      may = minimum(portion[v] * minimum(met.part, 1.f),
+                    0.4f * nearest / maximum(length(way), 1e-30f));
     if (may < 1e-3f) may = 0.f;
     portion[v] = may;
-    next.set(v, may == 0.f ? x : x + way * may);
+    next.set(v, may == 0.f ? base : base + way * may);
+  }
+  /// Where no part of its path takes a vertex. m
+  DRENCH_HD Vec3<float> base_of(int v, int obstacle) const {
+    const Vec3<float> x = position[v];
+    if (!at_obstacles.any) return x;
+    int& by = at_obstacles.carrier[v];
+    if (by < 0) by = obstacle;
+    if (how == Stop::at_start) by = -1;
+    return by < 0 ? x : x + at_obstacles.carried(by, x);
   }
   DRENCH_HD float distance(const SheetPair& p) const {
     Vec3<float> x[4];
@@ -71,6 +86,11 @@ void sort_pairs(State& state) {
   SelfContact& s = state.self_contact;
   const SheetPair* pair = s.pair.data();
   const int entries = 4 * s.pairs;
+  if (entries == 0) {
+    s.pair_start.resize(size_t(state.cloth.padded) + 1);
+    s.pair_start.clear_bytes(state.queue, 0);
+    return;
+  }
   s.key.resize(entries);
   int* key = s.key.data();
   parallel_for(
@@ -95,10 +115,13 @@ void keep_wanted_paths(State& state) {
   const VecView wanted = state.self_contact.wanted.view();
   const ConstVecView next = state.cloth.next.view();
   float* portion = state.self_contact.portion.data();
+  const bool at_obstacles = state.triangle_obstacles.any;
+  int* carrier = state.triangle_obstacles.carrier.data();
   parallel_for(
       state.queue, "self: wanted paths", state.cloth.vertices, DRENCH_LAMBDA(int v) {
         wanted.set(v, next[v]);
         portion[v] = 1.f;
+        if (at_obstacles) carrier[v] = -1;
       });
 }
 
@@ -115,6 +138,7 @@ void stop_vertices(State& state, Stop how) {
                         .wanted = s.wanted.view(),
                         .next = state.cloth.next.view(),
                         .portion = s.portion.data(),
+                        .at_obstacles = triangle_stops_of(state),
                         .how = how};
   parallel_for(
       state.queue, "self: stop", state.cloth.vertices, DRENCH_LAMBDA(int v) { stop(v); });
@@ -126,10 +150,14 @@ void give_stopped_velocities(State& state) {
   const ConstVecView x = c.position.view(), next = c.next.view();
   const VecView velocity = c.next_velocity.view(), predicted = c.predicted.view();
   const float *portion = state.self_contact.portion.data(), inverse_dt = 1.f / float(state.dt);
+  const TriangleStops stops = triangle_stops_of(state);
+  const float* mass = c.mass.data();
   parallel_for(
       state.queue, "self: stopped velocities", c.vertices, DRENCH_LAMBDA(int v) {
         if (portion[v] == 1.f) return;
         const Vec3<float> u = (next[v] - x[v]) * inverse_dt;
+        if (stops.any && stops.carrier[v] >= 0)
+          stops.hold.react(stops.carrier[v], (u - velocity[v]) * mass[v]);
         velocity.set(v, u), predicted.set(v, u);
       });
 }
@@ -141,6 +169,7 @@ void find_pairs_of_paths(State& state) {
       state.queue, "self: paths", state.cloth.vertices,
       DRENCH_LAMBDA(int v) { to.set(v, next[v]); });
   find_sheet_pairs(state, 0.f);
+  find_triangles_at_obstacles(state);
 }
 
 }  // namespace
@@ -152,11 +181,13 @@ void guard_sheets(State& state) {
   for (;; ++round) {
     // Who is stopped has others come at him that moved along with him.
     if (!sheet_pairs_hold(state, state.cloth.next.view())) find_pairs_of_paths(state);
-    if (count_unsafe(state) == 0) break;
+    const int pairs = count_unsafe(state), triangles = count_unsafe_triangles(state);
+    if (pairs + triangles == 0) break;
     if (round == 0) keep_wanted_paths(state);
     stop_vertices(state, round < rounds_at_part ? Stop::at_part
                          : round < rounds       ? Stop::bounded
-                                                : Stop::at_start);
+                         : pairs > 0            ? Stop::at_start
+                                                : Stop::at_base);
     if (round == rounds) break;
   }
   if (round > 0) give_stopped_velocities(state);

@@ -210,9 +210,22 @@ PairSearch sort_boxes(State& state, float slack) {
 
 }  // namespace
 
+int starts_of(const Column<int>& counts, int n, Column<int>& first) {
+  std::vector<int> start = to_host(counts, n);
+  int sum = 0;
+  for (int& begin : start) {
+    const int found = begin;
+    begin = sum, sum += found;
+  }
+  first.resize(n);
+  first.upload(start.data(), start.size());
+  return sum;
+}
+
 void load_self_contact(State& state, const ClothTopology& t) {
   SelfContact& s = state.self_contact;
-  s.any = state.parameters.self_contact;
+  const bool at_obstacles = state.triangle_obstacles.any;
+  s.any = state.parameters.self_contact || at_obstacles;
   if (!s.any) return;
   std::vector<SheetVertex> vertex(size_t(state.cloth.padded), SheetVertex{});
   const std::vector<int> point = sewn_points(t);
@@ -223,13 +236,18 @@ void load_self_contact(State& state, const ClothTopology& t) {
                  .root_friction = std::sqrt(t.friction[v]),
                  .sheet = t.sheet[k / 3],
                  .point = point[v]};
-    if (t.meets_sheets[v]) s.thickness = std::max(s.thickness, 2 * t.half_thickness[k / 3]);
+    if (t.meets_sheets[v] || at_obstacles)
+      s.thickness = std::max(s.thickness, 2 * t.half_thickness[k / 3]);
   }
+  const bool joined = t.corner_shift.size() > 0;
+  const auto rest = [&](size_t k) {
+    const Vec3<float> x = vertex[size_t(t.corner[k])].rest;
+    if (!joined) return x;
+    return x + Vec3<float>{t.corner_shift.x[k], t.corner_shift.y[k], t.corner_shift.z[k]};
+  };
   double edges = 0;
-  for (size_t k = 0; k < t.corner.size(); ++k) {
-    const size_t next = k % 3 == 2 ? k - 2 : k + 1;
-    edges += length(vertex[size_t(t.corner[next])].rest - vertex[size_t(t.corner[k])].rest);
-  }
+  for (size_t k = 0; k < t.corner.size(); ++k)
+    edges += length(rest(k % 3 == 2 ? k - 2 : k + 1) - rest(k));
   s.edge = float(edges / double(t.corner.size()));
   from_host(s.vertex, vertex), from_host(s.owned, owned_pieces(t));
   for (VecColumn* column : {&s.low, &s.high, &s.sorted_low, &s.sorted_high})
@@ -244,6 +262,7 @@ void find_sheet_pairs(State& state, float slack) {
   SelfContact& s = state.self_contact;
   const int triangles = state.cloth.triangles;
   s.slack = slack;
+  if (!state.parameters.self_contact) return;
   const PairSearch search = sort_boxes(state, slack);
   int* count = s.count.data();
   s.pairs = parallel_reduce(
@@ -256,13 +275,7 @@ void find_sheet_pairs(State& state, float slack) {
       },
       Plus{});
   if (s.pairs == 0) return;
-  std::vector<int> first = to_host(s.count, triangles);
-  int sum = 0;
-  for (int& begin : first) {
-    const int found = begin;
-    begin = sum, sum += found;
-  }
-  s.first.upload(first.data(), first.size());
+  starts_of(s.count, triangles, s.first);
   s.pair.resize(s.pairs);
   const int* begin = s.first.data();
   SheetPair* pair = s.pair.data();

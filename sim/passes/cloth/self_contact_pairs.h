@@ -47,6 +47,9 @@ inline SheetPieces sheet_pieces_of(const State& state) {
   return {state.self_contact.vertex.data()};
 }
 
+/// Where each of n runs of these lengths begins; the sum of all.
+int starts_of(const Column<int>& counts, int n, Column<int>& first);
+
 /// What never changes about contact among sheets.
 void load_self_contact(State& state, const ClothTopology& cloth);
 
