@@ -141,10 +141,16 @@ std::vector<int> reach_of(const ClothTopology& cloth, const std::vector<int>& le
 void load_cloth_levels(State& state, const ClothTopology& cloth) {
   ClothLevels& s = state.cloth_levels;
   if (!state.shell.any) return;
+  // From a sheet's first vertex: the bits are not to depend on where the shot stands.
+  HostVec rest = cloth.rest;
   Leaves leaves;
   for (const auto& [first, last] : ranges_of_sheets(cloth)) {
+    for (std::vector<float>* x : {&rest.x, &rest.y, &rest.z}) {
+      const float from = (*x)[first];
+      for (int v = first; v <= last; ++v) (*x)[v] -= from;
+    }
     leaves.pad();
-    leaves.add_sheet(cloth.rest, first, last + 1 - first);
+    leaves.add_sheet(rest, first, last + 1 - first);
   }
   for (int count = int(leaves.start.size()) - 1; s.levels < ClothLevels::most;
        count = (count + 3) / 4) {
@@ -154,8 +160,7 @@ void load_cloth_levels(State& state, const ClothTopology& cloth) {
   }
   load_leaves(s, leaves, state.cloth.padded);
   from_host(s.reach, reach_of(cloth, to_host(s.leaf, size_t(state.cloth.padded))));
-  const HostVec centre = centres_of(s, leaves, cloth.rest);
-  HostVec rest = cloth.rest;
+  const HostVec centre = centres_of(s, leaves, rest);
   for (std::vector<float>* x : {&rest.x, &rest.y, &rest.z}) x->resize(state.cloth.padded);
   load_vectors(s.rest, rest), load_vectors(s.centre, centre);
   load_local_places(s, centre, rest);

@@ -229,26 +229,32 @@ bool something_holds(const State& state) {
              Larger{}) > 0;
 }
 
+/// As start_cloth, where no fluid is near.
+void prepare_cloth_alone(State& state, const ConstVecView& given) {
+  ClothSystem& s = state.cloth_system;
+  s.right.clear(state.queue);
+  hold_at_walls(state);
+  if (state.parameters.obstacles > 0) hold_at_obstacles(state);
+  build_cloth_levels(state);
+  add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
+                   state.shell.any ? quiet_speed : 0.);
+  add_pins_to_reference(state);
+  // What falls freely needs no sweeps.
+  if (state.shell.any) balance_loose_cloth(state, s.change.view(), given);
+}
+
 }  // namespace
 
 void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
   const bool meets = state.parameters.obstacles > 0 || state.self_contact.rows > 0;
+  if (state.contact.near == 0) prepare_cloth_alone(state, given);
   const bool loosely = state.shell.any && meets && something_holds(state);
   const float first = loosely ? contact_tolerance : last_tolerance;
   if (state.contact.near > 0) {
     respond_cloth(state, last_sweeps, first);
   } else {
-    s.right.clear(state.queue);
-    hold_at_walls(state);
-    if (state.parameters.obstacles > 0) hold_at_obstacles(state);
-    build_cloth_levels(state);
-    add_to_reference(state, scaled_cloth_matrix(state), given, 0.f,
-                     state.shell.any ? quiet_speed : 0.);
-    add_pins_to_reference(state);
-    // What falls freely needs no sweeps.
-    if (state.shell.any) balance_loose_cloth(state, s.change.view(), given);
     solve_cloth(state, s.change.view(), given, last_sweeps, first);
   }
   // No shift of the whole closes the momentum of a sheet that is held: of springs to a tenth.
