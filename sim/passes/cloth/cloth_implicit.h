@@ -6,9 +6,10 @@
 // K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed
 // spring would push over sideways, so that A is positive definite. Loads are what the fluid's
 // pressures give (contact_incompressible.h). Solved by conjugate gradients scaled by the 3 x 3
-// blocks of the vertices, and of shells by coarse levels (cloth_levels.h). B is the drag of the air (wind_on_cloth.h), whose force joins f. Pinned
-// vertices stay at w = 0, and vertices that a moving pin (cloth_pins.h), a wall of the domain or an
-// obstacle (cloth_obstacles.h) holds have the w that takes them there.
+// blocks of the vertices, and of shells by coarse levels (cloth_levels.h). B is the drag of the air
+// (wind_on_cloth.h), whose force joins f. Pinned vertices stay at w = 0, and vertices that a moving
+// pin (cloth_pins.h), a wall of the domain or an obstacle (cloth_obstacles.h) holds have the w that
+// takes them there.
 
 #include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_levels.h"
