@@ -372,17 +372,11 @@ class BackendSolver : public Solver {
     state_.pins.soft = std::any_of(pin_vertex_.begin(), pin_vertex_.end(),
                                    [&](int v) { return inverse_mass_[size_t(v)] > 0; });
     if (state_.pins.count > 0) from_host(state_.pins.vertex, t.pin_vertex);
-    std::map<int, std::pair<int, int>> sheet;  // first and last vertex, which follow each other
-    for (size_t k = 0; k < t.corner.size(); ++k) {
-      const int v = t.corner[k];
-      auto& [first, last] = sheet.try_emplace(t.sheet[k / 3], v, v).first->second;
-      first = std::min(first, v), last = std::max(last, v);
-    }
-    for (const auto& [id, range] : sheet) {
-      const auto within = [&](int v) { return v >= range.first && v <= range.second; };
-      if (std::none_of(t.seam.begin(), t.seam.end(),
-                       [&](const SeamSpring& s) { return within(s.a) || within(s.b); }))
-        free_sheet_.push_back({range.first, range.second - range.first + 1});
+    for (const VertexRange& range : sheet_ranges(t)) {
+      if (std::none_of(t.seam.begin(), t.seam.end(), [&](const SeamSpring& s) {
+            return range.contains(s.a) || range.contains(s.b);
+          }))
+        free_sheet_.push_back(range);
     }
   }
 
@@ -390,10 +384,10 @@ class BackendSolver : public Solver {
   void find_loose_sheets() {
     state_.cloth.loose.clear();
     for (const VertexRange& range : free_sheet_) {
-      const auto within = [&](int v) { return v >= range.first && v < range.first + range.count; };
       const auto begin = inverse_mass_.begin() + range.first;
       bool held = std::find(begin, begin + range.count, 0.f) != begin + range.count;
-      for (size_t k = 0; k < pull_.size(); ++k) held |= pull_[k] > 0 && within(pin_vertex_[k]);
+      for (size_t k = 0; k < pull_.size(); ++k)
+        held |= pull_[k] > 0 && range.contains(pin_vertex_[k]);
       if (!held) state_.cloth.loose.push_back(range);
     }
   }

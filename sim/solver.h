@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "sim/pins_now.h"
 #include "sim/probe_query.h"
 #include "sim/shell_topology.h"
+#include "sim/vertex_range.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim {
@@ -69,6 +71,20 @@ struct ClothTopology {
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
 };
+
+/// The vertices of every sheet.
+inline std::vector<VertexRange> sheet_ranges(const ClothTopology& cloth) {
+  std::map<int, std::pair<int, int>> ends;
+  for (size_t k = 0; k < cloth.corner.size(); ++k) {
+    const int v = cloth.corner[k];
+    auto& [first, last] = ends.try_emplace(cloth.sheet[k / 3], v, v).first->second;
+    first = std::min(first, v), last = std::max(last, v);
+  }
+  std::vector<VertexRange> all;
+  for (const auto& sheet : ends)
+    all.push_back({sheet.second.first, sheet.second.second - sheet.second.first + 1});
+  return all;
+}
 
 /// Of every vertex the first of those that seams join it to, of chains of seams, too.
 inline std::vector<int> sewn_points(const ClothTopology& cloth) {

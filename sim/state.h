@@ -12,6 +12,7 @@
 #include "sim/passes/coupling/geometry.h"
 #include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/setup/wall_table.h"
+#include "sim/vertex_range.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -63,11 +64,6 @@ struct FluidState {
   Column<int> held,
       stopped;  // by continuous collision for this substep; triangle it stopped, -1 none
 };
-
-struct VertexRange {
-  int first, count;
-};
-
 /// All sheets in one: vertices, springs by vertex, triangles.
 struct ClothState {
   int vertices = 0, triangles = 0;
@@ -196,6 +192,7 @@ struct ClothLevels {
     int first, count;  // of its aggregates: a is the parent of 4 a to 4 a + 3 of the one before
   };
   int levels = 0, aggregates = 0;  // of all levels, each padded to a multiple of eight
+  bool on = false;                 // they take part: no obstacle holds a sheet in this step
   Level level[most];
   // fixed
   Column<int> leaf;           // of a vertex: its aggregate of the finest level

@@ -83,7 +83,7 @@ TEST(Determinism, ShellsHaveTheSameBitsOnThreadsElsewhereAndResumed) {
   expect_same_state(after(here, 60), after(shell_splash(1e4), 60));
   expect_same_bits_when_resumed(here, 60, 0);
   Shot alone = here;  // on its own step, without fluid
-  alone.fluid.box.clear(), alone.cloth[0].pin = {{.vertices = {0, 24}}};
+  alone.fluid.box.clear(), alone.cloth[0].pin = {{.vertices = {0, 24}, .box = {}}};
   expect_same_bits_on_threads(alone, 60);
   expect_same_bits_when_resumed(alone, 60, 0);
 }
@@ -109,7 +109,7 @@ TEST(Determinism, AViolentSplashIsResumedWithTheSameBits) {
   Cloth& sheet = shot.cloth[0];
   const uint32_t side = 25;
   sheet.areal_density = 0.05;
-  sheet.pin = {{.vertices = {0, side - 1, side * (side - 1), side * side - 1}}};
+  sheet.pin = {{.vertices = {0, side - 1, side * (side - 1), side * side - 1}, .box = {}}};
   expect_same_bits_when_resumed(shot, 600, 0);
 }
 

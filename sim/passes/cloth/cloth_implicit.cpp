@@ -354,8 +354,9 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
     if (sheets) changed |= revise_walls(state, round);
     if (sheets) changed |= revise_sheet_rows(state, round);
     if (!changed) break;
-    solve_cloth(state, change, right, most_iterations, tolerance.between);
-    reached = tolerance.between;
+    state.cloth_levels.on = state.cloth_levels.on && !at_obstacles(state);
+    reached = state.cloth_levels.on ? tolerance.between : tolerance.at_obstacles;
+    solve_cloth(state, change, right, most_iterations, reached);
   }
   if (reached > tolerance.last) solve_cloth(state, change, right, most_iterations, tolerance.last);
 }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <map>
 #include <numeric>
 
 #include "sim/passes/cloth/cloth_levels.h"
@@ -14,11 +13,11 @@ namespace {
 struct Leaves {
   std::vector<int> vertex, start{0};
 
-  void add_sheet(const HostVec& rest, int first, int count) {
-    const int leaves = (count + most_vertices - 1) / most_vertices;
-    vertex.resize(size_t(first) + count);
-    std::iota(vertex.begin() + first, vertex.end(), first);
-    halve(rest, first, first + count, leaves);
+  void add_sheet(const HostVec& rest, const VertexRange& sheet) {
+    const int last = sheet.first + sheet.count;
+    vertex.resize(size_t(last));
+    std::iota(vertex.begin() + sheet.first, vertex.end(), sheet.first);
+    halve(rest, sheet.first, last, (sheet.count + most_vertices - 1) / most_vertices);
   }
   /// No four of the next sheet are to share an aggregate with this one's, but at coarse levels.
   void pad() {
@@ -49,19 +48,6 @@ struct Leaves {
     halve(rest, first, middle, left), halve(rest, middle, last, leaves - left);
   }
 };
-
-/// First and last vertex of every sheet, whose vertices follow each other.
-std::vector<std::pair<int, int>> ranges_of_sheets(const ClothTopology& t) {
-  std::map<int, std::pair<int, int>> of;
-  for (size_t k = 0; k < t.corner.size(); ++k) {
-    auto& [first, last] = of.try_emplace(t.sheet[k / 3], t.corner[k], t.corner[k]).first->second;
-    first = std::min(first, t.corner[k]), last = std::max(last, t.corner[k]);
-  }
-  std::vector<std::pair<int, int>> all;
-  for (const auto& [sheet, range] : of) all.push_back(range);
-  std::sort(all.begin(), all.end());
-  return all;
-}
 
 /// Middles of the aggregates of all levels.
 HostVec centres_of(const ClothLevels& s, const Leaves& leaves, const HostVec& rest) {
@@ -144,13 +130,13 @@ void load_cloth_levels(State& state, const ClothTopology& cloth) {
   // From a sheet's first vertex: the bits are not to depend on where the shot stands.
   HostVec rest = cloth.rest;
   Leaves leaves;
-  for (const auto& [first, last] : ranges_of_sheets(cloth)) {
+  for (const VertexRange& sheet : sheet_ranges(cloth)) {
     for (std::vector<float>* x : {&rest.x, &rest.y, &rest.z}) {
-      const float from = (*x)[first];
-      for (int v = first; v <= last; ++v) (*x)[v] -= from;
+      const float from = (*x)[sheet.first];
+      for (int v = sheet.first; v < sheet.first + sheet.count; ++v) (*x)[v] -= from;
     }
     leaves.pad();
-    leaves.add_sheet(rest, first, last + 1 - first);
+    leaves.add_sheet(rest, sheet);
   }
   for (int count = int(leaves.start.size()) - 1; s.levels < ClothLevels::most;
        count = (count + 3) / 4) {

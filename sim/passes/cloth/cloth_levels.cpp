@@ -399,9 +399,22 @@ constexpr int small_level = 256;
 
 }  // namespace
 
+bool at_obstacles(const State& state) {
+  if (state.parameters.obstacles == 0) return false;
+  const SheetRow* row = state.self_contact.row.data();
+  const int* grip = state.cloth_system.grip.data();
+  const bool held = parallel_reduce(
+                        state.queue, "cloth: held", state.cloth.vertices, 0,
+                        DRENCH_LAMBDA(int i) { return int(grip[i] >= 0); }, Larger{}) > 0;
+  return held || parallel_reduce(
+                     state.queue, "self: at obstacles", state.self_contact.rows, 0,
+                     DRENCH_LAMBDA(int k) { return int(row[k].obstacle >= 0); }, Larger{}) > 0;
+}
+
 void build_cloth_levels(State& state) {
   ClothLevels& s = state.cloth_levels;
-  if (s.levels == 0) return;
+  s.on = s.levels > 0 && !at_obstacles(state);
+  if (!s.on) return;
   const SelfContact& c = state.self_contact;
   const int stride = s.aggregates;
   double *partial = s.partial.data(), *strain = s.strain.data();
@@ -456,7 +469,7 @@ void build_cloth_levels(State& state) {
 
 void add_cloth_levels(State& state, const ScaledClothMatrix& matrix) {
   const ClothLevels& s = state.cloth_levels;
-  if (s.levels == 0) return;
+  if (!s.on) return;
   const LevelAnswers answers = level_answers_of(state);
   for_each_lane(
       state.queue, "levels: restrict", s.level[0].count,

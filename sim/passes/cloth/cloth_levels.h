@@ -6,8 +6,9 @@
 // which contain what hardly costs a sheet anything, shifts, small turns and even strains (Vanek,
 // Mandel, Brezina 1996). B_l: their block of P_l^T A P_l, with all other aggregates still.
 // Sums only, nothing is solved. The blocks of the vertices alone lower errors of wavelength L in
-// about L / h sweeps; a hanging sheet of 64 x 64 cells takes 0.42 of the sweeps with levels, a stiff
-// strip an eighth, and a sweep costs half as much again (docs/decisions/0032-levels-of-sheets.md).
+// about L / h sweeps; a hanging sheet of 64 x 64 cells takes 0.42 of the sweeps with levels, a
+// stiff strip an eighth, and a sweep costs half as much again
+// (docs/decisions/0032-levels-of-sheets.md).
 //
 // Energies are summed by differences: that of two vertices of one aggregate by that of their
 // functions, so that the sum of a stiff sheet keeps what its shift has. A vertex that a pin or
@@ -41,8 +42,13 @@ DRENCH_HD int common_level(int a, int b) {
 /// Aggregates of all sheets; none without shells.
 void load_cloth_levels(State& state, const ClothTopology& cloth);
 
-/// Blocks of the levels, for the rows, holds and walls that there are.
+/// Blocks of the levels, for the rows and walls that there are. Where obstacles hold a sheet the
+/// levels take no part: what rounds hold and stiffen there they would correct far too much, and
+/// thrown sheets were seen.
 void build_cloth_levels(State& state);
+
+/// Whether obstacles hold vertices, or have rows of triangles.
+bool at_obstacles(const State& state);
 
 /// Adds to ClothSystem::scaled what the levels make of ClothSystem::residual, unless the solve has
 /// ended.

@@ -279,10 +279,10 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// Tolerances of the first solve of a step, of those between which contacts change, and of the
-/// last, which is made where the one before it was to a larger one.
+/// Tolerances of the first solve of a step, of those between which contacts change, with levels and
+/// without, and of the last, which is made where the one before it was to a larger one.
 struct ContactTolerances {
-  float first, between, last;
+  float first, between, at_obstacles, last;
 };
 
 /// The first solve of the sheets was made: on with friction and with other vertices and pairs of

@@ -277,20 +277,12 @@ bool revise_sheet_rows(State& state, int round) {
   const float dt = float(state.dt);
   const RowRevision revise{state.cloth_system.change.view(), 1.f / dt, dt, round};
   SheetRow* row = s.row.data();
-  // 2: one that stands at an obstacle stiffens, by which a whole sheet may hang. Levels that did
-  // not know would correct it far too much.
-  const int changed = parallel_reduce(
-      state.queue, "self: revise", s.rows, 0,
-      DRENCH_LAMBDA(int k) {
-        const float before = row[k].stiffness;
-        const bool revised = revise(row[k]);
-        return revised && row[k].obstacle >= 0 && row[k].stiffness > before ? 2 : int(revised);
-      },
-      Larger{});
-  if (changed == 0) return false;
+  const bool changed = parallel_reduce(
+                           state.queue, "self: revise", s.rows, 0,
+                           DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
+  if (!changed) return false;
   load_by_rows(state, Sides::all);
   put_rows_in_blocks(state, Sides::all);
-  if (changed == 2) build_cloth_levels(state);
   return true;
 }
 

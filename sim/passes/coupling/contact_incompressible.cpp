@@ -216,17 +216,12 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
 
 namespace {
 
-/// Whether rows of sheets or obstacles hold any vertex, as far as known before the solve.
-bool something_holds(const State& state) {
+/// Whether rows of sheets hold any vertex, as far as known before the solve.
+bool sheets_touch(const State& state) {
   const SheetRows rows = sheet_rows_of(state);
-  const int* grip = state.cloth_system.grip.data();
-  const bool obstacles = state.parameters.obstacles > 0;
-  return parallel_reduce(
-             state.queue, "cloth: held", state.cloth.vertices, 0,
-             DRENCH_LAMBDA(int i) {
-               return int((rows.any && rows.touches(i)) || (obstacles && grip[i] >= 0));
-             },
-             Larger{}) > 0;
+  return rows.any && parallel_reduce(
+                         state.queue, "cloth: touching", state.cloth.vertices, 0,
+                         DRENCH_LAMBDA(int i) { return int(rows.touches(i)); }, Larger{}) > 0;
 }
 
 /// As start_cloth, where no fluid is near.
@@ -250,18 +245,20 @@ void settle_cloth(State& state) {
   const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
   const bool meets = state.parameters.obstacles > 0 || state.self_contact.rows > 0;
   if (state.contact.near == 0) prepare_cloth_alone(state, given);
-  const bool loosely = state.shell.any && meets && something_holds(state);
+  const bool loosely = state.cloth_levels.on && sheets_touch(state);
   const float first = loosely ? contact_tolerance : last_tolerance;
   if (state.contact.near > 0) {
     respond_cloth(state, last_sweeps, first);
   } else {
     solve_cloth(state, s.change.view(), given, last_sweeps, first);
   }
-  // No shift of the whole closes the momentum of a sheet that is held: of springs to a tenth.
-  const float between = state.shell.any ? contact_tolerance : 0.1f * last_tolerance;
+  // No shift of the whole closes the momentum of a sheet that is held: to a tenth.
   if (meets)
     settle_contacts(state, given, last_sweeps,
-                    {.first = first, .between = between, .last = last_tolerance});
+                    {.first = first,
+                     .between = contact_tolerance,
+                     .at_obstacles = 0.1f * last_tolerance,
+                     .last = last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 
