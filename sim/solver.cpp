@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <numeric>
 
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
@@ -372,15 +373,35 @@ class BackendSolver : public Solver {
     state_.pins.soft = std::any_of(pin_vertex_.begin(), pin_vertex_.end(),
                                    [&](int v) { return inverse_mass_[size_t(v)] > 0; });
     if (state_.pins.count > 0) from_host(state_.pins.vertex, t.pin_vertex);
-    for (const VertexRange& range : sheet_ranges(t)) {
-      if (std::none_of(t.seam.begin(), t.seam.end(), [&](const SeamSpring& s) {
-            return range.contains(s.a) || range.contains(s.b);
-          }))
-        free_sheet_.push_back(range);
+    find_free_sheets(t);
+  }
+
+  /// Sheets, and what seams make of sheets that follow each other, which move as a whole.
+  void find_free_sheets(const ClothTopology& t) {
+    std::vector<VertexRange> piece = sheet_ranges(t);
+    std::vector<size_t> group(piece.size());
+    std::iota(group.begin(), group.end(), size_t(0));
+    const auto group_of = [&](int v) {
+      const auto has = [v](const VertexRange& range) { return range.contains(v); };
+      return group[size_t(std::find_if(piece.begin(), piece.end(), has) - piece.begin())];
+    };
+    for (const SeamSpring& s : t.seam)
+      std::replace(group.begin(), group.end(), group_of(s.a), group_of(s.b));
+    for (size_t k = 0; k < piece.size(); ++k) {
+      if (std::find(group.begin(), group.begin() + std::ptrdiff_t(k), group[k]) !=
+          group.begin() + std::ptrdiff_t(k))
+        continue;
+      VertexRange whole = piece[k];
+      int count = 0;
+      for (size_t j = k; j < piece.size(); ++j) {
+        if (group[j] != group[k]) continue;
+        whole.count = piece[j].first + piece[j].count - whole.first, count += piece[j].count;
+      }
+      if (whole.count == count) free_sheet_.push_back(whole);
     }
   }
 
-  /// Of the sheets that no seam ties to others, those that nothing holds.
+  /// Those that nothing holds.
   void find_loose_sheets() {
     state_.cloth.loose.clear();
     for (const VertexRange& range : free_sheet_) {

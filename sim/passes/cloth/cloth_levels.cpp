@@ -80,12 +80,10 @@ struct LeafEnergies {
   double* partial;
   float* held;
   int level, first;  // of the level's aggregates
-  bool obstacles;
 
   DRENCH_HD bool moves(int v) const {
     const Vec3<float> free = matrix.constraints.axis[v];
-    if (free.x + free.y + free.z == 0.f) return false;
-    return !obstacles || matrix.constraints.slides[v] > 0.f;
+    return free.x + free.y + free.z > 0.f;
   }
   DRENCH_HD Vec3<float> from_centre(int a, int v) const {
     return rest[v] - centre[first + (a >> (2 * level))];
@@ -149,9 +147,6 @@ struct LeafEnergies {
     Symmetric3 k = Symmetric3::of(matrix.inertia[i]);
     k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
     k.entry[5] += (1.f - free.z) * stiff;
-    if (obstacles)
-      k = k + Symmetric3::of(matrix.constraints.normal[i], stiff) +
-          Symmetric3::of(matrix.constraints.cling[i]);
     if (matrix.anchored) k.add(matrix.anchor[i]);
     if (!matrix.air.on) return k;
     const Vec3<float> d = matrix.air.diagonal[i] * matrix.dt, c = matrix.air.cross[i] * matrix.dt;
@@ -433,8 +428,7 @@ void build_cloth_levels(State& state) {
                               .partial = partial,
                               .held = s.held.data(),
                               .level = l,
-                              .first = s.level[l].first,
-                              .obstacles = state.parameters.obstacles > 0};
+                              .first = s.level[l].first};
     parallel_for(
         state.queue, "levels: leaves", s.level[0].count, DRENCH_LAMBDA(int a) { leaves(a); });
     for (int k = 1; k <= l; ++k) {

@@ -11,9 +11,9 @@
 // (docs/decisions/0032-levels-of-sheets.md).
 //
 // Energies are summed by differences: that of two vertices of one aggregate by that of their
-// functions, so that the sum of a stiff sheet keeps what its shift has. A vertex that a pin or
-// friction holds is no part of its aggregate; one that may go along a surface resists along the
-// normal as if its neighbours stood still.
+// functions, so that the sum of a stiff sheet keeps what its shift has. A vertex that a pin
+// holds is no part of its aggregate; one that a wall holds resists along its normal as if its
+// neighbours stood still.
 
 #include "sim/state.h"
 
