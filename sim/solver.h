@@ -31,7 +31,8 @@ struct HostState {
   std::vector<float> pressure_term;  // m^5/(kg s^2), of the incompressible solver's last step
   HostVec cloth_position, cloth_velocity;
   // of shells, else empty: see ShellState
-  HostVec shell_landed, shell_rounding, shell_left, shell_acceleration, shell_internal;
+  HostVec shell_landed, shell_rounding, shell_left, shell_lost, shell_acceleration, shell_friction,
+      shell_internal;
   double shell_dt = 0;  // s, of the step that left these
   Limits limits;        // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;

@@ -151,7 +151,9 @@ struct ShellState {
   VecColumn landed;    // m, where the last step left a vertex: what has moved it since stopped it
   VecColumn rounding;  // m, what that place lacks
   VecColumn left;      // m/s, the velocity that it was left with
+  VecColumn lost;      // m/s, what that velocity lacks
   VecColumn acceleration;  // m/s^2, over that step
+  VecColumn friction;      // N, of the obstacle that it slid on over it. Only with obstacles
   VecColumn internal;      // N, of the sheet on the vertex, as it acted over that step
   double dt = 0;           // s, of it; 0: there is none
   // fixed; triangles by fields of `triangles`, padded to a multiple of eight

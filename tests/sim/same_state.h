@@ -33,7 +33,9 @@ inline void expect_same_state(const sim::HostState& a, const sim::HostState& b) 
   expect_same_vectors(a.shell_landed, b.shell_landed);
   expect_same_vectors(a.shell_rounding, b.shell_rounding);
   expect_same_vectors(a.shell_left, b.shell_left);
+  expect_same_vectors(a.shell_lost, b.shell_lost);
   expect_same_vectors(a.shell_acceleration, b.shell_acceleration);
+  expect_same_vectors(a.shell_friction, b.shell_friction);
   expect_same_vectors(a.shell_internal, b.shell_internal);
   EXPECT_EQ(a.shell_dt, b.shell_dt);
 }

@@ -74,10 +74,12 @@ TEST(Seam, HoldsByItselfAndRests) {
     shot.cloth[0].seam[0].rest_length = rest;
     Stepper run(shot);
     while (run.time < 3) run.step(4e-3);
+    float fastest = 0;
+    for (; run.time < 4; fastest = std::max(fastest, run.limits.max_speed)) run.step(4e-3);
     const sim::HostState state = run.solver->save();
     for (const sim::SeamSpring& s : run.scene.cloth.seam)
       EXPECT_NEAR(gap_of(s, state), rest < 0 ? 0.002 : rest, 2e-5) << rest;
-    EXPECT_LT(run.limits.max_speed, 1e-3) << rest;
+    EXPECT_LT(fastest, 1e-3) << rest;
   }
 }
 

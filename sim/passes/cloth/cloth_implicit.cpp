@@ -108,7 +108,8 @@ void linearise_cloth(State& state) {
           const Vec3<T> d = ends.to_end(x, here, i, k);
           const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
           const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
-          const T t = stiff * max0(excess * inverse);
+          // A spring of no rest length pulls along all axes, wherever its ends are.
+          const T t = stiff * select(load(rest, at) > T(0.f), max0(excess * inverse), T(1.f));
           const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
           const Vec3<T> away = straight - ends.at_end(path, i, k);
           force = force + n * (load(stiffness, at) * excess);
@@ -224,6 +225,9 @@ void hold_at_obstacles(State& state) {
   state.cloth_system.normal.clear(state.queue);
   // What is held in a later round would feel the last step's.
   state.cloth_system.rub.clear(state.queue);
+  const VecView rub = s.rub.view();
+  const ConstVecView friction = state.shell.friction.view();
+  const bool shells = state.shell.any;
   parallel_for(
       state.queue, "cloth: hold at obstacles", c.vertices, DRENCH_LAMBDA(int i) {
         hold.grip[i] = -1, slides[i] = 1.f, cling[i] = 0.f;
@@ -232,7 +236,9 @@ void hold_at_obstacles(State& state) {
         const Vec3<float> straight = x[i] + v[i] * dt;
         Vec3<float> w = change[i];
         const Vec3<float> to = straight + block.times(i, base[i] + right[i]);
-        if (hold.hold(i, x[i], straight, to, w)) change.set(i, w);
+        if (!hold.hold(i, x[i], straight, to, w)) return;
+        change.set(i, w);
+        if (shells) rub.set(i, HoldRevision::across(friction[i] * (dt * dt), hold.normal[i]));
       });
 }
 
@@ -342,20 +348,27 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
   constexpr int most_rounds = 6;
   ClothSystem& s = state.cloth_system;
   const VecView change = s.change.view();
+  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
+  if (!obstacles && !sheets)
+    return solve_cloth(state, change, given, most_iterations, tolerance.first);
   const VecView right = s.answer.view();
+  const ConstVecView rub = s.rub.view();
   parallel_for(
       state.queue, "cloth: given", state.cloth.padded,
-      DRENCH_LAMBDA(int i) { right.set(i, given[i]); });
-  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
+      DRENCH_LAMBDA(int i) { right.set(i, obstacles ? given[i] + rub[i] : given[i]); });
   float reached = tolerance.first;
+  solve_cloth(state, change, right, most_iterations, reached);
   for (int round = 0; round < most_rounds; ++round) {
     find_reactions(state, given);
     bool changed = obstacles && revise_holds(state, given, round);
-    if (sheets) changed |= revise_walls(state, round);
+    const bool at_walls = sheets && revise_walls(state, round);
     if (sheets) changed |= revise_sheet_rows(state, round);
-    if (!changed) break;
-    state.cloth_levels.on = state.cloth_levels.on && !at_obstacles(state);
-    reached = state.cloth_levels.on ? tolerance.between : tolerance.at_obstacles;
+    if (!changed && !at_walls) break;
+    ClothLevels& levels = state.cloth_levels;
+    if (levels.on) levels.on = !at_obstacles(state);
+    // Blocks that do not know what walls hold now would correct far too much.
+    if (levels.on && at_walls) build_cloth_levels(state);
+    reached = tolerance.between;
     solve_cloth(state, change, right, most_iterations, reached);
   }
   if (reached > tolerance.last) solve_cloth(state, change, right, most_iterations, tolerance.last);

@@ -141,12 +141,27 @@ struct LeafEnergies {
       add_link(a, i, matrix.ends.end[at], k, k.scaled(0.5f), to);
     }
   }
-  /// What holds a vertex that moves, beside neighbours that do; `stiff` is what all of them do.
-  DRENCH_HD Symmetric3 own(int i, float stiff) const {
+  /// At most what rows make of a way that one of their vertices goes and the others do not. What a
+  /// wall takes from an affine function at a vertex is such a way.
+  DRENCH_HD float rows_at(int i) const {
+    float sum = 0.f;
+    if (!matrix.contact.any) return sum;
+    for (int e = row_start[i]; e < row_start[i + 1]; ++e) {
+      const SheetRow& r = row[row_entry[e] >> 2];
+      sum += 4.f * r.stiffness * fabsf(r.weight[row_entry[e] & 3]);
+    }
+    return sum;
+  }
+  /// What holds a vertex that moves, beside neighbours that do.
+  /// @param neighbours  what all of them do
+  DRENCH_HD Symmetric3 own(int i, float neighbours) const {
     const Vec3<float> free = matrix.constraints.axis[i];
     Symmetric3 k = Symmetric3::of(matrix.inertia[i]);
-    k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
-    k.entry[5] += (1.f - free.z) * stiff;
+    if (free.x * free.y * free.z == 0.f) {
+      const float stiff = 2.f * neighbours + rows_at(i);
+      k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
+      k.entry[5] += (1.f - free.z) * stiff;
+    }
     if (matrix.anchored) k.add(matrix.anchor[i]);
     if (!matrix.air.on) return k;
     const Vec3<float> d = matrix.air.diagonal[i] * matrix.dt, c = matrix.air.cross[i] * matrix.dt;

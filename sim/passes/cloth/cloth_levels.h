@@ -43,8 +43,8 @@ DRENCH_HD int common_level(int a, int b) {
 void load_cloth_levels(State& state, const ClothTopology& cloth);
 
 /// Blocks of the levels, for the rows and walls that there are. Where obstacles hold a sheet the
-/// levels take no part: what rounds hold and stiffen there they would correct far too much, and
-/// thrown sheets were seen.
+/// levels take no part: who is held there changes from round to round, and blocks made anew for
+/// each cost more than they save.
 void build_cloth_levels(State& state);
 
 /// Whether obstacles hold vertices, or have rows of triangles.

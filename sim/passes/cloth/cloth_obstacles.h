@@ -279,14 +279,14 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// Tolerances of the first solve of a step, of those between which contacts change, with levels and
-/// without, and of the last, which is made where the one before it was to a larger one.
+/// Tolerances of the first solve of a step, of those between which contacts change, and of the
+/// last, which is made where the one before it was to a larger one.
 struct ContactTolerances {
-  float first, between, at_obstacles, last;
+  float first, between, last;
 };
 
-/// The first solve of the sheets was made: on with friction and with other vertices and pairs of
-/// sheets held (self_contact.h), until these are the right ones, or nearly.
+/// Solves for the sheets, with friction and with other vertices and pairs of sheets held
+/// (self_contact.h) until these are the right ones, or nearly.
 void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
                      const ContactTolerances& tolerance);
 

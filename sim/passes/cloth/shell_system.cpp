@@ -154,7 +154,7 @@ void find_paths(State& state) {
   const ShellState& s = state.shell;
   const ConstVecView x = state.cloth.position.view(), v = state.cloth.velocity.view(),
                      landed = s.landed.view(), left = s.left.view();
-  const VecView rounding = state.shell.rounding.view(),
+  const VecView rounding = state.shell.rounding.view(), lost = state.shell.lost.view(),
                 acceleration = state.shell.acceleration.view(), path = state.shell.path.view();
   const float half = 0.5f * float(std::min(state.dt, s.dt));
   parallel_for(
@@ -162,6 +162,7 @@ void find_paths(State& state) {
         const Vec3<float> none{0.f, 0.f, 0.f};
         const bool here = length2(x[i] - landed[i]) == 0.f, so = length2(v[i] - left[i]) == 0.f;
         if (!here) rounding.set(i, none);
+        if (!so) lost.set(i, none);
         if (!here || !so) acceleration.set(i, none);
         path.set(i, v[i] - acceleration[i] * half);
       });
@@ -356,6 +357,12 @@ void linearise_shell(State& state) {
       state.queue, "shell: rows", c.padded, DRENCH_LAMBDA(int i) { vertices(i); });
 }
 
+/// Whether no more than rounding of a vector is lost.
+DRENCH_HD bool is_rounding(Vec3<float> lost, Vec3<float> of) {
+  return fabsf(lost.x) + fabsf(lost.y) + fabsf(lost.z) <=
+         1e-6f * (fabsf(of.x) + fabsf(of.y) + fabsf(of.z));
+}
+
 void keep_shell_step(State& state) {
   ShellState& s = state.shell;
   const ClothState& c = state.cloth;
@@ -363,8 +370,9 @@ void keep_shell_step(State& state) {
                      next_velocity = c.next_velocity.view(), path = s.path.view(),
                      change = state.cloth_system.change.view(), base = s.base.view();
   const ShellMatrix matrix = shell_matrix_of(state);
-  const VecView landed = s.landed.view(), left = s.left.view(), rounding = s.rounding.view(),
-                acceleration = s.acceleration.view(), internal = s.internal.view();
+  const VecView lacks = s.lost.view(), landed = s.landed.view(), left = s.left.view(),
+                rounding = s.rounding.view(), acceleration = s.acceleration.view(),
+                internal = s.internal.view();
   const int *fan_start = c.fan_start.data(), *fan_slot = s.fan_slot.data();
   const ConstVecView free = state.cloth_system.free.view(),
                      normal = state.cloth_system.normal.view();
@@ -372,6 +380,10 @@ void keep_shell_step(State& state) {
   const ConstVecView anchor_pull = state.cloth_system.anchor_pull.view();
   const float* anchor = state.cloth_system.anchor.data();
   const SheetRows contact = sheet_rows_of(state);
+  const VecView friction = s.friction.view();
+  const ConstVecView rub = state.cloth_system.rub.view();
+  const int* grip = state.cloth_system.grip.data();
+  const float* cling = state.cloth_system.cling.data();
   const float dt = float(state.dt), inverse_dt = 1.f / dt;
   parallel_for(
       state.queue, "shell: keep", c.vertices, DRENCH_LAMBDA(int i) {
@@ -385,14 +397,20 @@ void keep_shell_step(State& state) {
                           (contact.any && contact.touches(i));
         acceleration.set(i, shell && !held ? (next_velocity[i] - v[i]) * inverse_dt
                                            : Vec3<float>{0.f, 0.f, 0.f});
+        if (obstacles) {
+          const bool slides = shell && grip[i] >= 0 && cling[i] == 0.f;
+          friction.set(i, slides ? rub[i] * (inverse_dt * inverse_dt) : Vec3<float>{0.f, 0.f, 0.f});
+        }
         // What x + way + rounding loses by being rounded, if that is where the vertex ends.
         const auto lost = [](float x, float way, float to) { return way - (to - x); };
+        const Vec3<float> gain = change[i] * inverse_dt + lacks[i], to = next_velocity[i],
+                          lack{lost(v.x[i], gain.x, to.x), lost(v.y[i], gain.y, to.y),
+                               lost(v.z[i], gain.z, to.z)};
+        lacks.set(i, shell && !held && is_rounding(lack, to) ? lack : Vec3<float>{0.f, 0.f, 0.f});
         const Vec3<float> way = path[i] * dt + change[i] + rounding[i];
         const Vec3<float> rest{lost(x.x[i], way.x, next.x[i]), lost(x.y[i], way.y, next.y[i]),
                                lost(x.z[i], way.z, next.z[i])};
-        const float most = 1e-6f * (fabsf(next.x[i]) + fabsf(next.y[i]) + fabsf(next.z[i]));
-        const bool whole = fabsf(rest.x) + fabsf(rest.y) + fabsf(rest.z) <= most;
-        rounding.set(i, whole ? rest : Vec3<float>{0.f, 0.f, 0.f});
+        rounding.set(i, is_rounding(rest, next[i]) ? rest : Vec3<float>{0.f, 0.f, 0.f});
       });
   s.dt = state.dt;
 }

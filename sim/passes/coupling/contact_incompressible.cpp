@@ -216,12 +216,18 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
 
 namespace {
 
-/// Whether rows of sheets hold any vertex, as far as known before the solve.
-bool sheets_touch(const State& state) {
+/// Whether obstacles or rows of sheets hold any vertex, as far as known before the solve.
+bool anything_touches(const State& state) {
   const SheetRows rows = sheet_rows_of(state);
-  return rows.any && parallel_reduce(
-                         state.queue, "cloth: touching", state.cloth.vertices, 0,
-                         DRENCH_LAMBDA(int i) { return int(rows.touches(i)); }, Larger{}) > 0;
+  const bool obstacles = state.parameters.obstacles > 0;
+  if (!rows.any && !obstacles) return false;
+  const int* grip = state.cloth_system.grip.data();
+  return parallel_reduce(
+             state.queue, "cloth: touching", state.cloth.vertices, 0,
+             DRENCH_LAMBDA(int i) {
+               return int((obstacles && grip[i] >= 0) || (rows.any && rows.touches(i)));
+             },
+             Larger{}) > 0;
 }
 
 /// As start_cloth, where no fluid is near.
@@ -242,23 +248,20 @@ void prepare_cloth_alone(State& state, const ConstVecView& given) {
 
 void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
-  const ConstVecView given = state.contact.near > 0 ? s.right.view() : s.base.view();
-  const bool meets = state.parameters.obstacles > 0 || state.self_contact.rows > 0;
-  if (state.contact.near == 0) prepare_cloth_alone(state, given);
-  const bool loosely = state.cloth_levels.on && sheets_touch(state);
-  const float first = loosely ? contact_tolerance : last_tolerance;
-  if (state.contact.near > 0) {
-    respond_cloth(state, last_sweeps, first);
+  const bool near = state.contact.near > 0, shells = state.shell.any;
+  const ConstVecView given = near ? s.right.view() : s.base.view();
+  if (near) {
+    load_by_pressures(state);
+    sum_loads(state, Base::own);
   } else {
-    solve_cloth(state, s.change.view(), given, last_sweeps, first);
+    prepare_cloth_alone(state, given);
   }
-  // No shift of the whole closes the momentum of a sheet that is held: to a tenth.
-  if (meets)
-    settle_contacts(state, given, last_sweeps,
-                    {.first = first,
-                     .between = contact_tolerance,
-                     .at_obstacles = 0.1f * last_tolerance,
-                     .last = last_tolerance});
+  const bool loosely = shells && anything_touches(state);
+  // No shift of the whole closes the momentum of springs that are held: to a tenth.
+  settle_contacts(state, given, last_sweeps,
+                  {.first = loosely ? contact_tolerance : last_tolerance,
+                   .between = shells ? contact_tolerance : 0.1f * last_tolerance,
+                   .last = last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 
@@ -302,12 +305,16 @@ void finish_cloth(State& state) {
   const float dt = float(state.dt), inverse_dt = 1.f / dt, *inverse_mass = c.inverse_mass.data();
   const ClothWalls walls = cloth_walls_of(state.parameters);
   const bool shells = state.shell.any;
-  const ConstVecView path = path_velocity_of(state), rounding = state.shell.rounding.view();
+  const ConstVecView path = path_velocity_of(state), rounding = state.shell.rounding.view(),
+                     lost = state.shell.lost.view();
   for_each_lane(
       state.queue, "cloth: finish", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(inverse_mass, i));
         Vec3<T> velocity = v.at(i) + change.at(i) * T(inverse_dt), to = x.at(i) + velocity * T(dt);
-        if (shells) to = x.at(i) + (path.at(i) * T(dt) + change.at(i) + rounding.at(i));
+        if (shells) {
+          to = x.at(i) + (path.at(i) * T(dt) + change.at(i) + rounding.at(i));
+          velocity = v.at(i) + (change.at(i) * T(inverse_dt) + lost.at(i));
+        }
         walls.stop(to, velocity);
         const auto free = load(inverse_mass, i) > T(0.f);
         const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
