@@ -84,6 +84,14 @@ Shot hanging(int cells) {
   return shot;
 }
 
+/// In a frame that begins to turn.
+Shot turning() {
+  Shot shot = hanging(8);
+  shot.frame_rotation_deg.keys = {{1001, 0}, {1002, 30}};
+  return shot;
+}
+void stop_turning(Shot& shot) { shot.frame_rotation_deg.keys = {{1001, 0}}; }
+
 Shot strip() {
   Shot shot = shells_alone();
   Cloth& sheet = add_shell(shot, 0.12, 0, 24);
@@ -129,6 +137,23 @@ Shot on_a_corner() {
   Obstacle& box = add_obstacle(shot, ObstacleType::box, V3d(0.003, -0.055, 0.004));
   box.size = V3d(0.06), box.rotation_deg = V3d(45, 0, 35.2644), box.friction = 0.4;
   box.position.keys = {{1001, V3d(0.003, -0.055, 0.004)}, {1003, V3d(0.003, 0.025, 0.01)}};
+  return shot;
+}
+/// The ball is an image of the one beyond the seam.
+Shot across_a_seam() {
+  Shot shot = on_a_ball();
+  shot.domain.axis[0] = Axis::periodic;
+  shot.cloth[0].corner.x += 0.2;
+  shot.obstacle[0].position.keys[0].second.x -= 0.2;
+  return shot;
+}
+/// Friction holds it.
+Shot on_a_slope() {
+  Shot shot = shells_alone();
+  const V3d normal = V3d(-0.2, 1, 0).normalized(), down(normal.y, -normal.x, 0);
+  Cloth& sheet = add_shell(shot, 0.1, 0, 8);
+  sheet.u = down * 0.1, sheet.corner = normal * 0.0029 - (sheet.u + sheet.v) / 2;
+  add_plane(shot, V3d(0), normal);
   return shot;
 }
 Shot thrown_on_a_corner() {
@@ -226,6 +251,16 @@ Shot joined() {
   shot.wind.present = true, shot.wind.velocity = V3d(3, 4, 1);
   return shot;
 }
+/// The same on which a block falls across the seam.
+Shot joined_under_water() {
+  Shot shot = joined();
+  shot.wind = {};
+  shot.fluid.solver = FluidSolver::incompressible;
+  ClothPin& edges = shot.cloth[0].pin.emplace_back();
+  for (uint32_t k = 0; k < 17; ++k) edges.vertices.insert(edges.vertices.end(), {k, 68 + k});
+  add_box(shot, V3d(0.17, 0.003, -0.03), {6, 4, 6}, V3d(0.2, -3, 0));
+  return shot;
+}
 void calm(Shot& shot) { shot.wind = {}; }
 
 /// A block falls on two layers that are held along their edges.
@@ -268,11 +303,14 @@ struct Situation {
 };
 const Situation situations[] = {
     {"Hangs", [] { return hanging(8); }, make_limp, rolled},
+    {"Turns", turning, stop_turning, rolled},
     {"Folded", strip, part_sheets, folded},
     {"Stacked", stacked, part_sheets, nullptr, 1},
     {"Claps", clapping, part_sheets, nullptr, 3, 1e-2},
     {"OnABall", on_a_ball, take_obstacles},
     {"OnACorner", on_a_corner, take_obstacles},
+    {"AcrossASeam", across_a_seam, take_obstacles},
+    {"OnASlope", on_a_slope, take_obstacles},
     {"ThrownOnACorner", thrown_on_a_corner, take_obstacles},
     {"OnAMesh", on_a_mesh, take_obstacles},
     {"BetweenPlates", between_plates, take_obstacles},
@@ -284,8 +322,9 @@ const Situation situations[] = {
     {"UnderWater", under_water, take_water, nullptr, 3, 8e-4},
     {"OnARodUnderWater", on_a_rod_under_water, take_water, nullptr, 3, 8e-4},
     {"UnderHoney", under_honey, thin_honey, nullptr, 2, 8e-4},
-    // More aggregates at the second level than one launch of all coarse levels takes.
-    {"ManyLevels", [] { return hanging(91); }, make_limp, rolled, 1, 1e-4},
+    {"JoinedUnderWater", joined_under_water, take_water, nullptr, 3, 8e-4},
+    // Levels that one thread takes, and others.
+    {"ManyLevels", [] { return hanging(24); }, make_limp, rolled},
 };
 void PrintTo(const Situation& s, std::ostream* out) { *out << s.name; }
 
