@@ -22,7 +22,7 @@ double exact_distance(const Obstacle& obstacle, double frame, const V3d& world);
 int particles_inside(const Shot& shot, Stepper& run);
 
 struct Settled {
-  V3d centre;                // of mass, in the tank's frame, spacings
+  V3d centre{0};             // of mass, in the tank's frame, spacings
   double kinetic = 0;        // energy over rho g h volume
   double density_error = 0;  // mean |rho / rho_0 - 1| a support below the surface
   int outside = 0;
