@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
-#include "pipeline/contract/geometry/level_set.h"
 #include "tests/sim/obstacle_scenes.h"
 
 namespace drench::sim_tests {
@@ -16,49 +13,6 @@ namespace {
 
 constexpr double g = 9.81, radius = 0.05, thickness = 0.001, spacing = 0.004;  // m
 constexpr double friction = 0.2;
-
-/// Distances of a cylinder along z that has no ends, by its definition.
-LevelSet cylinder(double voxel, double band) {
-  LevelSet set;
-  set.voxel = float(voxel), set.band = float(band);
-  const int reach = int(std::ceil((radius + band) / (8 * voxel))) + 1, deep = 3;
-  for (int k = 0; k < 3; ++k) {
-    set.low[k] = k == 2 ? -deep : -reach;
-    set.blocks[k] = -2 * set.low[k];
-  }
-  int made = 0;
-  for (int bz = 0; bz < set.blocks[2]; ++bz) {
-    for (int by = 0; by < set.blocks[1]; ++by) {
-      for (int bx = 0; bx < set.blocks[0]; ++bx) {
-        set.block.push_back(made++);
-        for (int z = 0; z < 9; ++z)
-          for (int y = 0; y < 9; ++y)
-            for (int x = 0; x < 9; ++x) {
-              const double r = std::hypot(8 * (set.low[0] + bx) + x, 8 * (set.low[1] + by) + y);
-              set.value.push_back(float(std::clamp(r * voxel - radius, -band, band)));
-            }
-      }
-    }
-  }
-  return set;
-}
-
-/// A box around the cylinder: what the file of a mesh is read for here.
-std::filesystem::path bounding_mesh(double half_width) {
-  const auto path = std::filesystem::temp_directory_path() / "drench_belt_bounds.obj";
-  std::ofstream file(path);
-  for (int k = 0; k < 8; ++k) {
-    file << "v " << (k & 1 ? radius : -radius) << ' ' << (k & 2 ? radius : -radius) << ' '
-         << (k & 4 ? half_width : -half_width) << '\n';
-  }
-  const int side[6][4] = {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5},
-                          {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}};
-  for (const auto& s : side) {
-    file << "f " << s[0] << ' ' << s[1] << ' ' << s[2] << '\n';
-    file << "f " << s[0] << ' ' << s[2] << ' ' << s[3] << '\n';
-  }
-  return path;
-}
 
 /// Of the strip's middle line, m.
 constexpr double belt = radius + 0.25 * spacing + 0.5 * thickness;
@@ -94,9 +48,9 @@ double slid(int cells, double share) {
   strip.corner = V3d(-shorter, 0.1, -0.015);
   shot.cloth.push_back(strip);
   Obstacle& post = add_obstacle(shot, ObstacleType::mesh, V3d(0));
-  post.mesh_file = bounding_mesh(0.03), post.friction = friction;
+  post.mesh_file = bounding_mesh(radius, 0.03), post.friction = friction;
   const LevelSetMaker maker = [](const TriangleMesh&, double voxel, double band,
-                                 const LevelSetBounds&) { return cylinder(voxel, band); };
+                                 const LevelSetBounds&) { return cylinder(radius, voxel, band); };
   sim::Scene scene = sim::build_scene(shot, maker);
   sim::HostVec& x = scene.start.cloth_position;
   const auto place = [&](double k) {  // k in cells from the shorter end

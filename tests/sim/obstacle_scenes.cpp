@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "pipeline/contract/geometry/obstacle.h"
 
@@ -192,6 +193,48 @@ BarForce lift_of_bar(Obstacle bar, double section, int across,
   Stepper run(shot, make_level_set);
   const V3d force = mean_force(run) / (1000 * g * section * 6 * a);
   return {force.y - 1, force.x, force.z};
+}
+
+LevelSet cylinder(double radius, double voxel, double band) {
+  LevelSet set;
+  set.voxel = float(voxel), set.band = float(band);
+  const int reach = int(std::ceil((radius + band) / (8 * voxel))) + 1, deep = 3;
+  for (int k = 0; k < 3; ++k) {
+    set.low[k] = k == 2 ? -deep : -reach;
+    set.blocks[k] = -2 * set.low[k];
+  }
+  int made = 0;
+  for (int bz = 0; bz < set.blocks[2]; ++bz) {
+    for (int by = 0; by < set.blocks[1]; ++by) {
+      for (int bx = 0; bx < set.blocks[0]; ++bx) {
+        set.block.push_back(made++);
+        for (int z = 0; z < 9; ++z)
+          for (int y = 0; y < 9; ++y)
+            for (int x = 0; x < 9; ++x) {
+              const double r = std::hypot(8 * (set.low[0] + bx) + x, 8 * (set.low[1] + by) + y);
+              set.value.push_back(float(std::clamp(r * voxel - radius, -band, band)));
+            }
+      }
+    }
+  }
+  return set;
+}
+
+std::filesystem::path bounding_mesh(double radius, double half_width) {
+  const auto path = std::filesystem::temp_directory_path() /
+                    ("drench_cylinder_" + std::to_string(radius) + ".obj");
+  std::ofstream file(path);
+  for (int k = 0; k < 8; ++k) {
+    file << "v " << (k & 1 ? radius : -radius) << ' ' << (k & 2 ? radius : -radius) << ' '
+         << (k & 4 ? half_width : -half_width) << '\n';
+  }
+  const int side[6][4] = {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5},
+                          {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}};
+  for (const auto& s : side) {
+    file << "f " << s[0] << ' ' << s[1] << ' ' << s[2] << '\n';
+    file << "f " << s[0] << ' ' << s[2] << ' ' << s[3] << '\n';
+  }
+  return path;
 }
 
 }  // namespace drench::sim_tests

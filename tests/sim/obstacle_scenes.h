@@ -1,8 +1,10 @@
 #pragma once
 // Scenes with obstacles and what is measured in them, outside the solver and in double.
 
+#include <filesystem>
 #include <functional>
 
+#include "pipeline/contract/geometry/level_set.h"
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -20,7 +22,7 @@ double exact_distance(const Obstacle& obstacle, double frame, const V3d& world);
 int particles_inside(const Shot& shot, Stepper& run);
 
 struct Settled {
-  V3d centre;                // of mass, in the tank's frame, spacings
+  V3d centre{0};             // of mass, in the tank's frame, spacings
   double kinetic = 0;        // energy over rho g h volume
   double density_error = 0;  // mean |rho / rho_0 - 1| a support below the surface
   int outside = 0;
@@ -45,5 +47,10 @@ struct BarForce {
 /// period is six spacings.
 BarForce lift_of_bar(Obstacle bar, double section, int across,
                      const LevelSetMaker& make_level_set = {});
+
+/// Distances of a cylinder along z that has no ends, by its definition.
+LevelSet cylinder(double radius, double voxel, double band);
+/// A box around a part of it: what the file of a mesh is read for where these stand for it.
+std::filesystem::path bounding_mesh(double radius, double half_width);
 
 }  // namespace drench::sim_tests

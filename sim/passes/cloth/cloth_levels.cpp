@@ -404,8 +404,13 @@ LevelAnswers level_answers_of(State& state) {
   return all;
 }
 
-/// Aggregates of levels that are this small are one launch.
+/// Aggregates of levels that are this small are one launch: of a core, or of a thread of a GPU, to
+/// which each of them is as long as a launch.
+#if defined(__CUDACC__)
+constexpr int small_level = 4;
+#else
 constexpr int small_level = 256;
+#endif
 
 }  // namespace
 
