@@ -99,9 +99,13 @@ struct LeafEnergies {
     const Vec3<float> d = rest[i] - rest[j];
     to.within.add({d.x, d.y, d.z}, half);  // it comes from both
   }
+  /// What a row may have in any round of the step. Blocks that lack what a round takes in correct
+  /// far too much: a light sheet on another is thrown.
+  static DRENCH_HD float most_stiffness(const SheetRow& r) {
+    return maximum(r.stiffness, row_stiffness * r.mass);
+  }
   /// The row's energy once, by the first of its vertices in the aggregate.
   DRENCH_HD void add_row(int a, const SheetRow& r, int corner, Energies<functions>& all) const {
-    if (!(r.stiffness > 0.f)) return;
     float sum[functions] = {};
     for (int k = 0; k < 4; ++k) {
       const int v = r.vertex[k];
@@ -110,7 +114,8 @@ struct LeafEnergies {
       const Vec3<float> x = from_centre(a, v) * r.weight[k];
       sum[0] += r.weight[k], sum[1] += x.x, sum[2] += x.y, sum[3] += x.z;
     }
-    all.add(sum, Symmetric3::of(r.grip) + Symmetric3::of(r.normal, r.stiffness - r.grip));
+    const float normal = most_stiffness(r), across = r.friction > 0.f ? row_grip * r.mass : 0.f;
+    all.add(sum, Symmetric3::of(across) + Symmetric3::of(r.normal, normal - across));
   }
   DRENCH_HD void add_shell(int a, int i, LinkSums& to) const {
     const ShellRows& rows = matrix.shell.rows;
@@ -148,7 +153,7 @@ struct LeafEnergies {
     if (!matrix.contact.any) return sum;
     for (int e = row_start[i]; e < row_start[i + 1]; ++e) {
       const SheetRow& r = row[row_entry[e] >> 2];
-      sum += 4.f * r.stiffness * fabsf(r.weight[row_entry[e] & 3]);
+      sum += 4.f * most_stiffness(r) * fabsf(r.weight[row_entry[e] & 3]);
     }
     return sum;
   }
