@@ -1,0 +1,39 @@
+#!/usr/bin/env python3
+"""Writes bag.obj beside itself: two sheets that meet at three of their edges, an open bag.
+
+0.34 m wide and 0.38 m deep, 0.1 m from side to side at its mouth, which is at y = 0.38 m. Each
+sheet has its own vertices and its own texture coordinates, in m along and across; those on the
+common edges stand in the same places, to be welded. Python's standard library is enough.
+"""
+import math
+import pathlib
+
+WIDTH, DEPTH, OPENING = 0.34, 0.38, 0.1  # m
+ACROSS, DOWN = 28, 32                    # cells of each sheet
+
+
+def bulge(i, j):
+    """Half of the distance between the sheets: none at the sides and the bottom."""
+    return OPENING / 2 * math.sin(math.pi * i / ACROSS) * math.sin(math.pi / 2 * j / DOWN)
+
+
+def main():
+    lines, faces = [], []
+    for sheet, side in enumerate((1, -1)):
+        first = 1 + sheet * (ACROSS + 1) * (DOWN + 1)
+        for j in range(DOWN + 1):
+            for i in range(ACROSS + 1):
+                x, y = WIDTH * (i / ACROSS - 0.5), DEPTH * j / DOWN
+                lines.append(f"v {x:.5f} {y:.5f} {side * bulge(i, j):.5f}")
+                lines.append(f"vt {x:.5f} {y:.5f}")
+        for j in range(DOWN):
+            for i in range(ACROSS):
+                a = first + j * (ACROSS + 1) + i
+                b, c, d = a + 1, a + ACROSS + 2, a + ACROSS + 1
+                # Diagonals end in the corners of the bag, so that none joins edge to edge.
+                for corners in ((a, b, d), (b, c, d)) if (i + j) % 2 else ((a, b, c), (a, c, d)):
+                    faces.append("f " + " ".join(f"{k}/{k}" for k in corners[::side]))
+    pathlib.Path(__file__).with_name("bag.obj").write_text("\n".join(lines + faces) + "\n")
+
+
+main()
