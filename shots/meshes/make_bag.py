@@ -9,7 +9,7 @@ import math
 import pathlib
 
 WIDTH, DEPTH, OPENING = 0.34, 0.38, 0.1  # m
-ACROSS, DOWN = 28, 32                    # cells of each sheet
+ACROSS, DOWN = 22, 26                    # cells of each sheet
 
 
 def bulge(i, j):
