@@ -48,6 +48,10 @@ std::string scene_text(const sim::SceneReport& report) {
       report.particles, report.cloth_triangles, report.obstacle_triangles, report.particles_at_end,
       report.memory / double(1 << 20), report.steps_a_frame);
   for (const sim::SourceReport& source : report.source) text += source_text(source, report.spacing);
+  for (const sim::SheetReport& sheet : report.sheet) {
+    text += fmt::format("  cloth.{}  {} triangles, {}\n", sheet.name, sheet.triangles,
+                        sheet.fabric.empty() ? "springs" : "shell of " + sheet.fabric);
+  }
   for (const sim::InletReport& inlet : report.inlet) {
     text += fmt::format("  {}  about {:.0f} particles", inlet.name, inlet.emitted);
     if (inlet.blocked > 0) text += fmt::format(", {:.0f} % blocked", 100 * inlet.blocked);
@@ -57,7 +61,7 @@ std::string scene_text(const sim::SceneReport& report) {
 }
 
 json scene_json(const sim::SceneReport& report) {
-  json sources = json::array(), inlets = json::array();
+  json sources = json::array(), inlets = json::array(), sheets = json::array();
   for (const sim::SourceReport& source : report.source) {
     sources.push_back({{"name", source.name},
                        {"asked_litres", asked_litres(source, report.spacing)},
@@ -72,6 +76,12 @@ json scene_json(const sim::SceneReport& report) {
     inlets.push_back(
         {{"name", inlet.name}, {"emitted", inlet.emitted}, {"blocked", inlet.blocked}});
   }
+  for (const sim::SheetReport& sheet : report.sheet) {
+    sheets.push_back({{"name", sheet.name},
+                      {"model", sheet.fabric.empty() ? "springs" : "shell"},
+                      {"fabric", sheet.fabric},
+                      {"triangles", sheet.triangles}});
+  }
   return {{"particles", report.particles},
           {"particles_at_end", report.particles_at_end},
           {"cloth_triangles", report.cloth_triangles},
@@ -79,6 +89,7 @@ json scene_json(const sim::SceneReport& report) {
           {"memory_bytes", report.memory},
           {"steps_a_frame", report.steps_a_frame},
           {"source", sources},
+          {"cloth", sheets},
           {"inlet", inlets}};
 }
 

@@ -182,10 +182,15 @@ std::string guess_of_unit(const Domain& domain, const Cloth& cloth, const Sheet&
 
 void note_cloth(const Shot& shot, Scene& scene) {
   for (size_t s = 0; s < scene.sheet.size(); ++s) {
-    const std::string guess = guess_of_unit(shot.domain, shot.cloth[s], scene.sheet[s]);
+    const Cloth& cloth = shot.cloth[s];
+    scene.report.sheet.push_back(
+        {.name = cloth.name,
+         .fabric = cloth.model == ClothModel::shell ? cloth.fabric : std::string(),
+         .triangles = scene.sheet[s].triangle.size()});
+    const std::string guess = guess_of_unit(shot.domain, cloth, scene.sheet[s]);
     if (guess.empty()) continue;
     scene.report.notes.push_back(
-        fmt::format("cloth \"{}\" is much larger than the domain: {}", shot.cloth[s].name, guess));
+        fmt::format("cloth \"{}\" is much larger than the domain: {}", cloth.name, guess));
   }
 }
 

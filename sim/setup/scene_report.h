@@ -51,11 +51,19 @@ struct InletReport {
   bool never() const { return !in_time || blocked >= 1; }
 };
 
+/// A sheet of the first state.
+struct SheetReport {
+  std::string name;
+  std::string fabric;  // of a shell; empty: a net of springs
+  size_t triangles = 0;
+};
+
 /// All of a scene. What is certain to make nothing has been refused before.
 struct SceneReport {
   double spacing = 0;  // m
   std::vector<SourceReport> source;
   std::vector<InletReport> inlet;
+  std::vector<SheetReport> sheet;
   size_t particles = 0;           // of the first state
   double particles_at_end = 0;    // estimate, emitters included; sinks and open sides are not known
   size_t cloth_triangles = 0;     // of the sheets
@@ -81,7 +89,7 @@ void note_meshes(const Shot& shot, Scene& scene);
 /// Whether the bounds of a solid that stands, or the solid side of a plane, miss the domain.
 bool lies_beyond(const Domain& domain, double spacing, const ObstacleSet& solids, int k);
 
-/// Notes sheets whose unit may be another.
+/// Names the sheets and notes those whose unit may be another.
 void note_cloth(const Shot& shot, Scene& scene);
 
 /// Notes sinks that take nothing, beyond the domain or after the last frame, or whose unit may be

@@ -84,6 +84,23 @@ TEST_F(ShotFile, FindsTheVerticesOfNamedPins) {
   EXPECT_EQ(pins("rim"), (std::vector<uint32_t>{0, 1, 2, 3, 4, 5}));
 }
 
+// A shell of cotton unless a key of springs is given or the fluid cannot take one along.
+TEST_F(ShotFile, MakesAShellOfASheetWhereItCan) {
+  const auto sheet = [&](const std::string& before, const std::string& key) {
+    return parse(before + "[[cloth]]\n" + key).cloth[0];
+  };
+  EXPECT_EQ(sheet("", "").model, ClothModel::shell);
+  EXPECT_EQ(sheet("", "").areal_density, 0.15);
+  EXPECT_EQ(sheet("", "areal_density = 0.3\n").areal_density, 0.3);
+  EXPECT_EQ(sheet("", "model = \"springs\"\n").model, ClothModel::springs);
+  for (const char* key : {"adjacent_stiffness = 1\n", "diagonal_stiffness = 1\n",
+                          "spring_damping = 0\n", "retardation_time = 0\n"})
+    EXPECT_EQ(sheet("", key).model, ClothModel::springs) << key;
+  EXPECT_EQ(sheet("[coupling]\nscheme = \"paper\"\n", "").model, ClothModel::springs);
+  EXPECT_EQ(sheet("[fluid]\nsolver = \"weakly_compressible\"\n", "").model, ClothModel::springs);
+  EXPECT_EQ(sheet("[fluid]\nsolver = \"incompressible\"\n", "").model, ClothModel::shell);
+}
+
 TEST_F(ShotFile, AppliesAQualityAndResolvesPinsOnItsGrid) {
   const Shot preview = parse(full_shot(), {.quality = "preview", .set = {}});
   EXPECT_EQ(preview.fluid.spacing, 0.04);

@@ -34,6 +34,9 @@ TEST(PlanScene, CountsParticlesTrianglesMemoryAndSteps) {
   const nlohmann::json scene = nlohmann::json::parse(ended.out).at("scene");
   EXPECT_GT(scene.at("particles").get<int>(), 0);
   EXPECT_GT(scene.at("cloth_triangles").get<int>(), 0);
+  EXPECT_EQ(scene.at("cloth")[0].at("model"), "shell");
+  EXPECT_TRUE(shot.run("plan").out.find("  cloth.flag  72 triangles, shell of cotton\n") !=
+              std::string::npos);
   EXPECT_GT(scene.at("memory_bytes").get<double>(), 1e4);
   EXPECT_GT(scene.at("steps_a_frame").get<double>(), 0);
   // As many as the simulation then says it has.

@@ -105,6 +105,7 @@ std::string held_sheet_text(const std::string& name, const std::string& corner,
                             const std::string& u, const std::string& v) {
   return fmt::format(R"([[cloth]]
 name = "{}"
+model = "springs"
 corner = {}
 u = {}
 v = {}

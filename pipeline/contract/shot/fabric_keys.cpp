@@ -45,8 +45,9 @@ const char* first_given(const char* const (&keys)[N], const ShotSources& sources
   return nullptr;
 }
 
+/// A shell wherever the solver can take one along, unless a key of springs is given.
 /// @throws Error where keys of both models are given.
-ClothModel model_of(const ShotSources& sources, const std::string& path) {
+ClothModel model_of(const Shot& shot, const ShotSources& sources, const std::string& path) {
   const char* const spring = first_given(spring_keys, sources, path);
   const char* const shell = first_given(shell_keys, sources, path);
   if (spring != nullptr && shell != nullptr) {
@@ -55,7 +56,8 @@ ClothModel model_of(const ShotSources& sources, const std::string& path) {
                     "or say which with {1}model",
                     sources.at(path + shell), path, shell, spring));
   }
-  return shell != nullptr ? ClothModel::shell : ClothModel::springs;
+  if (spring != nullptr) return ClothModel::springs;
+  return shell != nullptr || is_incompressible(shot) ? ClothModel::shell : ClothModel::springs;
 }
 
 }  // namespace
@@ -64,7 +66,7 @@ void take_fabrics(Shot& shot, const ShotSources& sources) {
   for (size_t i = 0; i < shot.cloth.size(); ++i) {
     Cloth& cloth = shot.cloth[i];
     const std::string path = fmt::format("cloth[{}].", i);
-    if (cloth.model == ClothModel::automatic) cloth.model = model_of(sources, path);
+    if (cloth.model == ClothModel::automatic) cloth.model = model_of(shot, sources, path);
     if (cloth.model != ClothModel::shell) continue;
     const Fabric* const fabric = find_fabric(cloth.fabric);
     if (fabric == nullptr) {

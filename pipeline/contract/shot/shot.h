@@ -183,8 +183,8 @@ struct ClothSeam {
   double time = 0;          // s from the start in which the seam is drawn to that length
 };
 
-/// automatic, which the shots of files have resolved: a shell where any of its constants is given,
-/// else springs.
+/// automatic, which the shots of files have resolved: springs where any of their constants is given
+/// or the fluid is weakly compressible, else a shell. In a shot that is no file's: springs.
 enum class ClothModel { automatic, springs, shell };
 
 struct Cloth {

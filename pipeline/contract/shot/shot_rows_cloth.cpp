@@ -64,10 +64,12 @@ std::vector<Parameter> cloth_rows() {
           .only(ClothModel::automatic, ClothModel::springs),
       row<&Cloth::thickness>("cloth", "thickness", "m", {1e-6, 1}, simulate,
                              "thickness; of a shell that gives none its fabric's"),
-      row<&Cloth::model>("cloth", "model", "", none, simulate,
-                         "shell: a continuous sheet with the constants of a fabric. springs: a net "
-                         "of springs without bending, as published. automatic: a shell where any "
-                         "of its constants is given, else springs")
+      row<&Cloth::model>(
+          "cloth", "model", "", none, simulate,
+          "shell: a continuous sheet with the constants of a fabric. springs: a net "
+          "of springs without bending, as published. automatic: springs where any of "
+          "their constants is given, or beside weakly compressible fluid, else a "
+          "shell")
           .identity(),
       row<&Cloth::fabric>("cloth", "fabric", "", none, simulate,
                           "a name that `drench fabrics` lists: the constants that are not given")
