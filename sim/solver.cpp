@@ -10,6 +10,7 @@
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
 #include "sim/passes/cloth/cloth_levels.h"
+#include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/self_contact_pairs.h"
 #include "sim/passes/cloth/shell_columns.h"
 #include "sim/passes/cloth/triangle_obstacles.h"
@@ -271,6 +272,11 @@ class BackendSolver : public Solver {
       impulses[k].stopped = stopped[4 * k + 3];
     }
     return impulses;
+  }
+
+  ClothContacts cloth_contacts() const override {
+    const bool implicit = allocated_.contains(ColumnGroup::cloth_system);
+    return implicit ? count_cloth_contacts(state_) : ClothContacts{};
   }
 
   std::vector<PassInfo> plan() const override {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "pipeline/contract/geometry/level_set.h"
+#include "sim/cloth_contacts.h"
 #include "sim/column_groups.h"
 #include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
@@ -168,6 +169,8 @@ class Solver {
   virtual void draw_seams(const std::vector<float>& rest_length) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
+  /// Of the last step.
+  virtual ClothContacts cloth_contacts() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no
   /// step has made yet only those that ask for no pressure or force. Changes no bit of a later
   /// step. What the numbers are: sim/probe_query.h.

@@ -215,6 +215,7 @@ struct Cloth {
   double damping_time = 0.005;    // s, viscosity over stiffness in its plane
   double friction = 0.5;          // Coulomb's coefficient on itself
   bool self_collision = true;     // it meets itself and other shells
+  bool write_strain = false;      // its files hold principal strains and stresses
   Slip slip = Slip::automatic;    // of fluid along it
   double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid
   std::string material = "cotton";

@@ -105,6 +105,12 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::self_collision>("cloth", "self_collision", "", none, simulate,
                                   "whether it meets itself and other shells: nothing crosses")
           .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::write_strain>(
+          "cloth", "write_strain", "", none, simulate,
+          "whether its files hold strain_max and strain_min, length over rest length less 1 along "
+          "the two principal directions, and stress_max and stress_min, N/m, the elastic stress "
+          "times the thickness: means of the triangles at a vertex, by area")
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "
                         "with the sheet, which it drags along). automatic is as that of "
