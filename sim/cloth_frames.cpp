@@ -52,6 +52,10 @@ std::vector<ClothFrame> cloth_frames(const Shot& shot, const Scene& scene, const
   for (size_t s = 0; s < scene.sheet.size(); ++s) {
     const int first = scene.first_vertex[s];
     frames.push_back(frame_of(scene, scene.sheet[s], first, state));
+    if (!scene.cloth.wet.empty() && scene.cloth.wet[s].uptake > 0) {
+      for (const int node : scene.sheet[s].node)
+        frames.back().mesh.wetness.push_back(state.cloth_wetness[size_t(first + node)]);
+    }
     if (!shot.cloth[s].write_strain) continue;
     const VertexRange vertices{first, scene.first_vertex[s + 1] - first};
     add_strain(scene.sheet[s], cloth_strain(scene.cloth, state, vertices), frames.back().mesh);

@@ -15,8 +15,8 @@ using Vector = cpu::Vec3<double>;
 /// Principal strains and stresses of triangles.
 class TriangleStrain {
  public:
-  TriangleStrain(const ClothTopology& cloth, const HostState& state)
-      : cloth_(cloth), state_(state) {}
+  TriangleStrain(const ClothTopology& cloth, const HostState& state, double softness)
+      : cloth_(cloth), state_(state), softness_(softness) {}
 
   double area(int t) const { return cloth_.shell.area[size_t(t)]; }
 
@@ -58,7 +58,8 @@ class TriangleStrain {
   };
   Elastic law(int sheet) const {
     const ShellLaw& l = cloth_.shell.law[size_t(sheet)];
-    return {{l.c11, l.c22, l.c12, l.c66, 0, 0}, {l.limit_start, l.limit_stiffness}};
+    const cpu::Moduli<double> dry{l.c11, l.c22, l.c12, l.c66, 0, 0};
+    return {dry * softness_, {l.limit_start, l.limit_stiffness}};
   }
 
   /// Of Cauchy's stress F S F^T / J: its trace is S : C / J and its determinant that of S, as J^2
@@ -74,13 +75,23 @@ class TriangleStrain {
 
   const ClothTopology& cloth_;
   const HostState& state_;
+  double softness_;
 };
+
+/// Of a sheet over that of the dry one (passes/cloth/wet_cloth.h).
+double stiffness_when_wet(const ClothTopology& cloth, const HostState& state, VertexRange sheet) {
+  if (cloth.wet.empty()) return 1;
+  double water = 0, mass = 0;
+  for (size_t v = size_t(sheet.first); v < size_t(sheet.first + sheet.count); ++v)
+    water += double(cloth.mass[v]) * state.cloth_wetness[v], mass += double(cloth.mass[v]);
+  return 1 + (double(cloth.wet[size_t(cloth.sheet_of(sheet.first))].stiffness) - 1) * water / mass;
+}
 
 }  // namespace
 
 std::vector<ClothStrain> cloth_strain(const ClothTopology& cloth, const HostState& state,
                                       VertexRange vertices) {
-  const TriangleStrain strain(cloth, state);
+  const TriangleStrain strain(cloth, state, stiffness_when_wet(cloth, state, vertices));
   std::vector<ClothStrain> all;
   for (int v = vertices.first; v < vertices.first + vertices.count; ++v) {
     double sum[4] = {0, 0, 0, 0}, area = 0;

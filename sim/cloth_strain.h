@@ -14,7 +14,7 @@ struct ClothStrain {
   float strain_max = 0, strain_min = 0, stress_max = 0, stress_min = 0;
 };
 
-/// Of the vertices from `first` on. Their triangles must be a shell's.
+/// @param vertices  of one sheet, which must be a shell
 std::vector<ClothStrain> cloth_strain(const ClothTopology& cloth, const HostState& state,
                                       VertexRange vertices);
 

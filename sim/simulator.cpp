@@ -84,7 +84,7 @@ struct Simulator::Implementation {
     told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 6").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 7").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(run.scene.start.id.size());
     births = run.scene.births;
@@ -364,8 +364,11 @@ struct Simulator::Implementation {
     };
     for (size_t i = 0; i < state.velocity.size(); ++i)
       energy += run.scene.parameters.particle_mass * kinetic(state.velocity, i);
-    for (size_t i = 0; i < state.cloth_velocity.size(); ++i)
-      energy += run.scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
+    for (size_t i = 0; i < state.cloth_velocity.size(); ++i) {
+      const double water = sim::water_at(run.scene.cloth, state, int(i));
+      energy += (run.scene.cloth.mass[i] + water) * kinetic(state.cloth_velocity, i);
+      report.water_in_cloth += water;
+    }
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
     report.cloth_contacts = run.solver->cloth_contacts();

@@ -50,6 +50,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"viscous_iterations", step.viscous_iterations},
                      {"sheet_sweeps", step.sheet_sweeps},
                      {"sheets_cut_short", step.sheets_cut_short},
+                     {"water_in_cloth", step.water_in_cloth},
                      {"sheet_contacts", step.cloth_contacts.sheets},
                      {"obstacle_contacts", step.cloth_contacts.obstacles},
                      {"viscous_unconverged", step.viscous_unconverged},
