@@ -26,7 +26,8 @@ void transfer(Archive& archive, C& c) {
   archive(c.emitted), archive(c.shut);
   auto& s = c.state;
   cpu::State columns;
-  columns.parameters.incompressible = columns.shell.any = true;  // which keep more
+  columns.parameters.incompressible = columns.shell.any = columns.wet.any =
+      true;  // which keep more
   cpu::for_each_kept_column(
       columns, [&](const auto&, const auto&, auto member) { transfer_values(archive, s.*member); });
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);

@@ -38,6 +38,7 @@ enum class ColumnGroup : int {
   cloth_obstacles,  // which vertices obstacles hold
   shell_history,    // what the next step needs of the last
   shell_system,
+  wet_cloth,  // how wet vertices are
   pins,
   self_contact,
   lists,
@@ -86,6 +87,7 @@ inline constexpr std::array column_group_names{
     std::string_view("cloth at obstacles"),
     std::string_view("last step of shells"),
     std::string_view("implicit step of shells"),
+    std::string_view("wet cloth"),
     std::string_view("pins that move"),
     std::string_view("contact among sheets"),
     std::string_view("neighbour lists"),

@@ -287,6 +287,23 @@ void for_each_shell_column(S& state, const Visit& visit) {
 }
 
 template <class S, class Visit>
+void for_each_wet_column(S& state, const Visit& visit) {
+  using enum Extent;
+  using Group = ColumnGroup;
+  auto& w = state.wet;
+  const Use kept = w.any ? Use::kept : Use::rebuilt;
+  visit({"wetness", "1", Group::wet_cloth, vertices, kept}, w.wetness, &HostState::cloth_wetness);
+  visit({"wet_law", "", Group::cloth_fixed}, w.law, none);
+  visit({"dry_mass", "kg", Group::cloth_fixed}, w.dry_mass, none);
+  visit({"dry_law", "", Group::cloth_fixed}, w.dry_law, none);
+  visit({"dry_bend", "N/m", Group::cloth_fixed}, w.dry_bend, none);
+  visit({"dry_pull", "N", Group::cloth_fixed}, w.dry_pull, none);
+  visit({"dry_of_pull", "N", Group::cloth_fixed}, w.dry_of_pull, none);
+  visit({"dry_push", "N", Group::cloth_fixed}, w.dry_push, none);
+  visit({"softness", "1", Group::wet_cloth}, w.softness, none);
+}
+
+template <class S, class Visit>
 void for_each_cloth_level_column(S& state, const Visit& visit) {
   using Group = ColumnGroup;
   auto& s = state.cloth_levels;
@@ -384,6 +401,7 @@ void for_each_column(S& state, const Visit& visit) {
   for_each_cloth_column(state, visit);
   for_each_system_column(state, visit);
   for_each_shell_column(state, visit);
+  for_each_wet_column(state, visit);
   for_each_cloth_level_column(state, visit);
   for_each_pin_column(state, visit);
   for_each_self_contact_column(state, visit);

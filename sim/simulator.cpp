@@ -12,6 +12,7 @@
 #include "pipeline/contract/shot/shot_file.h"
 #include "sim/blow_up.h"
 #include "sim/checkpoint.h"
+#include "sim/cloth_frames.h"
 #include "sim/probe_series.h"
 #include "sim/setup/inlet_report.h"
 #include "sim/setup/room.h"
@@ -83,7 +84,7 @@ struct Simulator::Implementation {
     told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 6").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 7").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(run.scene.start.id.size());
     births = run.scene.births;
@@ -363,10 +364,14 @@ struct Simulator::Implementation {
     };
     for (size_t i = 0; i < state.velocity.size(); ++i)
       energy += run.scene.parameters.particle_mass * kinetic(state.velocity, i);
-    for (size_t i = 0; i < state.cloth_velocity.size(); ++i)
-      energy += run.scene.cloth.mass[i] * kinetic(state.cloth_velocity, i);
+    for (size_t i = 0; i < state.cloth_velocity.size(); ++i) {
+      const double water = sim::water_at(run.scene.cloth, state, int(i));
+      energy += (run.scene.cloth.mass[i] + water) * kinetic(state.cloth_velocity, i);
+      report.water_in_cloth += water;
+    }
     report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
+    report.cloth_contacts = run.solver->cloth_contacts();
     for (const sim::ColumnMemory& group : run.solver->memory()) report.memory += group.bytes;
     count_particles(report, state.removed);
   }
@@ -387,33 +392,14 @@ struct Simulator::Implementation {
     return out;
   }
 
-  V3f world(const sim::HostVec& p, size_t i, const V3d& shift = V3d(0)) const {
-    return V3f(float(run.scene.frame.to_world(0, p.x[i]) + shift.x),
-               float(run.scene.frame.to_world(1, p.y[i]) + shift.y),
-               float(run.scene.frame.to_world(2, p.z[i]) + shift.z));
+  V3f world(const sim::HostVec& p, size_t i) const {
+    return V3f(float(run.scene.frame.to_world(0, p.x[i])),
+               float(run.scene.frame.to_world(1, p.y[i])),
+               float(run.scene.frame.to_world(2, p.z[i])));
   }
 
   std::vector<ClothFrame> cloth() const {
-    const sim::HostState state = run.solver->save();
-    std::vector<ClothFrame> frames;
-    for (size_t s = 0; s < run.scene.sheet.size(); ++s) {
-      const sim::Sheet& sheet = run.scene.sheet[s];
-      ClothFrame out{sheet.name, {}};
-      // Both edges at a seam are drawn, so that there is no hole in what is seen.
-      for (size_t point = 0; point < sheet.position.size(); ++point) {
-        const int v = run.scene.first_vertex[s] + sheet.node[point];
-        const V3d shift = V3d(sheet.image[point]) * sheet.period;
-        out.mesh.position.push_back(world(state.cloth_position, size_t(v), shift));
-        out.mesh.velocity.emplace_back(state.cloth_velocity.x[v], state.cloth_velocity.y[v],
-                                       state.cloth_velocity.z[v]);
-        out.mesh.rest_position.push_back(V3f(sheet.rest[point]));
-      }
-      out.mesh.uv = sheet.uv;
-      if (sheet.is_sewn()) out.mesh.point = sheet.welded;
-      out.mesh.triangle = sheet.triangle;
-      frames.push_back(std::move(out));
-    }
-    return frames;
+    return sim::cloth_frames(shot, run.scene, run.solver->save());
   }
 
   static constexpr size_t max_particles = 200'000'000;

@@ -14,6 +14,7 @@
 #include "pipeline/contract/frames.h"
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/shot/shot.h"
+#include "sim/cloth_contacts.h"
 
 namespace drench {
 
@@ -42,6 +43,8 @@ struct StepReport {
   int viscous_unconverged = 0;  // steps in which these did not reach their tolerance
   double worst_viscous_residual = 0;  // RMS that one left over the RMS of the velocity
   uint64_t guard_hits = 0;            // particles that continuous collision held back
+  sim::ClothContacts cloth_contacts;  // of the last step
+  double water_in_cloth = 0;          // kg, that sheets hold; the fluid's particles have it as well
   uint64_t memory = 0;                // bytes of the state on its device, room to grow included
   std::vector<std::pair<std::string, uint64_t>> drained;  // particles that each sink took
   uint64_t emitted = 0;                                   // particles that emitters added

@@ -10,9 +10,11 @@
 #include "pipeline/contract/hash.h"
 #include "sim/columns.h"
 #include "sim/passes/cloth/cloth_levels.h"
+#include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/self_contact_pairs.h"
 #include "sim/passes/cloth/shell_columns.h"
 #include "sim/passes/cloth/triangle_obstacles.h"
+#include "sim/passes/cloth/wet_cloth.h"
 #include "sim/passes/motion/measure_limits.h"
 #include "sim/passes/obstacle/obstacle_impulse.h"
 #include "sim/passes/pressure/measure_density.h"
@@ -92,6 +94,7 @@ class BackendSolver : public Solver {
       upload(column, values.size() == n ? values : repeated(column, n, info.initial));
       if (info.extent == Extent::vertices) column.resize(state_.cloth.padded);
     });
+    if (state_.wet.any) apply_wetness(state_);
     state_.fluid.beyond_support.clear_bytes(state_.queue, 0);
     state_.owes = true;
     state_.guard_hits = host.guard_hits;
@@ -242,6 +245,7 @@ class BackendSolver : public Solver {
       inverse_mass_[v] = pull_[k] == 0 ? 0.f : 1 / mass_[v];
     }
     from_host(state_.cloth.inverse_mass, inverse_mass_);
+    if (state_.wet.any) apply_wetness(state_);
     find_loose_sheets();
   }
   void draw_seams(const std::vector<float>& rest_length) override {
@@ -271,6 +275,11 @@ class BackendSolver : public Solver {
       impulses[k].stopped = stopped[4 * k + 3];
     }
     return impulses;
+  }
+
+  ClothContacts cloth_contacts() const override {
+    const bool implicit = allocated_.contains(ColumnGroup::cloth_system);
+    return implicit ? count_cloth_contacts(state_) : ClothContacts{};
   }
 
   std::vector<PassInfo> plan() const override {
@@ -364,6 +373,7 @@ class BackendSolver : public Solver {
     load_cloth_levels(state_, t);
     load_triangle_obstacles(state_, t);
     load_self_contact(state_, t);
+    load_wet_cloth(state_, t);
   }
 
   void load_pins(const ClothTopology& t) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "pipeline/contract/geometry/level_set.h"
+#include "sim/cloth_contacts.h"
 #include "sim/column_groups.h"
 #include "sim/frame_now.h"
 #include "sim/obstacle_placement.h"
@@ -19,6 +20,7 @@
 #include "sim/probe_query.h"
 #include "sim/shell_topology.h"
 #include "sim/vertex_range.h"
+#include "sim/wet_law.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim {
@@ -33,8 +35,9 @@ struct HostState {
   // of shells, else empty: see ShellState
   HostVec shell_landed, shell_rounding, shell_left, shell_lost, shell_acceleration, shell_friction,
       shell_internal;
-  double shell_dt = 0;  // s, of the step that left these
-  Limits limits;        // of the step before
+  double shell_dt = 0;               // s, of the step that left these
+  std::vector<float> cloth_wetness;  // 0 to 1; empty where no sheet is ever wet
+  Limits limits;                     // of the step before
   uint64_t guard_hits = 0, guard_holds = 0;
   std::vector<uint64_t> removed;  // particles since the start: by each sink; last: left the domain
 };
@@ -47,7 +50,7 @@ struct SeamSpring {
 
 /// What never changes about the sheets, all in one.
 struct ClothTopology {
-  std::vector<float> mass, inverse_mass, damping_rate;  // kg; 0 where pinned; 1/s
+  std::vector<float> mass, inverse_mass, damping_rate;  // kg, dry; 0 where pinned; 1/s
   std::vector<int> spring_start, spring_end;            // rows by vertex
   std::vector<float> rest_length, stiffness, spring_damping;
   std::vector<int> corner, neighbour, sheet;  // 3, 3, 1 a triangle
@@ -60,6 +63,7 @@ struct ClothTopology {
   // coefficient there.
   HostVec rest;
   std::vector<char> meets_sheets;
+  std::vector<WetLaw> wet;  // of a sheet; empty where none is ever wet
   std::vector<float> friction;
   std::vector<int> fan_start, fan_entry, rim;
   // Where a sheet is joined to itself across the seam of a periodic axis, else empty: how far from
@@ -69,6 +73,9 @@ struct ClothTopology {
   ShellTopology shell;
   std::vector<int> pin_vertex;  // of pins that do more than hold where the vertex starts
   std::vector<SeamSpring> seam;
+  int sheet_of(int vertex) const {
+    return sheet[size_t(fan_entry[size_t(fan_start[size_t(vertex)])]) / 3];
+  }
   int vertices() const { return int(mass.size()); }
   int triangles() const { return int(sheet.size()); }
 };
@@ -85,6 +92,13 @@ inline std::vector<VertexRange> sheet_ranges(const ClothTopology& cloth) {
   for (const auto& sheet : ends)
     all.push_back({sheet.second.first, sheet.second.second - sheet.second.first + 1});
   return all;
+}
+
+/// kg, of the water that a vertex holds.
+inline double water_at(const ClothTopology& cloth, const HostState& state, int vertex) {
+  if (state.cloth_wetness.empty()) return 0;
+  return double(cloth.mass[size_t(vertex)]) * cloth.wet[size_t(cloth.sheet_of(vertex))].uptake *
+         state.cloth_wetness[size_t(vertex)];
 }
 
 /// Of every vertex the first of those that seams join it to, of chains of seams, too.
@@ -169,6 +183,8 @@ class Solver {
   virtual void draw_seams(const std::vector<float>& rest_length) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.
   virtual std::vector<ObstacleImpulse> obstacle_impulses() const = 0;
+  /// Of the last step.
+  virtual ClothContacts cloth_contacts() const = 0;
   /// Answers to probes, in their order, of the state as step() has just left it; of a state that no
   /// step has made yet only those that ask for no pressure or force. Changes no bit of a later
   /// step. What the numbers are: sim/probe_query.h.

@@ -13,6 +13,7 @@
 #include "sim/passes/obstacle/obstacle_distance.h"
 #include "sim/setup/wall_table.h"
 #include "sim/vertex_range.h"
+#include "sim/wet_law.h"
 #include "sim/wind_now.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -185,6 +186,20 @@ struct ShellState {
   VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x; two
                               // fields of `triangles`: at the start, where straight paths end
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
+};
+
+/// Sheets that water changes (passes/cloth/wet_cloth.h). Columns are empty where none is ever wet.
+struct WetState {
+  bool any = false;
+  // kept from step to step
+  Column<float> wetness;  // of a vertex, 0 to 1
+  // fixed
+  Column<WetLaw> law;                                                // of a sheet
+  std::vector<VertexRange> sheets;                                   // their vertices
+  Column<float> dry_mass, dry_law, dry_bend, dry_pull, dry_of_pull;  // as ClothState, ShellState
+  VecColumn dry_push;
+  // rebuilt every step
+  Column<float> softness;  // of a sheet: its stiffness over that of the dry one
 };
 
 /// Coarse levels of the sheets' solve (passes/cloth/cloth_levels.h). None without shells.
@@ -478,6 +493,7 @@ struct State {
   ClothState cloth;
   ClothSystem cloth_system;
   ShellState shell;
+  WetState wet;
   ClothLevels cloth_levels;
   PinState pins;
   SelfContact self_contact;

@@ -3,6 +3,7 @@
 #include "sim/neighbours/sort_particles.h"
 #include "sim/passes/air/wind_on_cloth.h"
 #include "sim/passes/air/wind_on_fluid.h"
+#include "sim/passes/cloth/wet_cloth.h"
 #include "sim/passes/coupling/cloth_filter.h"
 #include "sim/passes/coupling/cloth_side.h"
 #include "sim/passes/coupling/collision_rounds.h"
@@ -91,6 +92,9 @@ bool coupled_exactly(const Parameters& p, bool cloth) {
 }
 bool strong(const Parameters& p, bool cloth) { return coupled(p, cloth) && p.incompressible; }
 bool strong_shells(const Parameters& p, bool cloth) { return strong(p, cloth) && p.shells; }
+bool wets_sheets(const Parameters& p, bool cloth) {
+  return cloth && p.wet_sheets && sheets_are_implicit(p);
+}
 bool strong_meeting(const Parameters& p, bool cloth) {
   return strong(p, cloth) && (p.self_contact || (p.shells && p.obstacles > 0));
 }
@@ -129,6 +133,8 @@ const Pass all_passes[] = {
     {"sheet_side", coupled, position | start | sheets | polygons, near_cloth | memory, exact_sides},
     {"sort_near", strong, near_cloth, contact | sorting, sort_all_contacts},
     {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},
+    {"wet_cloth", wets_sheets, moving | cells | sheets | shell_history,
+     cloth | cloth_fixed | shell_history | wet_cloth, soak_sheets},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
     {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
     {"linearise_shell", strong_shells, sheets | pins, shell_system | shell_history,
@@ -211,6 +217,7 @@ std::vector<Pass> step_plan(const Parameters& parameters, bool cloth) {
 void step_cloth_alone(State& state) {
   state.cloth.force.clear(state.queue);
   if (state.parameters.turns) turn_frame(state);
+  if (state.wet.any) soak_sheets(state);
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
 }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "pipeline/contract/files/mesh_columns.h"
 #include "pipeline/contract/frames.h"
 
 namespace drench::test {
@@ -24,6 +25,8 @@ inline void expect_same_bits(const TriangleMesh& a, const TriangleMesh& b) {
   EXPECT_TRUE(same_bits(a.rest_position, b.rest_position));
   EXPECT_TRUE(same_bits(a.triangle, b.triangle));
   EXPECT_TRUE(same_bits(a.contact, b.contact));
+  for (const auto& [name, values] : mesh_columns)
+    EXPECT_TRUE(same_bits(a.*values, b.*values)) << name;
 }
 
 }  // namespace drench::test

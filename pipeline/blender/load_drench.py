@@ -8,7 +8,7 @@ and after opening a saved scene, without a folder, to let its objects follow aga
 the shot's frames and frames per second, which motion blur depends on.
 
 Vertices keep what the files hold as attributes: `velocity` in m/s, from which Cycles makes motion
-blur, `N` for the normals, `rest`, and others by their own names; u and v become a UV map. Drench's
+blur, `N` for the normals, `rest`, and others by their own names; s and t become a UV map. Drench's
 Y is up, Blender's is Z: the objects are turned.
 """
 
@@ -84,7 +84,7 @@ def columns_of(vertices):
     """Columns by attribute name: n x 3, n x 2 or n; NAME_x, NAME_y, NAME_z are one, NAME."""
     rest = list(vertices.dtype.names)
     groups = {"co": ["x", "y", "z"], "velocity": ["vx", "vy", "vz"], "N": ["nx", "ny", "nz"],
-              "UVMap": ["u", "v"]}
+              "UVMap": ["s", "t"] if "s" in rest else ["u", "v"]}
     for stem in [name[:-2] for name in rest if name.endswith("_x")]:
         groups[stem] = [f"{stem}_{axis}" for axis in "xyz"]
     columns = {}

@@ -48,6 +48,9 @@ struct TriangleMesh {
   std::vector<float> source;              // fluid: of the nearest particle, or empty
   std::vector<float> age;                 // fluid: as of its particles, or empty
   std::vector<float> wetness;             // as age; cloth: wet fraction, 0 to 1; or empty
+  // cloth: principal strains, length over rest length less 1, and stresses, N/m; or empty
+  std::vector<float> strain_max, strain_min, stress_max, stress_min;
+  std::vector<uint32_t> id;     // cloth: the vertex as the shot numbers it; written only; or empty
   std::vector<uint32_t> point;  // the first vertex at the same point of the surface, where
                                 // several differ in uv or normal; or empty
   std::vector<Imath::Vec3<uint32_t>> triangle;  // counter-clockwise seen from outside

@@ -30,6 +30,9 @@ constexpr Constant constants[] = {
     {"stretch_limit", "1", &Fabric::stretch_limit},
     {"damping_time", "s", &Fabric::damping_time},
     {"water_capacity", "kg/m2", &Fabric::water_capacity},
+    {"soak_time", "s", &Fabric::soak_time},
+    {"wet_modulus_ratio", "1", &Fabric::wet_modulus_ratio},
+    {"wet_friction", "1", &Fabric::wet_friction},
     {"contact_angle_deg", "deg", &Fabric::contact_angle_deg},
 };
 

@@ -50,6 +50,9 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"viscous_iterations", step.viscous_iterations},
                      {"sheet_sweeps", step.sheet_sweeps},
                      {"sheets_cut_short", step.sheets_cut_short},
+                     {"water_in_cloth", step.water_in_cloth},
+                     {"sheet_contacts", step.cloth_contacts.sheets},
+                     {"obstacle_contacts", step.cloth_contacts.obstacles},
                      {"viscous_unconverged", step.viscous_unconverged},
                      {"drained", drained},
                      {"emitted", step.emitted},
@@ -60,6 +63,9 @@ StageReport report_of(const StepReport& step, const std::string& device) {
   report.line =
       fmt::format("steps={} cloth_substeps={} limit=\"{}\" particles={} max_speed={:.3g}",
                   step.steps, step.cloth_substeps, step.limit, step.particles, step.max_speed);
+  const auto& [sheets, obstacles] = step.cloth_contacts;
+  if (sheets > 0) report.line += fmt::format(" sheet_contacts={}", sheets);
+  if (obstacles > 0) report.line += fmt::format(" obstacle_contacts={}", obstacles);
   if (step.emitted > 0) report.line += fmt::format(" emitted={}", step.emitted);
   for (const auto& [sink, count] : step.drained) {
     if (count > 0) report.line += fmt::format(" {}={}", sink, count);

@@ -209,7 +209,10 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
   p.surface_tension = float(shot.fluid.surface_tension);
   set_wetting(shot, p);
   p.paper = shot.coupling.scheme == CouplingScheme::paper;
-  for (const Cloth& c : shot.cloth) p.shells |= c.model == ClothModel::shell;
+  for (const Cloth& c : shot.cloth) {
+    p.shells |= c.model == ClothModel::shell;
+    p.wet_sheets |= is_ever_wet(c);
+  }
   p.fixed_dt = shot.time_step;
   return p;
 }
@@ -332,6 +335,17 @@ void append_neighbours(const Sheet& sheet, ClothTopology& t, int base_triangle) 
   }
 }
 
+WetLaw wet_law(const Cloth& cloth) {
+  const bool wet = is_ever_wet(cloth);
+  return {.uptake = wet ? float(cloth.water_capacity / cloth.areal_density) : 0.f,
+          .soak_time = float(cloth.soak_time),
+          .dry_time = float(cloth.dry_time),
+          .soaks = cloth.soaks,
+          .stiffness = wet ? float(cloth.wet_modulus_ratio) : 1.f,
+          .friction = float(cloth.friction),
+          .wet_friction = float(wet ? cloth.wet_friction : cloth.friction)};
+}
+
 /// Images across seams are not looked for: a sheet that is joined to itself meets none.
 bool meets_sheets(const Cloth& cloth, const Sheet& sheet) {
   return cloth.model == ClothModel::shell && cloth.self_collision && !sheet.joined();
@@ -390,6 +404,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     scene.start.cloth_position.push(frame.to_local(0, p.x), frame.to_local(1, p.y),
                                     frame.to_local(2, p.z));
     scene.start.cloth_velocity.push(float(u.x), float(u.y), float(u.z));
+    if (scene.parameters.wet_sheets) scene.start.cloth_wetness.push_back(float(cloth.wetness));
   }
 }
 
@@ -463,6 +478,7 @@ void place_sheets(const Shot& shot, Scene& scene) {
     scene.sheet.push_back(build_sheet(shot.cloth[s], seams_of(shot)));
     scene.first_vertex.push_back(scene.cloth.vertices());
     scene.first_triangle.push_back(scene.cloth.triangles());
+    if (scene.parameters.wet_sheets) scene.cloth.wet.push_back(wet_law(shot.cloth[s]));
     append_sheet(scene.sheet.back(), shot.cloth[s], int(s), scene.frame, shot, scene);
     if (scene.parameters.shells)
       append_shell(scene.sheet.back(), shot.cloth[s], scene.frame, scene.cloth);

@@ -23,6 +23,9 @@ TEST(Fabrics, HavePositiveDefiniteMaterials) {
     EXPECT_GT(f.stretch_limit, 1) << f.name;
     EXPECT_GE(f.water_capacity, 0) << f.name;
     EXPECT_LT(f.water_capacity, 1000 * f.thickness) << f.name;
+    EXPECT_GE(f.soak_time, 0) << f.name;
+    EXPECT_GT(f.wet_modulus_ratio, 0) << f.name;
+    EXPECT_LE(f.wet_modulus_ratio, 1) << f.name;
     EXPECT_FALSE(f.source.empty()) << f.name;
   }
 }

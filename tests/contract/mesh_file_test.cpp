@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "pipeline/contract/files/files.h"
 #include "pipeline/contract/files/ply_file.h"
 #include "tests/same_bits.h"
 #include "tests/temporary_folder.h"
@@ -32,6 +33,8 @@ TriangleMesh full_sheet() {
       mesh.uv.emplace_back(a / 4, b / 3);
       mesh.rest_position.emplace_back(b, a, -0.f);
       mesh.source.push_back(float(i)), mesh.age.push_back(a * b), mesh.wetness.push_back(b / 3);
+      mesh.strain_max.push_back(a), mesh.strain_min.push_back(-b);
+      mesh.stress_max.push_back(1e3f * a), mesh.stress_min.push_back(-1e-3f * b);
       if (i == 3 || j == 2) continue;
       const uint32_t k = j * 4 + i;
       mesh.triangle.emplace_back(k, k + 1, k + 5);
@@ -62,6 +65,19 @@ TEST(MeshFile, ReturnsOnlyTheColumnsThatWereThere) {
   mesh.age[3] = std::numeric_limits<float>::infinity();
   EXPECT_NE(error_of([&] { write_mesh(folder / "sheet.ply", mesh); }).find("age of vertex 3"),
             std::string::npos);
+}
+
+// Blender's reader takes s and t for texture coordinates, and numbers of vertices are whole.
+TEST(MeshFile, NamesColumnsAsOtherProgramsKnowThem) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh = full_sheet();
+  for (uint32_t v = 0; v < mesh.position.size(); ++v) mesh.id.push_back(100 + v);
+  write_mesh(folder / "sheet.ply", mesh);
+  const std::string text = read_text(folder / "sheet.ply");
+  for (const char* property : {"float s", "float t", "float rest_x", "float strain_max", "int id"})
+    EXPECT_NE(text.find(std::string("property ") + property + "\n"), std::string::npos) << property;
+  mesh.id.clear();
+  expect_same_bits(read_mesh(folder / "sheet.ply"), mesh);
 }
 
 TEST(MeshFile, HoldsAnEmptyMesh) {
@@ -124,7 +140,7 @@ TEST(ObjFile, HoldsANormalForEveryVertex) {
   mesh.velocity.resize(3);
   mesh.uv.clear();
   mesh.rest_position.clear();
-  mesh.source.clear(), mesh.age.clear(), mesh.wetness.clear();
+  for (const auto& [name, values] : mesh_columns) (mesh.*values).clear();
   mesh.normal = {{0, 0.6f, 0.8f}, {1, 0, 0}, {0, -1, 1e-9f}};
   mesh.triangle = {{0, 1, 2}, {2, 1, 0}};
   mesh.contact = {0, 1};

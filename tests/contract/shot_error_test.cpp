@@ -259,6 +259,13 @@ TEST_F(ShotError, NamesPinsAndSeamsThatCannotBe) {
 
 TEST_F(ShotError, NamesBadClothLightsAndMaterials) {
   expect_messages({
+      {"[[cloth]]\nmodel = \"springs\"\nsoaks = true\n",
+       {"scene.toml:6", "cloth[0].soaks", "shell"}},
+      {"[[cloth]]\nwetness = 1.5\n", {"scene.toml:5", "cloth[0].wetness", "between 0 and 1"}},
+      {"[[cloth]]\nfabric = \"rubber\"\nwetness = 1\n",
+       {"scene.toml:6", "cloth[0].wetness", "rubber takes up no water", "Give water_capacity"}},
+      {"[[cloth]]\nfabric = \"felt\"\nsoaks = true\nwater_capacity = 0\n",
+       {"scene.toml:6", "cloth[0].soaks", "water_capacity is 0"}},
       {"[[cloth]]\nmesh = \"none.ply\"\n",
        {"scene.toml:5", "cloth[0].mesh", "none.ply does not exist"}},
       {"[[cloth]]\nmesh = \".\"\n", {"scene.toml:5", "not a regular file"}},

@@ -75,7 +75,7 @@ TEST(Program, ListsFabricsByLines) {
   std::istringstream lines(ended.out);
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count)
-    EXPECT_EQ(std::count(line.begin(), line.end(), '\t'), 15) << line;
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\t'), 18) << line;
   EXPECT_EQ(count, 9);
   EXPECT_TRUE(has(ended.out, "fabric\tareal_density [kg/m2]\t")) << ended.out;
   const json all = json::parse(drench({"fabrics", "--json"}).out);

@@ -38,6 +38,7 @@ inline void expect_same_state(const sim::HostState& a, const sim::HostState& b) 
   expect_same_vectors(a.shell_friction, b.shell_friction);
   expect_same_vectors(a.shell_internal, b.shell_internal);
   EXPECT_EQ(a.shell_dt, b.shell_dt);
+  EXPECT_EQ(a.cloth_wetness, b.cloth_wetness);
 }
 
 /// After so many steps of dt s; of the largest stable size if it is 0. @param start  Shot or Scene.

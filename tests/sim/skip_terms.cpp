@@ -27,6 +27,13 @@ Shot on_sheet(FluidSolver solver) {
   return shot;
 }
 
+/// The same above a shell.
+Shot on_shell(FluidSolver solver) {
+  Shot shot = on_sheet(solver);
+  shot.cloth[0].model = ClothModel::shell;
+  return shot;
+}
+
 void sew(Cloth& cloth, const std::vector<uint32_t>& from, const std::vector<uint32_t>& to) {
   ClothSeam& seam = cloth.seam.emplace_back();
   seam.vertices = from, seam.to_vertices = to;
@@ -205,6 +212,14 @@ const Term terms[] = {
      Leaves::the_plan,
      {},
      {}},
+    {"soaking",
+     projected,
+     on_shell,
+     [](Shot& s) { s.cloth[0].soaks = true, s.cloth[0].soak_time = 0.02; },
+     [](Shot& s) { s.cloth[0].wetness = 0, s.cloth[0].dry_time = 1; },
+     Leaves::the_plan,
+     {"wet_cloth"},
+     {"wet cloth"}},
     {"damping_of_explicit_cloth",
      compressible,
      on_sheet,

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/mesh_columns.h"
 #include "pipeline/contract/files/mesh_text.h"
 #include "pipeline/contract/files/obj_file.h"
 #include "pipeline/contract/files/ply_file.h"
@@ -25,25 +26,23 @@ void append(std::string& bytes, const void* data, size_t size) {
 
 /// One column group of a vertex: its property names and where its floats are.
 struct VertexColumns {
-  std::vector<const char*> names;
+  std::vector<std::string_view> names;
   const float* data;
 };
 
 std::vector<VertexColumns> columns_of(const TriangleMesh& mesh) {
   const auto start = [](const auto& column) { return &column.data()->x; };
   std::vector<VertexColumns> columns;
-  const auto add_real = [&](const char* name, const std::vector<float>& column) {
-    if (!column.empty()) columns.push_back({{name}, column.data()});
-  };
   if (mesh.position.empty()) return columns;
   columns.push_back({{"x", "y", "z"}, start(mesh.position)});
   columns.push_back({{"vx", "vy", "vz"}, start(mesh.velocity)});
   if (!mesh.normal.empty()) columns.push_back({{"nx", "ny", "nz"}, start(mesh.normal)});
-  if (!mesh.uv.empty()) columns.push_back({{"u", "v"}, start(mesh.uv)});
+  if (!mesh.uv.empty()) columns.push_back({{"s", "t"}, start(mesh.uv)});
   if (!mesh.rest_position.empty()) {
     columns.push_back({{"rest_x", "rest_y", "rest_z"}, start(mesh.rest_position)});
   }
-  add_real("source", mesh.source), add_real("age", mesh.age), add_real("wetness", mesh.wetness);
+  for (const auto& [name, values] : mesh_columns)
+    if (!(mesh.*values).empty()) columns.push_back({{name}, (mesh.*values).data()});
   return columns;
 }
 
@@ -51,8 +50,9 @@ void check_columns(const TriangleMesh& mesh) {
   const size_t n = mesh.position.size();
   const auto fits = [&](const auto& column) { return column.empty() || column.size() == n; };
   if (mesh.velocity.size() != n || !fits(mesh.normal) || !fits(mesh.uv) ||
-      !fits(mesh.rest_position) || !fits(mesh.source) || !fits(mesh.age) || !fits(mesh.wetness) ||
-      !fits(mesh.point)) {
+      !fits(mesh.rest_position) || !fits(mesh.point) || !fits(mesh.id) ||
+      !std::all_of(std::begin(mesh_columns), std::end(mesh_columns),
+                   [&](const MeshColumn& column) { return fits(mesh.*column.values); })) {
     throw std::logic_error("mesh file: vertex columns differ in length");
   }
   if (!mesh.contact.empty() && mesh.contact.size() != mesh.triangle.size())
@@ -62,7 +62,7 @@ void check_columns(const TriangleMesh& mesh) {
   }
 }
 
-void check_finite(const fs::path& path, const char* name, size_t vertex, const float* row,
+void check_finite(const fs::path& path, std::string_view name, size_t vertex, const float* row,
                   size_t width) {
   if (std::all_of(row, row + width, [](float value) { return std::isfinite(value); })) return;
   throw Error(
@@ -78,9 +78,11 @@ std::string header_of(const TriangleMesh& mesh, const std::vector<VertexColumns>
       "element vertex {}\n",
       mesh.position.size());
   for (const VertexColumns& column : columns) {
-    for (const char* name : column.names) header += fmt::format("property float {}\n", name);
+    for (const std::string_view name : column.names)
+      header += fmt::format("property float {}\n", name);
   }
   if (!mesh.point.empty()) header += "property uint point\n";
+  if (!mesh.id.empty()) header += "property int id\n";
   if (columns.empty()) header += "property float x\nproperty float y\nproperty float z\n";
   return header +
          fmt::format("element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
@@ -141,7 +143,7 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
   check_columns(mesh);
   const std::vector<VertexColumns> columns = columns_of(mesh);
   std::string bytes = header_of(mesh, columns);
-  bytes.reserve(bytes.size() + mesh.position.size() * 56 + mesh.triangle.size() * 14);
+  bytes.reserve(bytes.size() + mesh.position.size() * 64 + mesh.triangle.size() * 14);
   for (size_t i = 0; i < mesh.position.size(); ++i) {
     for (const VertexColumns& column : columns) {
       const size_t width = column.names.size();
@@ -150,6 +152,7 @@ WrittenFile write_mesh(const fs::path& path, const TriangleMesh& mesh) {
       append(bytes, row, width * sizeof(float));
     }
     if (!mesh.point.empty()) append(bytes, &mesh.point[i], sizeof(uint32_t));
+    if (!mesh.id.empty()) append(bytes, &mesh.id[i], sizeof(uint32_t));
   }
   for (size_t k = 0; k < mesh.triangle.size(); ++k) {
     bytes.push_back(3);

@@ -9,8 +9,9 @@
 
 namespace drench {
 
-/// Columns: x y z, vx vy vz, and those present: nx ny nz, u v, rest_x rest_y rest_z, point; faces
-/// of 3, contact if present.
+/// Columns: x y z, vx vy vz, and those present: nx ny nz, s t, rest_x rest_y rest_z, those of
+/// mesh_columns.h, point, id; faces of 3, contact if present. Texture coordinates are s t because
+/// Blender's own reader knows no other names.
 WrittenFile write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Positions, normals if present, and triangles as Wavefront OBJ, for programs that read no PLY;

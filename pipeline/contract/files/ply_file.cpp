@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/mesh_columns.h"
 #include "pipeline/contract/files/mesh_text.h"
 #include "pipeline/contract/geometry/mesh_builder.h"
 
@@ -45,15 +46,6 @@ struct PlyHeader {
   std::vector<Element> elements;
   size_t body = 0;  // offset of the first byte after the header
 };
-
-/// Vertex columns of one number.
-struct RealColumn {
-  std::string_view name;
-  std::vector<float> TriangleMesh::*values;
-};
-constexpr RealColumn real_columns[] = {{"source", &TriangleMesh::source},
-                                       {"age", &TriangleMesh::age},
-                                       {"wetness", &TriangleMesh::wetness}};
 
 /// How programs call texture coordinates of vertices.
 constexpr std::array<std::string_view, 2> uv_names[] = {
@@ -304,13 +296,13 @@ class PlyReader {
       if (name == u) return slot(mesh_.uv, 0);
       if (name == v) return slot(mesh_.uv, 1);
     }
-    for (const auto& [real, values] : real_columns)
+    for (const auto& [real, values] : mesh_columns)
       if (name == real) return slot(mesh_.*values, 0);
     return nullptr;
   }
 
   static size_t stride_of(std::string_view name) {
-    for (const auto& [real, values] : real_columns)
+    for (const auto& [real, values] : mesh_columns)
       if (name == real) return 1;
     for (const auto& [u, v] : uv_names)
       if (name == u || name == v) return 2;

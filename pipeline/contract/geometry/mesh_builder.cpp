@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/mesh_columns.h"
 #include "pipeline/contract/geometry/polygon.h"
 #include "pipeline/contract/log.h"
 
@@ -112,7 +113,7 @@ void MeshBuilder::check_vertices() const {
 void MeshBuilder::mend_columns() {
   mend(mesh.uv, bad_uv_), mend(uv, bad_uv_);
   for (auto* column : {&mesh.velocity, &mesh.rest_position}) mend(*column, bad_values_);
-  for (auto* column : {&mesh.source, &mesh.age, &mesh.wetness}) mend(*column, bad_values_);
+  for (const MeshColumn& column : mesh_columns) mend(mesh.*column.values, bad_values_);
   mend(mesh.normal, bad_normals_), mend(normal, bad_normals_);
   if (wanted_ != CornerData::uv_and_normal) return;
   for (auto* column : {&mesh.normal, &normal}) {
@@ -202,7 +203,7 @@ void MeshBuilder::split_vertices() {
     repeat(mesh.rest_position, v, point[v]);
     if (!has_uv) repeat(mesh.uv, v, point[v]);
     if (!has_normal) repeat(mesh.normal, v, point[v]);
-    for (auto* column : {&mesh.source, &mesh.age, &mesh.wetness}) repeat(*column, v, point[v]);
+    for (const MeshColumn& column : mesh_columns) repeat(mesh.*column.values, v, point[v]);
   }
   mesh.point = std::move(point);
 }

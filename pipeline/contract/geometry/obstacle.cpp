@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/mesh_columns.h"
 #include "pipeline/contract/geometry/shells.h"
 #include "pipeline/contract/geometry/weld.h"
 #include "pipeline/contract/log.h"
@@ -157,7 +158,8 @@ void drop_unused_vertices(TriangleMesh& mesh, const std::filesystem::path& file)
     column.resize(kept);
   };
   shrink(mesh.position), shrink(mesh.velocity), shrink(mesh.normal), shrink(mesh.uv);
-  shrink(mesh.rest_position), shrink(mesh.source), shrink(mesh.age), shrink(mesh.wetness);
+  shrink(mesh.rest_position);
+  for (const MeshColumn& column : mesh_columns) shrink(mesh.*column.values);
   for (uint32_t& v : mesh.point) v = number[v];
   shrink(mesh.point);
   for (Triangle& t : mesh.triangle) t = {number[t.x], number[t.y], number[t.z]};

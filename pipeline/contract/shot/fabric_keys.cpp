@@ -28,13 +28,20 @@ constexpr Constant constants[] = {
     {"stretch_limit", &Cloth::stretch_limit, &Fabric::stretch_limit},
     {"damping_time", &Cloth::damping_time, &Fabric::damping_time},
     {"friction", &Cloth::friction, &Fabric::friction},
+    {"water_capacity", &Cloth::water_capacity, &Fabric::water_capacity},
+    {"soak_time", &Cloth::soak_time, &Fabric::soak_time},
+    {"wet_modulus_ratio", &Cloth::wet_modulus_ratio, &Fabric::wet_modulus_ratio},
+    {"wet_friction", &Cloth::wet_friction, &Fabric::wet_friction},
 };
 
 constexpr const char* spring_keys[] = {"adjacent_stiffness", "diagonal_stiffness", "spring_damping",
                                        "retardation_time"};
 constexpr const char* shell_keys[] = {
-    "fabric",    "young_warp", "young_weft",    "shear_modulus", "poisson",  "bend_warp",
-    "bend_weft", "bend_bias",  "stretch_limit", "damping_time",  "friction", "self_collision"};
+    "fabric",        "young_warp",   "young_weft",        "shear_modulus",
+    "poisson",       "bend_warp",    "bend_weft",         "bend_bias",
+    "stretch_limit", "damping_time", "friction",          "self_collision",
+    "write_strain",  "soaks",        "wetness",           "water_capacity",
+    "soak_time",     "dry_time",     "wet_modulus_ratio", "wet_friction"};
 
 /// The first of these keys that the shot gives, or null.
 template <size_t N>

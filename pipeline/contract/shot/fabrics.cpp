@@ -10,6 +10,8 @@ namespace drench {
 // Rigidities that are not measured are set by the bending length at which a fabric's drape
 // coefficient (Cusick's, 30 cm on 18 cm) is published: about 15 mm for 30 %, 20 for 50, 23 for 68,
 // 29 for 80.
+// Wet constants are estimates: bleached cotton takes up a drop in about a second, wool and felt
+// repel it at first; fibres swell and soften, silk and wool more than cotton; wet fabrics rub more.
 const std::array<Fabric, 8> fabrics = {{
     {.name = "cotton",
      .areal_density = 0.15,
@@ -25,6 +27,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.05,
      .damping_time = 0.005,
      .water_capacity = water_in_pores(0.35e-3, 0.15, cotton_fibre),
+     .soak_time = 0.5,
+     .wet_modulus_ratio = 0.7,
+     .wet_friction = 0.7,
      .contact_angle_deg = 40.8,
      .source = "bending: drape 68 % (Gan, Ly and Steven 1991); contact angle: Fei et al. 2018; "
                "(e) others, KES-F plain weaves"},
@@ -42,6 +47,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.06,
      .damping_time = 0.005,
      .water_capacity = water_in_pores(0.18e-3, 0.065, silk_fibre),
+     .soak_time = 1,
+     .wet_modulus_ratio = 0.6,
+     .wet_friction = 0.45,
      .contact_angle_deg = 60,
      .source = "bending: drape 20-40 % (Matsudaira and Yang 2003); (e) others, KES-F habutae and "
                "crepe"},
@@ -59,6 +67,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.08,
      .damping_time = 0.008,
      .water_capacity = water_in_pores(0.5e-3, 0.2, wool_fibre),
+     .soak_time = 20,
+     .wet_modulus_ratio = 0.6,
+     .wet_friction = 0.55,
      .contact_angle_deg = 100,
      .source =
          "weight: suitings of 0.125-0.258 kg/m2 (Leung et al. 2000); (e) others, KES-F worsted "
@@ -77,6 +88,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.05,
      .damping_time = 0.008,
      .water_capacity = water_in_pores(0.8e-3, 0.324, cotton_fibre),
+     .soak_time = 3,
+     .wet_modulus_ratio = 0.7,
+     .wet_friction = 0.7,
      .contact_angle_deg = 60,
      .source =
          "weight, moduli, bending: 11 oz denim at small strains (Wang, O'Brien and Ramamoorthi "
@@ -95,6 +109,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.03,
      .damping_time = 0.008,
      .water_capacity = water_in_pores(0.75e-3, 0.41, cotton_fibre),
+     .soak_time = 5,
+     .wet_modulus_ratio = 0.7,
+     .wet_friction = 0.7,
      .contact_angle_deg = 60,
      .source = "(e) cotton duck of 12 oz/yd2, bending length 40 mm"},
     {.name = "leather",
@@ -111,6 +128,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.2,
      .damping_time = 0.01,
      .water_capacity = water_in_pores(0.8e-3, 0.52, collagen),
+     .soak_time = 120,
+     .wet_modulus_ratio = 0.5,
+     .wet_friction = 0.7,
      .contact_angle_deg = 90,
      .source = "thickness 0.64-0.96 mm, drape 47-70 %: sheep garment leather (Memon et al. 2021); "
                "(e) others"},
@@ -128,6 +148,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 1.15,
      .damping_time = 0.01,
      .water_capacity = water_in_pores(2e-3, 0.4, wool_fibre),
+     .soak_time = 60,
+     .wet_modulus_ratio = 0.6,
+     .wet_friction = 0.8,
      .contact_angle_deg = 110,
      .source = "(e) pressed wool felt of 200 kg/m3 and 0.5 MPa, bending by E h^3/(12 (1 - nu^2))"},
     {.name = "rubber",
@@ -144,6 +167,9 @@ const std::array<Fabric, 8> fabrics = {{
      .stretch_limit = 3,
      .damping_time = 0.003,
      .water_capacity = 0,
+     .soak_time = 0,
+     .wet_modulus_ratio = 1,
+     .wet_friction = 0.7,
      .contact_angle_deg = 105,
      .source =
          "(e) soft natural rubber of 1.5 MPa and 1100 kg/m3, bending by E h^3/(12 (1 - nu^2))"},

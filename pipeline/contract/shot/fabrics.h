@@ -18,6 +18,9 @@ struct Fabric {
   double stretch_limit;                    // length over rest length where it stiffens
   double damping_time;                     // s, viscosity over stiffness
   double water_capacity;                   // kg/m^2: its pores full
+  double soak_time;                        // s: 63 % full under water
+  double wet_modulus_ratio;                // moduli and rigidities when full over those when dry
+  double wet_friction;                     // as friction, when full
   double contact_angle_deg;                // of water, within the water
   std::string_view source;                 // of what; (e) an estimate within what is published
 };

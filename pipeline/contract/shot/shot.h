@@ -211,10 +211,16 @@ struct Cloth {
   double young_warp = 12000, young_weft = 8000, shear_modulus = 67.4;    // N/m
   double poisson = 0.2;                                                  // geometric mean of both
   double bend_warp = 1.96e-5, bend_weft = 1.37e-5, bend_bias = 1.27e-5;  // N m
-  double stretch_limit = 1.05;    // length over rest length where it stiffens
-  double damping_time = 0.005;    // s, viscosity over stiffness in its plane
-  double friction = 0.5;          // Coulomb's coefficient on itself
-  bool self_collision = true;     // it meets itself and other shells
+  double stretch_limit = 1.05;           // length over rest length where it stiffens
+  double damping_time = 0.005;           // s, viscosity over stiffness in its plane
+  double friction = 0.5;                 // Coulomb's coefficient on itself
+  bool self_collision = true;            // it meets itself and other shells
+  bool soaks = false;                    // it takes up fluid that touches it
+  double wetness = 0;                    // at the start: share of its pores that is full
+  double water_capacity = 0.2526;        // kg/m^2 when full
+  double soak_time = 0.5, dry_time = 0;  // s; dry_time 0: never
+  double wet_modulus_ratio = 0.7, wet_friction = 0.7;  // of a full sheet: factor, coefficient
+  bool write_strain = false;      // its files hold principal strains and stresses
   Slip slip = Slip::automatic;    // of fluid along it
   double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid
   std::string material = "cotton";
@@ -475,6 +481,10 @@ inline bool is_incompressible(const Shot& shot) {
 inline bool holds_fluid(const Shot& shot, Slip slip) {
   if (slip != Slip::automatic) return slip == Slip::none;
   return std::sqrt(shot.fluid.kinematic_viscosity * 1.0) >= shot.fluid.spacing;  // m after 1 s
+}
+/// What water makes of a sheet of springs is not modelled.
+inline bool is_ever_wet(const Cloth& cloth) {
+  return cloth.model == ClothModel::shell && (cloth.soaks || cloth.wetness > 0);
 }
 /// Cosine of a contact angle, 0 of a right one.
 inline double wetting_of(double contact_angle_deg) {

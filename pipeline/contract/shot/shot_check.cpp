@@ -387,6 +387,12 @@ class Checker : CheckBase {
                        "fluid.solver = \"incompressible\", or model = \"springs\"",
                        path));
     }
+    if (is_ever_wet(cloth) && cloth.water_capacity == 0) {
+      const std::string key = path + (cloth.soaks ? ".soaks" : ".wetness");
+      fail(key, fmt::format("{} asks for a wet sheet, but {}.water_capacity is 0: {} takes up no "
+                            "water. Give water_capacity, or remove the key",
+                            key, path, cloth.fabric));
+    }
     if (cloth.model != ClothModel::shell &&
         !(cloth.adjacent_stiffness + cloth.diagonal_stiffness > 0)) {
       fail(

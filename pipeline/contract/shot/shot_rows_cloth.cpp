@@ -107,6 +107,36 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::self_collision>("cloth", "self_collision", "", none, simulate,
                                   "whether it meets itself and other shells: nothing crosses")
           .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::soaks>("cloth", "soaks", "", none, simulate,
+                         "whether it takes up fluid that touches it, and gets heavier")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::wetness>("cloth", "wetness", "", {0, 1}, simulate,
+                           "at the start: share of its pores that is full of water")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::water_capacity>("cloth", "water_capacity", "kg/m^2", {0, 1e4}, simulate,
+                                  "mass of the water on an area that is full")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::soak_time>("cloth", "soak_time", "s", {0, 1e6}, simulate,
+                             "in which fluid that touches it fills 63 % of what is left to fill")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::dry_time>(
+          "cloth", "dry_time", "s", {0, 1e9}, simulate,
+          "in which it loses 63 % of its water where no fluid is; 0: it stays wet")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::wet_modulus_ratio>(
+          "cloth", "wet_modulus_ratio", "", {1e-2, 100}, simulate,
+          "moduli and rigidities when full over those when dry; the mean "
+          "wetness of the sheet counts")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::wet_friction>("cloth", "wet_friction", "", {0, 10}, simulate,
+                                "as friction, when full")
+          .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::write_strain>(
+          "cloth", "write_strain", "", none, simulate,
+          "whether its files hold strain_max and strain_min, length over rest length less 1 along "
+          "the two principal directions, and stress_max and stress_min, N/m, the elastic stress "
+          "times the thickness: means of the triangles at a vertex, by area")
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::slip>("cloth", "slip", "", none, simulate,
                         "how the incompressible solver's fluid meets it: free, or none (it moves "
                         "with the sheet, which it drags along). automatic is as that of "

@@ -228,6 +228,14 @@ float slack_of(const State& state, float gravity) {
   return std::max(least, std::min(1.5f * dt * dt * std::sqrt(fastest2), 0.1f * s.edge));
 }
 
+/// Rows with a stiffness, of pairs of sheets and at obstacles.
+struct BearingRows {
+  int sheets = 0, obstacles = 0;
+  DRENCH_HD BearingRows operator+(const BearingRows& other) const {
+    return {sheets + other.sheets, obstacles + other.obstacles};
+  }
+};
+
 }  // namespace
 
 void start_sheet_rows(State& state) {
@@ -284,6 +292,25 @@ bool revise_sheet_rows(State& state, int round) {
   load_by_rows(state, Sides::all);
   put_rows_in_blocks(state, Sides::all);
   return true;
+}
+
+ClothContacts count_cloth_contacts(const State& state) {
+  const SelfContact& s = state.self_contact;
+  const SheetRow* row = s.row.data();
+  const BearingRows rows = parallel_reduce(
+      state.queue, "self: count", s.rows, BearingRows{},
+      DRENCH_LAMBDA(int k) {
+        if (row[k].stiffness == 0.f) return BearingRows{0, 0};
+        return row[k].obstacle < 0 ? BearingRows{1, 0} : BearingRows{0, 1};
+      },
+      Plus{});
+  ClothContacts count{uint64_t(rows.sheets), uint64_t(rows.obstacles)};
+  if (state.parameters.obstacles == 0) return count;
+  const int* grip = state.cloth_system.grip.data();
+  count.obstacles += uint64_t(parallel_reduce(
+      state.queue, "cloth: count held", state.cloth.vertices, 0,
+      DRENCH_LAMBDA(int i) { return int(grip[i] >= 0); }, Plus{}));
+  return count;
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

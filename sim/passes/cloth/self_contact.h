@@ -14,6 +14,7 @@
 //
 // What the solve leaves is no proof: guard_sheets, last of all, stops vertices short of crossing.
 
+#include "sim/cloth_contacts.h"
 #include "sim/passes/cloth/self_contact_pairs.h"
 
 namespace drench::sim::DRENCH_BACKEND {
@@ -86,6 +87,9 @@ void start_sheet_rows(State& state);
 /// Lets go the rows that pull by the solve that was made, takes in what came too near, and finds
 /// who sticks and who slides; the right sides follow. Whether anything changed.
 bool revise_sheet_rows(State& state, int round);
+
+/// Rows that bear, and vertices that obstacles hold.
+ClothContacts count_cloth_contacts(const State& state);
 
 /// Stops the vertices on their way to ClothState::next where they would take sheets through each
 /// other. What stops has the velocity that it came with.
