@@ -252,9 +252,7 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"lost", "m/s", Group::shell_history, vertices, kept}, s.lost, &H::shell_lost);
   visit({"shell.acceleration", "m/s^2", Group::shell_history, vertices, kept}, s.acceleration,
         &H::shell_acceleration);
-  visit({"friction", "N", Group::shell_history, vertices,
-         s.friction.x.size() > 0 ? kept : Use::rebuilt},
-        s.friction, &H::shell_friction);
+  visit({"friction", "N", Group::shell_history, vertices, kept}, s.friction, &H::shell_friction);
   visit({"internal", "N", Group::shell_history, vertices, kept}, s.internal, &H::shell_internal);
   visit({"area", "m^2", Group::cloth_fixed}, s.area, none);
   visit({"shell.gradient", "1/m", Group::cloth_fixed}, s.gradient, none);

@@ -154,7 +154,7 @@ struct ShellState {
   VecColumn left;      // m/s, the velocity that it was left with
   VecColumn lost;      // m/s, what that velocity lacks
   VecColumn acceleration;  // m/s^2, over that step
-  VecColumn friction;      // N, of the obstacle that it slid on over it. Only with obstacles
+  VecColumn friction;      // N, of the obstacle that it slid on over it
   VecColumn internal;      // N, of the sheet on the vertex, as it acted over that step
   double dt = 0;           // s, of it; 0: there is none
   // fixed; triangles by fields of `triangles`, padded to a multiple of eight
@@ -292,6 +292,7 @@ struct SelfContact {
   bool any = false;     // sheets take part, or triangles meet obstacles
   float thickness = 0;  // m, of the thickest pair
   float edge = 0;       // m, mean
+  float stopped = 0;    // m, the most that the guard took off a vertex' way in the step
   float slack = 0;      // m, that a vertex may end off the path that the pairs were found for
   int pairs = 0, rows = 0;
   // fixed
