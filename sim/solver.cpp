@@ -466,6 +466,7 @@ class BackendSolver : public Solver {
     std::vector<int> seams(size_t(c.vertices), 0);  // springs of seams have slots of their own
     for (const SeamSpring& s : t.seam) ++seams[size_t(s.a)], ++seams[size_t(s.b)];
     c.spring_slots = busiest + (t.seam.empty() ? 0 : *std::max_element(seams.begin(), seams.end()));
+    c.first_seam_slot = busiest;
     offset.resize(size_t(c.spring_slots), 0);
     const size_t size = size_t(c.spring_slots) * c.padded;
     std::vector<int> end(size);

@@ -74,6 +74,7 @@ struct ClothState {
   Column<float> mass, inverse_mass;  // kg; inverse 0 where pinned
   Column<float> damping_rate;        // 1/s
   int padded = 0, spring_slots = 0;  // vertices up to a multiple of 8; springs of the busiest one
+  int first_seam_slot = 0;           // of spring_slots, those of seams are the last
   Column<int> spring_end;            // other vertex, slot s of vertex i at s padded + i
   Column<int> slot_offset;  // other vertex - vertex, where it is the same all over a slot; else 0
   Column<float> rest_length, stiffness, spring_damping;  // m, N/m, N s/m

@@ -89,7 +89,7 @@ void linearise_cloth(State& state) {
   const float* shell_diagonal = state.shell.diagonal.data();
   const float* anchor = s.anchor.data();
   const ConstVecView anchor_pull = s.anchor_pull.view();
-  const int padded = c.padded;
+  const int padded = c.padded, seams = c.first_seam_slot;
   ClothControl* control = s.control.data();
   parallel_for(
       state.queue, "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
@@ -114,9 +114,15 @@ void linearise_cloth(State& state) {
           const Vec3<T> away = straight - ends.at_end(path, i, k);
           force = force + n * (load(stiffness, at) * excess);
           held = held + away * t + e * dot(e, away);
-          store(tension, at, t), axis.put(at, e);
-          b[0] = b[0] + t + e.x * e.x, b[1] = b[1] + e.x * e.y, b[2] = b[2] + e.x * e.z;
-          b[3] = b[3] + t + e.y * e.y, b[4] = b[4] + e.y * e.z, b[5] = b[5] + t + e.z * e.z;
+          // A seam is shorter than a step's way, on which it may turn: off its path it holds its
+          // ends together in all directions.
+          const bool seam = k >= seams;
+          const T side = seam ? maximum(stiff, t) : t;
+          const Vec3<T> along = seam ? n * square_root(load(damping, at) * T(dt)) : e;
+          store(tension, at, side), axis.put(at, along);
+          b[0] = b[0] + side + along.x * along.x, b[1] = b[1] + along.x * along.y;
+          b[2] = b[2] + along.x * along.z, b[3] = b[3] + side + along.y * along.y;
+          b[4] = b[4] + along.y * along.z, b[5] = b[5] + side + along.z * along.z;
         }
         if (air.on) {
           const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);

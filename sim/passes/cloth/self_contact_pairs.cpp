@@ -138,8 +138,12 @@ struct PairSearch {
     if (apart_along_middles(edges, x, reach)) return;
     const float nearer = approach_of_pieces(edges, way) + 2.f * slack,
                 distance = length(distance_of_pieces(edges, x).apart);
-    if (distance > a.half_thickness + d.half_thickness + nearer) return;
-    if (distance <= pieces.thickness(pair) + nearer && !pieces.sewn(pair)) visit(pair);
+    const float whole = a.half_thickness + d.half_thickness;
+    if (distance > whole + nearer) return;
+    // What a needle's width joins are neighbours, as what shares a vertex.
+    const float keeps = pieces.thickness(pair);
+    if (keeps < 0.01f * whole) return;
+    if (distance <= keeps + nearer && !pieces.sewn(pair)) visit(pair);
   }
 };
 
