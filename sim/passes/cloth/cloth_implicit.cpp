@@ -64,6 +64,49 @@ void cloth_predict(State& state) {
       DRENCH_LAMBDA(int i) { predicted.set(i, (to[i] - from[i]) * inverse_dt); });
 }
 
+namespace {
+
+/// Springs where the step starts, by vertices.
+struct LinearSprings {
+  SpringEnds ends;
+  ConstVecView position, path;
+  const float *rest, *stiffness, *damping;
+  float* tension;
+  VecView axis;
+  float dt;
+  int seams;  // the first slot of theirs
+
+  /// Adds the springs of a vertex to its block, its force, and what they have of the paths, and
+  /// notes their part of A.
+  template <class Index, class T>
+  DRENCH_HD void add(Index i, Vec3<T> straight, Vec3<T>& force, Vec3<T>& held, T (&b)[6]) const {
+    const Vec3<T> here = position.at(i);
+    for (int k = 0; k < ends.slots; ++k) {
+      const auto at = i + k * ends.stride;
+      const Vec3<T> d = ends.to_end(position, here, i, k);
+      const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
+      const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
+      // A spring of no rest length pulls along all axes, wherever its ends are.
+      const T t = stiff * select(load(rest, at) > T(0.f), max0(excess * inverse), T(1.f));
+      const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
+      const Vec3<T> away = straight - ends.at_end(path, i, k);
+      force = force + n * (load(stiffness, at) * excess);
+      held = held + away * t + e * dot(e, away);
+      // A seam is shorter than a step's way, on which it may turn: off its path it holds its ends
+      // together in all directions.
+      const bool seam = k >= seams;
+      const T side = seam ? maximum(stiff, t) : t;
+      const Vec3<T> along = seam ? n * square_root(load(damping, at) * T(dt)) : e;
+      store(tension, at, side), axis.put(at, along);
+      b[0] = b[0] + side + along.x * along.x, b[1] = b[1] + along.x * along.y;
+      b[2] = b[2] + along.x * along.z, b[3] = b[3] + side + along.y * along.y;
+      b[4] = b[4] + along.y * along.z, b[5] = b[5] + side + along.z * along.z;
+    }
+  }
+};
+
+}  // namespace
+
 void linearise_cloth(State& state) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
@@ -72,14 +115,21 @@ void linearise_cloth(State& state) {
   const bool anchored = state.pins.soft;
   if (anchored) find_anchors(state);
   const ConstVecView x = c.position.view(), v = c.velocity.view(), path = path_velocity_of(state);
-  const VecView axis = s.axis.view(), base = s.base.view(), free = s.free.view(),
-                change = s.change.view();
+  const VecView base = s.base.view(), free = s.free.view(), change = s.change.view();
   const ConstVecView owed = c.force.view();
-  const SpringEnds ends = spring_ends_of(c);
-  const float *rest = c.rest_length.data(), *stiffness = c.stiffness.data(),
-              *damping = c.spring_damping.data(), *mass = c.mass.data(),
-              *rate = c.damping_rate.data(), *inverse_mass = c.inverse_mass.data();
-  float *tension = s.tension.data(), *inertia = s.inertia.data();
+  const LinearSprings springs{.ends = spring_ends_of(c),
+                              .position = x,
+                              .path = path,
+                              .rest = c.rest_length.data(),
+                              .stiffness = c.stiffness.data(),
+                              .damping = c.spring_damping.data(),
+                              .tension = s.tension.data(),
+                              .axis = s.axis.view(),
+                              .dt = dt,
+                              .seams = c.first_seam_slot};
+  const float *mass = c.mass.data(), *rate = c.damping_rate.data(),
+              *inverse_mass = c.inverse_mass.data();
+  float* inertia = s.inertia.data();
   const BlockInverse block = block_inverse(state);
   const Vec3<float> g{p.gravity[0], p.gravity[1], p.gravity[2]};
   const AirDrag air = air_drag_of(state);
@@ -89,41 +139,20 @@ void linearise_cloth(State& state) {
   const float* shell_diagonal = state.shell.diagonal.data();
   const float* anchor = s.anchor.data();
   const ConstVecView anchor_pull = s.anchor_pull.view();
-  const int padded = c.padded, seams = c.first_seam_slot;
+  const int padded = c.padded;
   ClothControl* control = s.control.data();
   parallel_for(
       state.queue, "cloth: control", 1, DRENCH_LAMBDA(int) { *control = {}; });
   for_each_lane(
       state.queue, "cloth: linearise", c.vertices, DRENCH_LAMBDA(auto i) {
         using T = decltype(load(mass, i));
-        const Vec3<T> here = x.at(i), speed = v.at(i), straight = path.at(i),
-                      none{T(0.f), T(0.f), T(0.f)};
+        const Vec3<T> speed = v.at(i), straight = path.at(i), none{T(0.f), T(0.f), T(0.f)};
         const T m = load(mass, i), heavy = m * (T(1.f) + T(dt) * load(rate, i));
         Vec3<T> force =
             Vec3<T>{T(g.x), T(g.y), T(g.z)} * m + owed.at(i) - speed * (m * load(rate, i));
         T b[6] = {heavy, T(0.f), T(0.f), heavy, T(0.f), heavy};
         Vec3<T> held = none;
-        for (int k = 0; k < ends.slots; ++k) {
-          const auto at = i + k * ends.stride;
-          const Vec3<T> d = ends.to_end(x, here, i, k);
-          const T l = square_root(length2(d)), inverse = T(1.f) / maximum(l, T(1e-12f));
-          const T stiff = load(stiffness, at) * T(dt * dt), excess = l - load(rest, at);
-          // A spring of no rest length pulls along all axes, wherever its ends are.
-          const T t = stiff * select(load(rest, at) > T(0.f), max0(excess * inverse), T(1.f));
-          const Vec3<T> n = d * inverse, e = n * square_root(stiff + load(damping, at) * T(dt) - t);
-          const Vec3<T> away = straight - ends.at_end(path, i, k);
-          force = force + n * (load(stiffness, at) * excess);
-          held = held + away * t + e * dot(e, away);
-          // A seam is shorter than a step's way, on which it may turn: off its path it holds its
-          // ends together in all directions.
-          const bool seam = k >= seams;
-          const T side = seam ? maximum(stiff, t) : t;
-          const Vec3<T> along = seam ? n * square_root(load(damping, at) * T(dt)) : e;
-          store(tension, at, side), axis.put(at, along);
-          b[0] = b[0] + side + along.x * along.x, b[1] = b[1] + along.x * along.y;
-          b[2] = b[2] + along.x * along.z, b[3] = b[3] + side + along.y * along.y;
-          b[4] = b[4] + along.y * along.z, b[5] = b[5] + side + along.z * along.z;
-        }
+        springs.add(i, straight, force, held, b);
         if (air.on) {
           const Vec3<T> d = air.diagonal.at(i) * T(dt), m = air.cross.at(i) * T(dt);
           force = force + air_push.at(i);
