@@ -220,18 +220,17 @@ void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& rig
   const ConstraintProjection constraints = constraint_projection(state);
   const ClothMatrix matrix = cloth_matrix(state);
   ClothControl* control = state.cloth_system.control.data();
-  const SheetVertex* vertex = state.self_contact.vertex.data();
   for (const VertexRange& sheet : state.cloth.loose) {
     const int first = sheet.first;
     reduce_then(
         state.queue, "cloth: lack", sheet.count, ClothImbalance{},
         DRENCH_LAMBDA(int k) {
           const int i = first + k;
-          const Vec3<float> left = right[i] - matrix.times(w, i), free = constraints.axis[i];
+          const Vec3<float> left = right[i] - matrix.outer(w, i), free = constraints.axis[i];
           const double gripped =
               constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
           const double met =
-              matrix.contact.any && matrix.contact.touches_another(i, vertex) ? 1. : 0.;
+              matrix.contact.any && matrix.contact.touches_beyond(i, sheet) ? 1. : 0.;
           return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
                                 3. - free.x - free.y - free.z + gripped + met};
         },
@@ -406,7 +405,8 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
     reached = tolerance.between;
     solve_cloth(state, change, right, most_iterations, reached);
   }
-  if (reached > tolerance.last) solve_cloth(state, change, right, most_iterations, tolerance.last);
+  const float last = at_obstacles(state) ? tolerance.held : tolerance.last;
+  if (reached > last) solve_cloth(state, change, right, most_iterations, last);
 }
 
 void finish_at_obstacles(State& state, const ConstVecView& given) {

@@ -77,14 +77,22 @@ struct ClothMatrix {
     if (constraints.shells) y = y + constraints.clung(i, view.at(i));
     return constraints.project(i, y);
   }
-  /// On all axes: less the right side it is what holds a vertex.
+  /// What does not act between vertices: the rest of the rows sums up to nothing.
   template <class Index>
-  DRENCH_HD auto whole(const ConstVecView& view, Index i) const {
+  DRENCH_HD auto outer(const ConstVecView& view, Index i) const {
     using T = decltype(load(inertia, i));
     const Vec3<T> x = view.at(i);
     Vec3<T> y = x * load(inertia, i);
     if (air.on) y = y + air.times(i, x) * T(dt);
     if (anchored) y = y + x * load(anchor, i);
+    return y;
+  }
+  /// On all axes: less the right side it is what holds a vertex.
+  template <class Index>
+  DRENCH_HD auto whole(const ConstVecView& view, Index i) const {
+    using T = decltype(load(inertia, i));
+    const Vec3<T> x = view.at(i);
+    Vec3<T> y = outer(view, i);
     for (int s = 0; s < ends.slots; ++s) {
       const auto at = i + s * ends.stride;
       const Vec3<T> d = x - ends.at_end(view, i, s), e = axis.at(at);

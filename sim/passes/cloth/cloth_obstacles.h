@@ -280,9 +280,9 @@ struct HoldRevision {
 };
 
 /// Tolerances of the first solve of a step, of those between which contacts change, and of the
-/// last, which is made where the one before it was to a larger one.
+/// last, which is made where the one before it was to a larger one: also where obstacles hold.
 struct ContactTolerances {
-  float first, between, last;
+  float first, between, last, held;
 };
 
 /// Solves for the sheets, with friction and with other vertices and pairs of sheets held

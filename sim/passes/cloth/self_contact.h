@@ -64,12 +64,13 @@ struct SheetRows {
       if (row[entry[e] >> 2].stiffness > 0.f) return true;
     return false;
   }
-  /// Whether another sheet or an obstacle does: a shift of the whole meets resistance.
-  DRENCH_HD bool touches_another(int i, const SheetVertex* vertex) const {
+  /// Whether an obstacle or a vertex beyond a range does: a shift of all of it meets resistance.
+  DRENCH_HD bool touches_beyond(int i, VertexRange range) const {
     for (int e = start[i]; e < start[i + 1]; ++e) {
       const SheetRow& r = row[entry[e] >> 2];
       if (r.stiffness == 0.f) continue;
-      if (r.obstacle >= 0 || vertex[r.vertex[0]].sheet != vertex[r.vertex[3]].sheet) return true;
+      if (r.obstacle >= 0 || !range.contains(r.vertex[0]) || !range.contains(r.vertex[3]))
+        return true;
     }
     return false;
   }
@@ -92,7 +93,7 @@ bool revise_sheet_rows(State& state, int round);
 ClothContacts count_cloth_contacts(const State& state);
 
 /// Stops the vertices on their way to ClothState::next where they would take sheets through each
-/// other. What stops has the velocity that it came with.
+/// other. What stops has the velocity of the way that is left to it.
 void guard_sheets(State& state);
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -144,7 +144,7 @@ void stop_vertices(State& state, Stop how) {
       state.queue, "self: stop", state.cloth.vertices, DRENCH_LAMBDA(int v) { stop(v); });
 }
 
-/// Without rebound. The most that was taken off a vertex' way, m.
+/// Without rebound. The most that sheets took off a vertex' way, m.
 float give_stopped_velocities(State& state) {
   ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), next = c.next.view();
@@ -158,10 +158,10 @@ float give_stopped_velocities(State& state) {
       DRENCH_LAMBDA(int v) {
         if (portion[v] == 1.f) return 0.f;
         const Vec3<float> u = (next[v] - x[v]) * inverse_dt;
-        if (stops.any && stops.carrier[v] >= 0)
-          stops.hold.react(stops.carrier[v], (u - velocity[v]) * mass[v]);
+        const bool by_obstacle = stops.any && stops.carrier[v] >= 0;
+        if (by_obstacle) stops.hold.react(stops.carrier[v], (u - velocity[v]) * mass[v]);
         velocity.set(v, u), predicted.set(v, u);
-        return length(wanted[v] - next[v]);
+        return by_obstacle ? 0.f : length(wanted[v] - next[v]);
       },
       Larger{});
 }

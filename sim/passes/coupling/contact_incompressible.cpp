@@ -257,11 +257,11 @@ void settle_cloth(State& state) {
     prepare_cloth_alone(state, given);
   }
   const bool loosely = shells && anything_touches(state);
-  // No shift of the whole closes the momentum of springs that are held: to a tenth.
   settle_contacts(state, given, last_sweeps,
                   {.first = loosely ? contact_tolerance : last_tolerance,
-                   .between = shells ? contact_tolerance : 0.1f * last_tolerance,
-                   .last = last_tolerance});
+                   .between = shells ? contact_tolerance : held_tolerance,
+                   .last = last_tolerance,
+                   .held = shells ? held_tolerance : last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 
