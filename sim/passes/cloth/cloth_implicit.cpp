@@ -399,13 +399,13 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
     if (sheets) changed |= revise_sheet_rows(state, round);
     if (!changed && !at_walls) break;
     ClothLevels& levels = state.cloth_levels;
-    if (levels.on) levels.on = !at_obstacles(state);
+    if (levels.on) levels.on = !anything_touches(state);
     // Blocks that do not know what walls hold now would correct far too much.
     if (levels.on && at_walls) build_cloth_levels(state);
     reached = tolerance.between;
     solve_cloth(state, change, right, most_iterations, reached);
   }
-  const float last = at_obstacles(state) ? tolerance.held : tolerance.last;
+  const float last = obstacles && anything_touches(state) ? tolerance.held : tolerance.last;
   if (reached > last) solve_cloth(state, change, right, most_iterations, last);
 }
 

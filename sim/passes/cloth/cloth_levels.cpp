@@ -73,8 +73,7 @@ struct LinkSums {
 /// level: first in all, then what two vertices have that no finer level had in one aggregate.
 struct LeafEnergies {
   ClothMatrix matrix;
-  const SheetRow* row;
-  const int *row_start, *row_entry, *leaf, *leaf_vertex, *reach;
+  const int *leaf, *leaf_vertex, *reach;
   ConstVecView rest, centre;
   const float* leaf_weight;
   double* partial;
@@ -98,24 +97,6 @@ struct LeafEnergies {
     if (at < level) return;
     const Vec3<float> d = rest[i] - rest[j];
     to.within.add({d.x, d.y, d.z}, half);  // it comes from both
-  }
-  /// What a row may have in any round of the step. Blocks that lack what a round takes in correct
-  /// far too much: a light sheet on another is thrown.
-  static DRENCH_HD float most_stiffness(const SheetRow& r) {
-    return maximum(r.stiffness, row_stiffness * r.mass);
-  }
-  /// The row's energy once, by the first of its vertices in the aggregate.
-  DRENCH_HD void add_row(int a, const SheetRow& r, int corner, Energies<functions>& all) const {
-    float sum[functions] = {};
-    for (int k = 0; k < 4; ++k) {
-      const int v = r.vertex[k];
-      if (!moves(v) || common_level(a, leaf[v]) > level) continue;
-      if (k < corner) return;
-      const Vec3<float> x = from_centre(a, v) * r.weight[k];
-      sum[0] += r.weight[k], sum[1] += x.x, sum[2] += x.y, sum[3] += x.z;
-    }
-    const float normal = most_stiffness(r), across = r.friction > 0.f ? row_grip * r.mass : 0.f;
-    all.add(sum, Symmetric3::of(across) + Symmetric3::of(r.normal, normal - across));
   }
   DRENCH_HD void add_shell(int a, int i, LinkSums& to) const {
     const ShellRows& rows = matrix.shell.rows;
@@ -146,24 +127,13 @@ struct LeafEnergies {
       add_link(a, i, matrix.ends.end[at], k, k.scaled(0.5f), to);
     }
   }
-  /// At most what rows make of a way that one of their vertices goes and the others do not. What a
-  /// wall takes from an affine function at a vertex is such a way.
-  DRENCH_HD float rows_at(int i) const {
-    float sum = 0.f;
-    if (!matrix.contact.any) return sum;
-    for (int e = row_start[i]; e < row_start[i + 1]; ++e) {
-      const SheetRow& r = row[row_entry[e] >> 2];
-      sum += 4.f * most_stiffness(r) * fabsf(r.weight[row_entry[e] & 3]);
-    }
-    return sum;
-  }
   /// What holds a vertex that moves, beside neighbours that do.
   /// @param neighbours  what all of them do
   DRENCH_HD Symmetric3 own(int i, float neighbours) const {
     const Vec3<float> free = matrix.constraints.axis[i];
     Symmetric3 k = Symmetric3::of(matrix.inertia[i]);
     if (free.x * free.y * free.z == 0.f) {
-      const float stiff = 2.f * neighbours + rows_at(i);
+      const float stiff = 2.f * neighbours;
       k.entry[0] += (1.f - free.x) * stiff, k.entry[3] += (1.f - free.y) * stiff;
       k.entry[5] += (1.f - free.z) * stiff;
     }
@@ -195,9 +165,6 @@ struct LeafEnergies {
       const int at = ClothLevels::slot(a, k), i = leaf_vertex[at];
       if (leaf_weight[at] == 0.f || !moves(i)) continue;
       add_vertex(a, i, sum);
-      if (!matrix.contact.any) continue;
-      for (int e = row_start[i]; e < row_start[i + 1]; ++e)
-        add_row(a, row[row_entry[e] >> 2], row_entry[e] & 3, sum.all);
     }
     double* to = partial + size_t(sums) * a;
     sum.all.put(to), sum.within.put(to + sums_of_all);
@@ -419,31 +386,28 @@ constexpr int small_level = 256;
 
 }  // namespace
 
-bool at_obstacles(const State& state) {
-  if (state.parameters.obstacles == 0) return false;
-  const SheetRow* row = state.self_contact.row.data();
+bool anything_touches(const State& state) {
+  const SheetRows rows = sheet_rows_of(state);
+  const bool obstacles = state.parameters.obstacles > 0;
+  if (!rows.any && !obstacles) return false;
   const int* grip = state.cloth_system.grip.data();
-  const bool held = parallel_reduce(
-                        state.queue, "cloth: held", state.cloth.vertices, 0,
-                        DRENCH_LAMBDA(int i) { return int(grip[i] >= 0); }, Larger{}) > 0;
-  return held || parallel_reduce(
-                     state.queue, "self: at obstacles", state.self_contact.rows, 0,
-                     DRENCH_LAMBDA(int k) { return int(row[k].obstacle >= 0); }, Larger{}) > 0;
+  return parallel_reduce(
+             state.queue, "cloth: touching", state.cloth.vertices, 0,
+             DRENCH_LAMBDA(int i) {
+               return int((obstacles && grip[i] >= 0) || (rows.any && rows.touches(i)));
+             },
+             Larger{}) > 0;
 }
 
 void build_cloth_levels(State& state) {
   ClothLevels& s = state.cloth_levels;
-  s.on = s.levels > 0 && !at_obstacles(state);
+  s.on = s.levels > 0 && !anything_touches(state);
   if (!s.on) return;
-  const SelfContact& c = state.self_contact;
   const int stride = s.aggregates;
   double *partial = s.partial.data(), *strain = s.strain.data();
   float* inverse = s.inverse.data();
   for (int l = 0; l < s.levels; ++l) {
     const LeafEnergies leaves{.matrix = cloth_matrix(state),
-                              .row = c.row.data(),
-                              .row_start = c.start.data(),
-                              .row_entry = c.entry.data(),
                               .leaf = s.leaf.data(),
                               .leaf_vertex = s.leaf_vertex.data(),
                               .reach = s.reach.data(),

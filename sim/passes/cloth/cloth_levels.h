@@ -42,13 +42,13 @@ DRENCH_HD int common_level(int a, int b) {
 /// Aggregates of all sheets; none without shells.
 void load_cloth_levels(State& state, const ClothTopology& cloth);
 
-/// Blocks of the levels, for the rows and walls that there are. Where obstacles hold a sheet the
-/// levels take no part: who is held there changes from round to round, and blocks made anew for
-/// each cost more than they save.
+/// Blocks of the levels, for the walls that there are. Where sheets touch each other or an obstacle
+/// the levels take no part: who touches changes from round to round, blocks made anew for each cost
+/// more than they save, and others correct far too much.
 void build_cloth_levels(State& state);
 
-/// Whether obstacles hold vertices, or have rows of triangles.
-bool at_obstacles(const State& state);
+/// Whether obstacles or rows of sheets hold any vertex, as far as known.
+bool anything_touches(const State& state);
 
 /// Adds to ClothSystem::scaled what the levels make of ClothSystem::residual, unless the solve has
 /// ended.

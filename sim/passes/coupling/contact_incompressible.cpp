@@ -216,20 +216,6 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
 
 namespace {
 
-/// Whether obstacles or rows of sheets hold any vertex, as far as known before the solve.
-bool anything_touches(const State& state) {
-  const SheetRows rows = sheet_rows_of(state);
-  const bool obstacles = state.parameters.obstacles > 0;
-  if (!rows.any && !obstacles) return false;
-  const int* grip = state.cloth_system.grip.data();
-  return parallel_reduce(
-             state.queue, "cloth: touching", state.cloth.vertices, 0,
-             DRENCH_LAMBDA(int i) {
-               return int((obstacles && grip[i] >= 0) || (rows.any && rows.touches(i)));
-             },
-             Larger{}) > 0;
-}
-
 /// As start_cloth, where no fluid is near.
 void prepare_cloth_alone(State& state, const ConstVecView& given) {
   ClothSystem& s = state.cloth_system;
