@@ -96,7 +96,6 @@ struct Limits {
   float residual = 0;          // mean density error that the pressure solve left, over rest
   int iterations = 0;          // of the pressure solve
   int sheet_sweeps = 0;        // of the conjugate gradients of the sheets
-  float sheets_stopped = 0;    // of an edge, the most that sheets took off a vertex' way
   int sheets_cut_short = 0;    // 1: these were too few for their tolerance at the end of the step
   float viscous_residual = 0;  // RMS that a viscous solve cut short left, over that of the velocity
   int viscous_iterations = 0;  // of the viscous solve

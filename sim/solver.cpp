@@ -162,9 +162,6 @@ class BackendSolver : public Solver {
       const ClothControl sheets = value_at(state_.cloth_system.control, 0);
       limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
     }
-    if (state_.shell.any) limits.step = float(dt);
-    if (state_.self_contact.any)
-      limits.sheets_stopped = state_.self_contact.stopped / state_.self_contact.edge;
     if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
       const ViscousControl solve = value_at(state_.viscosity.control, 0);
       limits.viscous_residual = solve.converged ? 0.f : solve.residual;

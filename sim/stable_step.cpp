@@ -27,10 +27,6 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
       // back than the warm start bears.
       if (limits.iterations >= p.most_iterations)
         consider(std::max(0.5 * limits.step, 0.1 * ruling.dt), "iterations");
-      // What contact stops while its neighbours go on is strain that nothing has paid for, and is
-      // thrown: shorter steps meet what comes with forces.
-      if (limits.sheets_stopped > 0.01f)
-        consider(std::max(0.5 * limits.step, 0.05 * ruling.dt), "contact");
       consider(1.25 * limits.step, "growth");
       // The solve takes the places of neighbours as they are; moved by what pressures push, they
       // answer like springs of frequency sqrt(p / rho) / a and more, which long steps excite: 40

@@ -11,8 +11,7 @@ namespace drench::sim {
 /// a step follows the one before: half of it when its solve was cut short, 0.43 spacings over
 /// sqrt(p / rho) of the pressure it found; surface tension 0.25
 /// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none. Implicit sheets alone
-/// keep to the two of speed and gravity; shells halve a step after one in which sheets took a
-/// hundredth of an edge off a vertex' way.
+/// keep to the two of speed and gravity.
 struct StepLimit {
   double dt;
   const char* name;

@@ -293,7 +293,6 @@ struct SelfContact {
   bool any = false;     // sheets take part, or triangles meet obstacles
   float thickness = 0;  // m, of the thickest pair
   float edge = 0;       // m, mean
-  float stopped = 0;    // m, the most that sheets took off a vertex' way in the step
   float slack = 0;      // m, that a vertex may end off the path that the pairs were found for
   int pairs = 0, rows = 0;
   // fixed

@@ -77,7 +77,7 @@ struct ClothMatrix {
     if (constraints.shells) y = y + constraints.clung(i, view.at(i));
     return constraints.project(i, y);
   }
-  /// What does not act between vertices: the rest of the rows sums up to nothing.
+  /// What does not act between vertices. The rest of the rows sums up to nothing.
   template <class Index>
   DRENCH_HD auto outer(const ConstVecView& view, Index i) const {
     using T = decltype(load(inertia, i));

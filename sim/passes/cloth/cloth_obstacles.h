@@ -279,10 +279,9 @@ struct HoldRevision {
   DRENCH_HD static Vec3<float> across(Vec3<float> v, Vec3<float> n) { return v - n * dot(v, n); }
 };
 
-/// Tolerances of the first solve of a step, of those between which contacts change, and of the
-/// last, which is made where the one before it was to a larger one: also where obstacles hold.
+/// Tolerances of the first solve of a step, and of those after contacts changed.
 struct ContactTolerances {
-  float first, between, last, held;
+  float first, between;
 };
 
 /// Solves for the sheets, with friction and with other vertices and pairs of sheets held

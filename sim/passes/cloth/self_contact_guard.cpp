@@ -144,26 +144,22 @@ void stop_vertices(State& state, Stop how) {
       state.queue, "self: stop", state.cloth.vertices, DRENCH_LAMBDA(int v) { stop(v); });
 }
 
-/// Without rebound. The most that sheets took off a vertex' way, m.
-float give_stopped_velocities(State& state) {
+/// Without rebound.
+void give_stopped_velocities(State& state) {
   ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), next = c.next.view();
   const VecView velocity = c.next_velocity.view(), predicted = c.predicted.view();
-  const ConstVecView wanted = state.self_contact.wanted.view();
   const float *portion = state.self_contact.portion.data(), inverse_dt = 1.f / float(state.dt);
   const TriangleStops stops = triangle_stops_of(state);
   const float* mass = c.mass.data();
-  return parallel_reduce(
-      state.queue, "self: stopped velocities", c.vertices, 0.f,
-      DRENCH_LAMBDA(int v) {
-        if (portion[v] == 1.f) return 0.f;
+  parallel_for(
+      state.queue, "self: stopped velocities", c.vertices, DRENCH_LAMBDA(int v) {
+        if (portion[v] == 1.f) return;
         const Vec3<float> u = (next[v] - x[v]) * inverse_dt;
-        const bool by_obstacle = stops.any && stops.carrier[v] >= 0;
-        if (by_obstacle) stops.hold.react(stops.carrier[v], (u - velocity[v]) * mass[v]);
+        if (stops.any && stops.carrier[v] >= 0)
+          stops.hold.react(stops.carrier[v], (u - velocity[v]) * mass[v]);
         velocity.set(v, u), predicted.set(v, u);
-        return by_obstacle ? 0.f : length(wanted[v] - next[v]);
-      },
-      Larger{});
+      });
 }
 
 void find_pairs_of_paths(State& state) {
@@ -179,7 +175,6 @@ void find_pairs_of_paths(State& state) {
 }  // namespace
 
 void guard_sheets(State& state) {
-  state.self_contact.stopped = 0;
   if (!state.self_contact.any) return;
   constexpr int rounds_at_part = 8, rounds = 16;
   int round = 0;
@@ -195,7 +190,7 @@ void guard_sheets(State& state) {
                                                 : Stop::at_base);
     if (round == rounds) break;
   }
-  if (round > 0) state.self_contact.stopped = give_stopped_velocities(state);
+  if (round > 0) give_stopped_velocities(state);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -21,11 +21,6 @@ namespace drench::sim::DRENCH_BACKEND {
 /// momentum of those that nothing holds is whole (balance_loose_cloth).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
-/// Of the solves of shells between which contacts are found and let go, before the last one: at
-/// 1e-2 friction holds what slides.
-constexpr float contact_tolerance = 1e-3f;
-/// Where obstacles hold sheets: no shift of the whole closes the momentum.
-constexpr float held_tolerance = 0.05f * last_tolerance;
 
 /// Rows of the near list as the pressure solve has them.
 struct ClothRows : ContactRows {
