@@ -177,8 +177,13 @@ Opened opened_gate(double a) {
 // x. The measured gate stays open where this one follows the water as it sinks, as linear sheets
 // without leaks at their sides do; of 10 MPa x is 18 % off.
 TEST(ShellInWater, AGateOpensAsMeasured) {
-  const Opened coarse = opened_gate(8e-3), fine = opened_gate(5e-3);
-  EXPECT_LT(coarse.x, 0.18);
+  Opened coarse;
+  for (const double a : {7.97e-3, 7.99e-3, 8e-3, 8.01e-3, 8.03e-3}) {
+    const Opened one = opened_gate(a);
+    coarse.x += one.x / 5, coarse.y += one.y / 5;
+  }
+  const Opened fine = opened_gate(5e-3);
+  EXPECT_LT(coarse.x, 0.16);
   EXPECT_LT(coarse.y, 0.12);
   EXPECT_LT(fine.x, 0.12);
   EXPECT_LT(fine.y, 0.12);
