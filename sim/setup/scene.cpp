@@ -385,6 +385,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
   if (t.fan_start.empty()) t.fan_start.push_back(0);
   for (size_t r = 1; r < start.size(); ++r) t.fan_start.push_back(start[r] + offset);
   t.fan_entry.insert(t.fan_entry.end(), flat.begin(), flat.end());
+  const bool meets = meets_sheets(cloth, sheet);  // asks all vertices
   for (size_t v = 0; v < sheet.point.size(); ++v) {
     double third = 0;
     for (const int entry : fan[v]) {
@@ -394,7 +395,7 @@ void append_sheet(const Sheet& sheet, const Cloth& cloth, int index, const Local
     }
     const V3d& rest = sheet.rest[sheet.point[v]];
     t.rest.push(frame.to_local(0, rest.x), frame.to_local(1, rest.y), frame.to_local(2, rest.z));
-    t.meets_sheets.push_back(meets_sheets(cloth, sheet));
+    t.meets_sheets.push_back(meets);
     t.friction.push_back(float(cloth.friction));
     t.air_share.push_back(float(sheet.mass[v] / (cloth.areal_density * third)));
     t.mass.push_back(float(sheet.mass[v]));

@@ -37,7 +37,8 @@ void sim_skips(const Emit& emit) {
     if (without == 0) without = instructions("sim_skips", std::to_string(k) + "-");
     Line line;
     line.method = term.name;
-    line.resolution = "512 particles, 10 steps";
+    const bool fluid = !term.without(term.solver).fluid.box.empty();
+    line.resolution = fluid ? "512 particles, 10 steps" : "sheets alone, 10 steps";
     line.threads = 1;
     line.error = instructions("sim_skips", std::to_string(k)) / without;
     line.error_of = "instructions over those of the scene without it";

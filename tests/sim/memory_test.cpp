@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <string>
+
 #include "tests/sim/support.h"
 
 namespace drench::sim_tests {
@@ -55,6 +57,20 @@ TEST(Memory, OfFluidAloneIsThatOfItsColumns) {
   // sixteenth to grow, and what threads leave of the pieces they take.
   EXPECT_LT(lists / (30 * 30 * 30), 1.1 * (5 * 36 + 8));
 }
+
+/// Bytes that the solver tells of so many shells of 2 x 2 cells.
+double of_shells(int count) {
+  Shot shot = empty_shot();
+  for (int k = 0; k < count; ++k) {
+    Cloth& sheet = add_sheet(shot, 0.1, 0.01 * k, 2);
+    sheet.name = "sheet" + std::to_string(k);
+    sheet.model = ClothModel::shell;
+  }
+  return sum(Stepper(shot).solver->memory());
+}
+
+// Aggregates of the coarse levels of one sheet begin where those of the ones before end.
+TEST(Memory, OfManyShellsIsThatOfEach) { EXPECT_LT(of_shells(16), 1.2 * 4 * of_shells(4)); }
 
 }  // namespace
 }  // namespace drench::sim_tests

@@ -33,7 +33,45 @@ Shot on_shell(FluidSolver solver) {
   shot.cloth[0].model = ClothModel::shell;
   return shot;
 }
+void bend(Shot& shot, double rigidity) {
+  for (Cloth& sheet : shot.cloth) sheet.bend_warp = sheet.bend_weft = sheet.bend_bias = rigidity;
+}
+/// The same above a shell that stretches and does nothing else.
+Shot on_bare_shell(FluidSolver solver) {
+  Shot shot = on_shell(solver);
+  Cloth& sheet = shot.cloth[0];
+  sheet.damping_time = 0, sheet.stretch_limit = 100, sheet.self_collision = false;
+  bend(shot, 0);
+  return shot;
+}
+/// Above a bare shell and a second one below it, within reach, that goes through it.
+Shot on_two_shells(FluidSolver solver) {
+  Shot shot = on_bare_shell(solver);
+  Cloth& lower = shot.cloth.emplace_back(shot.cloth[0]);
+  lower.name = "lower", lower.corner.y -= 1.2 * lower.thickness, lower.velocity.y = 0.1;
+  return shot;
+}
+/// Those two without water.
+Shot two_shells(FluidSolver solver) {
+  Shot shot = on_two_shells(solver);
+  shot.fluid.box.clear();
+  return shot;
+}
+/// A shell that swings about an edge, without water.
+Shot swinging_shell(FluidSolver solver) {
+  Shot shot = on_bare_shell(solver);
+  shot.fluid.box.clear();
+  Cloth& sheet = shot.cloth[0];
+  sheet.corner.y = 0;
+  sheet.pin[0].vertices = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+  return shot;
+}
 
+void lay_shell(Shot& shot, double height) {
+  Cloth& sheet = add_sheet(shot, 0.2, height, 8);
+  sheet.model = ClothModel::shell;
+  pin_edges(sheet);
+}
 void sew(Cloth& cloth, const std::vector<uint32_t>& from, const std::vector<uint32_t>& to) {
   ClothSeam& seam = cloth.seam.emplace_back();
   seam.vertices = from, seam.to_vertices = to;
@@ -268,6 +306,119 @@ const Term terms[] = {
      Leaves::the_bits,
      {"predict_around_obstacles", "project_around_obstacles"},
      {"obstacles", "momentum that obstacles stop"}},
+    {"bending_of_shell",
+     projected,
+     on_bare_shell,
+     [](Shot& s) { bend(s, 1e-4); },
+     [](Shot& s) { bend(s, 0); },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_in_shell",
+     projected,
+     on_bare_shell,
+     [](Shot& s) { s.cloth[0].damping_time = 0.005; },
+     [](Shot& s) { s.cloth[0].damping_time = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"damping_of_shell",
+     projected,
+     on_bare_shell,
+     [](Shot& s) { s.cloth[0].damping = 20; },
+     [](Shot& s) { s.cloth[0].damping = 0; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"stretch_limit_of_shell",
+     projected,
+     on_bare_shell,
+     [](Shot& s) { s.cloth[0].stretch_limit = 1.0001; },
+     [](Shot& s) { s.cloth[0].stretch_limit = 1.05; },
+     Leaves::the_plan,
+     {},
+     {}},
+    {"wet_constants_of_shell",
+     projected,
+     on_shell,
+     [](Shot& s) { s.cloth[0].wetness = 1; },
+     [](Shot& s) {
+       Cloth& sheet = s.cloth[0];
+       sheet.water_capacity = 1, sheet.soak_time = 0.01;
+       sheet.wet_modulus_ratio = 0.1, sheet.wet_friction = 0.1;
+     },
+     Leaves::the_plan,
+     {"wet_cloth"},
+     {"wet cloth"}},
+    {"no_slip_shell",
+     projected,
+     on_shell,
+     [](Shot& s) { s.cloth[0].slip = Slip::none, s.fluid.kinematic_viscosity = 1e-5; },
+     [](Shot& s) { s.cloth[0].slip = Slip::none; },
+     Leaves::the_plan,
+     {"apply_viscosity", "find_body_drag"},
+     {"implicit viscosity", "drag of obstacles and cloth", "drag of cloth"}},
+    {"wind_on_shell",
+     projected,
+     on_shell,
+     blow,
+     still_air,
+     Leaves::the_plan,
+     {"wind_on_cloth"},
+     {"air on cloth"}},
+    {"shell",
+     projected,
+     water,
+     [](Shot& s) { lay_shell(s, -0.99); },
+     [](Shot& s) { lay_shell(s, 0.5); },
+     Leaves::the_bits,
+     {"polygon_grid", "nearest_triangle", "sheet_side", "sort_near", "start_rows",
+      "linearise_shell", "linearise_cloth", "start_sheet_rows", "move_with_sheets"},
+     {"cloth", "topology of cloth", "substeps of cloth", "forces on cloth", "polygon grid",
+      "implicit step of cloth", "last step of shells", "implicit step of shells",
+      "contact among sheets", "nearest triangles", "remembered sides", "near list of cloth",
+      "rows of cloth", "rows of cloth in the pressure solve", "loads of cloth", "starts of paths",
+      "paths", "drift of paths"}},
+    {"contact_of_shells",
+     projected,
+     on_two_shells,
+     [](Shot& s) { s.cloth[0].self_collision = s.cloth[1].self_collision = true; },
+     [](Shot& s) { s.cloth[0].self_collision = true; },  // with itself alone
+     Leaves::the_bits,
+     {"start_sheet_rows"},
+     {"contact among sheets"}},
+    {"contact_of_shells_without_water",
+     projected,
+     two_shells,
+     [](Shot& s) { s.cloth[0].self_collision = s.cloth[1].self_collision = true; },
+     [](Shot& s) { s.cloth[0].self_collision = true; },
+     Leaves::the_bits,
+     {},
+     {"contact among sheets"}},
+    {"seam_of_shell",
+     projected,
+     on_shell,
+     [](Shot& s) { sew(s.cloth[0], {30}, {31}); },
+     [](Shot& s) { sew(s.cloth[0], {0}, {1}); },  // of its pinned edge
+     Leaves::the_bits,
+     {},
+     {}},
+    {"obstacle_under_shell",
+     projected,
+     on_shell,
+     [](Shot& s) { ball(s, V3d(0, -1.03, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {"predict_around_obstacles", "project_around_obstacles"},
+     {"obstacles", "cloth at obstacles", "momentum that obstacles stop"}},
+    {"obstacle_at_swinging_shell",
+     projected,
+     swinging_shell,
+     [](Shot& s) { ball(s, V3d(0, -0.04, 0)); },
+     [](Shot& s) { ball(s, V3d(0, 0.7, 0)); },
+     Leaves::the_bits,
+     {},
+     {"obstacles", "cloth at obstacles", "momentum that obstacles stop", "contact among sheets"}},
     {"sheet",
      projected,
      water,

@@ -111,6 +111,44 @@ TEST(Skip, AWeaklyCompressibleFluidHasNothingOfThePressureSolve) {
   }
 }
 
+/// A shell of cotton without water, held by an edge.
+Shot hanging_shell() {
+  Shot shot = empty_shot();
+  shot.gravity = V3d(0, -9.81, 0);
+  Cloth& sheet = add_sheet(shot, 0.2, 0, 8);
+  sheet.model = ClothModel::shell;
+  sheet.pin.push_back({{0, 1, 2, 3, 4, 5, 6, 7, 8}, {}});
+  return shot;
+}
+
+TEST(Skip, AShellWithoutRigidityHasNoRowsOfBending) {
+  Shot shot = hanging_shell();
+  const auto of_bending = [](const sim::ShellTopology& shell) {
+    size_t all = shell.column.size();
+    for (const int ring : shell.ring) all -= size_t(ring);
+    return all;
+  };
+  EXPECT_GT(of_bending(sim::build_scene(shot).cloth.shell), 500u);
+  shot.cloth[0].bend_warp = shot.cloth[0].bend_weft = shot.cloth[0].bend_bias = 0;
+  EXPECT_EQ(of_bending(sim::build_scene(shot).cloth.shell), 0u);
+}
+
+TEST(Skip, AFlatShellHasNoCurvatureOfRest) {
+  EXPECT_TRUE(sim::build_scene(hanging_shell()).cloth.shell.curved_node.empty());
+}
+
+// Files hold it; steps do not know.
+TEST(Skip, StrainThatIsWrittenIsNoPartOfAStep) {
+  Shot shot = hanging_shell();
+  Stepper plain(shot);
+  shot.cloth[0].write_strain = true;
+  Stepper written(shot);
+  EXPECT_EQ(names(plain.solver->plan()), names(written.solver->plan()));
+  EXPECT_EQ(plain.solver->allocated(), written.solver->allocated());
+  for (int k = 0; k < 20; ++k) plain.step(2e-3), written.step(2e-3);
+  expect_same_state(plain.solver->save(), written.solver->save());
+}
+
 /// A block that falls onto a floor, with or without a sheet 0.5 m away.
 sim::HostState splash(int steps, bool with_cloth) {
   Shot shot = empty_shot();

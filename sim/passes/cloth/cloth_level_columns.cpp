@@ -14,19 +14,23 @@ struct Leaves {
   std::vector<int> vertex, start{0};
 
   void add_sheet(const HostVec& rest, const VertexRange& sheet) {
-    const int last = sheet.first + sheet.count;
+    const int last = sheet.first + sheet.count,
+              leaves = (sheet.count + most_vertices - 1) / most_vertices;
+    pad(leaves);
     vertex.resize(size_t(last));
     std::iota(vertex.begin() + sheet.first, vertex.end(), sheet.first);
-    halve(rest, sheet.first, last, (sheet.count + most_vertices - 1) / most_vertices);
-  }
-  /// No four of the next sheet are to share an aggregate with this one's, but at coarse levels.
-  void pad() {
-    size_t group = 1;
-    while (4 * group <= start.size() - 1) group *= 4;
-    while ((start.size() - 1) % group != 0) start.push_back(start.back());
+    halve(rest, sheet.first, last, leaves);
   }
 
  private:
+  /// No four of the next sheet are to share an aggregate with those before, but at levels on which
+  /// it is one: by the size of all before it, fifty sheets would ask for more than any memory.
+  void pad(int leaves) {
+    int group = 1;
+    const int before = int(start.size()) - 1;
+    while (4 * group <= before && group < leaves) group *= 4;
+    start.resize(size_t((before + group - 1) / group * group) + 1, start.back());
+  }
   void halve(const HostVec& rest, int first, int last, int leaves) {
     if (leaves <= 1) return start.push_back(last);
     int left = 1;
@@ -135,7 +139,6 @@ void load_cloth_levels(State& state, const ClothTopology& cloth) {
       const float from = (*x)[sheet.first];
       for (int v = sheet.first; v < sheet.first + sheet.count; ++v) (*x)[v] -= from;
     }
-    leaves.pad();
     leaves.add_sheet(rest, sheet);
   }
   for (int count = int(leaves.start.size()) - 1; s.levels < ClothLevels::most;
