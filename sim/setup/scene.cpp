@@ -16,6 +16,7 @@
 #include "sim/setup/cloth_start.h"
 #include "sim/setup/pin_report.h"
 #include "sim/setup/probe_report.h"
+#include "sim/setup/seam_strips.h"
 
 namespace drench::sim {
 
@@ -464,6 +465,7 @@ void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
 void tie_sheets(const Shot& shot, Scene& scene) {
   scene.pins = ClothPins(shot, scene);
   scene.sewing = Sewing(shot, scene);
+  if (scene.parameters.fluid) scene.cloth.strips = seam_strips(scene.cloth, shot.fluid.spacing);
   Parameters& p = scene.parameters;
   p.ties = scene.pins.any() || !scene.cloth.seam.empty();
   // As automatic_sound_speed, which does not know the sheets yet.
