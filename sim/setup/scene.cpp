@@ -161,6 +161,16 @@ void set_wetting(const Shot& shot, Parameters& p) {
   for (const Cloth& c : shot.cloth) p.wets |= wetting_of(c.contact_angle_deg) != 0;
 }
 
+/// m; 0 with sheets of springs.
+float shell_margin_of(const Shot& shot) {
+  double thickest = 0;
+  for (const Cloth& c : shot.cloth) {
+    if (c.model != ClothModel::shell) return 0;
+    thickest = std::max(thickest, c.thickness);
+  }
+  return float(shell_wall_margin * thickest);
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
                             const std::vector<MeshEmitter>& emitters, const ObstacleSet& obstacles,
                             const FrameMotion& motion) {
@@ -214,6 +224,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.shells |= c.model == ClothModel::shell;
     p.wet_sheets |= is_ever_wet(c);
   }
+  if (!p.fluid) p.shell_margin = shell_margin_of(shot);
   p.fixed_dt = shot.time_step;
   return p;
 }
