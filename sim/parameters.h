@@ -102,8 +102,6 @@ struct Limits {
   int iterations = 0;          // of the pressure solve
   int sheet_sweeps = 0;        // of the conjugate gradients of the sheets
   int sheets_cut_short = 0;    // 1: these were too few for their tolerance at the end of the step
-  int sheets_strained = 0;     // 1: shells end the step strained by what its forces do not know of
-  float sheets_share = 1;      // of the stable step that is left to the next one for that
   float viscous_residual = 0;  // RMS that a viscous solve cut short left, over that of the velocity
   int viscous_iterations = 0;  // of the viscous solve
   float step = 0;              // s, of the step that was made

@@ -161,7 +161,6 @@ class BackendSolver : public Solver {
     if (allocated_.contains(ColumnGroup::cloth_system)) {
       const ClothControl sheets = value_at(state_.cloth_system.control, 0);
       limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
-      limits.sheets_strained = state_.shell.strained;
     }
     if (viscosity_is_implicit(state_.parameters, dt) && state_.fluid.count > 0) {
       const ViscousControl solve = value_at(state_.viscosity.control, 0);

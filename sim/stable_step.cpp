@@ -34,7 +34,6 @@ StepLimit stable_step(const Parameters& p, const Limits& limits) {
       if (limits.pressure > 0)
         consider(std::max(0.43 * a / std::sqrt(limits.pressure), 0.1 * ruling.dt), "pressure");
     }
-    if (limits.sheets_share < 1) consider(double(limits.sheets_share) * ruling.dt, "sheets");
   } else if (p.fluid) {
     // One speed of sound a step, and nothing moves farther than 0.4 supports: cloth speed counts.
     consider(0.4 * h / (double(p.sound_speed) + limits.max_speed), "sound speed");

@@ -11,7 +11,7 @@ namespace drench::sim {
 /// a step follows the one before: half of it when its solve was cut short, 0.43 spacings over
 /// sqrt(p / rho) of the pressure it found; surface tension 0.25
 /// sqrt(rho a^3 / (2 pi sigma)), more heats a drop. Its viscosity sets none. Implicit sheets alone
-/// keep to the two of speed and gravity; shells that a step has strained have part of all that.
+/// keep to the two of speed and gravity.
 struct StepLimit {
   double dt;
   const char* name;

@@ -188,9 +188,6 @@ struct ShellState {
   VecColumn curved_shift;                     // J
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
-  VecColumn about, from;      // m, off the straight paths: where triangles are linearised anew, and
-                              // where the last solve of the step started
-  bool strained = false;      // the step ends with strains that its linear forces do not know of
   Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix

@@ -5,16 +5,6 @@
 
 namespace drench::sim {
 
-namespace {
-
-/// Of the stable step that the next one may take. Over half the time a shell is strained by a
-/// quarter of what Newton's method has not settled in this one.
-float share_after(float share, int strained) {
-  return strained ? std::max(0.5f * share, 0.1f) : std::min(1.2f * share, 1.f);
-}
-
-}  // namespace
-
 Stepper::Stepper(Scene scene_, std::unique_ptr<Solver> solver_, double start)
     : scene(std::move(scene_)), solver(std::move(solver_)) {
   load(scene.start, {}, start);
@@ -66,9 +56,7 @@ void Stepper::step_to(double end, double dt) {
   if (scene.sewing.draws(time)) solver->draw_seams(scene.sewing.lengths(end));
   if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(end));
   if (scene.motion.moves()) solver->drive(scene.motion.over(time, end));
-  const float share = limits.sheets_share;
   limits = solver->step(dt, cloth_substeps(dt));
-  limits.sheets_share = share_after(share, limits.sheets_strained);
   time = end, ++steps;
 }
 

@@ -279,6 +279,135 @@ void hold_at_obstacles(State& state) {
       });
 }
 
+namespace {
+
+/// What a round makes of one vertex at the walls.
+struct WallRevision {
+  ClothWalls walls;
+  ConstVecView position, path, reaction;
+  VecView free, change;
+  BlockInverse block;
+  const float *inertia, *inverse_mass;
+  float dt, reach;
+  bool release;
+
+  DRENCH_HD bool operator()(int i) const {
+    if (inverse_mass[i] == 0.f) return false;
+    const Vec3<float> from = position[i], straight = from + path[i] * dt, to = straight + change[i],
+                      push = reaction[i];
+    Vec3<float> axes = free[i], w = change[i];
+    bool held = false, freed = false;
+    const auto along = [&](float low, float high, float from, float straight, float to, float push,
+                           float& axis, float& w) {
+      if (axis == 0.f) {
+        const bool pulls = 2.f * to < low + high ? push < 0.f : push > 0.f;
+        if (release && pulls) axis = 1.f, freed = true;
+        return;
+      }
+      const float stop = minimum(maximum(to, low), high);
+      if (fabsf(stop - to) <= 1e-3f * reach || fabsf(stop - from) > reach) return;
+      axis = 0.f, w = stop - straight, held = true;
+    };
+    along(walls.low.x, walls.high.x, from.x, straight.x, to.x, push.x, axes.x, w.x);
+    along(walls.low.y, walls.high.y, from.y, straight.y, to.y, push.y, axes.y, w.y);
+    along(walls.low.z, walls.high.z, from.z, straight.z, to.z, push.z, axes.z, w.z);
+    if (!held && !freed) return false;
+    free.set(i, axes), change.set(i, w);
+    if (held) block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+    return true;
+  }
+};
+
+/// What holds the vertices by the solve that was made, kg m, into ClothSystem::residual. The
+/// springs of a vertex reach others, whose constraints must not change meanwhile.
+void find_reactions(State& state, const ConstVecView& given) {
+  ClothSystem& s = state.cloth_system;
+  const ClothMatrix matrix = cloth_matrix(state);
+  const ConstVecView change = s.change.view();
+  const VecView reaction = s.residual.view();
+  parallel_for(
+      state.queue, "cloth: reactions", state.cloth.vertices,
+      DRENCH_LAMBDA(int i) { reaction.set(i, matrix.whole(change, i) - given[i]); });
+}
+
+/// Lets go the axes along which a wall pulls, where sheets lie on sheets: alone each of them would
+/// have gone to the wall. Holds what went through it. Whether anything changed.
+bool revise_walls(State& state, int round) {
+  const ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const WallRevision revise{.walls = cloth_walls_of(state.parameters),
+                            .position = c.position.view(),
+                            .path = path_velocity_of(state),
+                            .reaction = s.residual.view(),
+                            .free = s.free.view(),
+                            .change = s.change.view(),
+                            .block = block_inverse(state),
+                            .inertia = s.inertia.data(),
+                            .inverse_mass = c.inverse_mass.data(),
+                            .dt = float(state.dt),
+                            .reach = state.parameters.spacing,
+                            .release = round < 3};
+  return parallel_reduce(
+             state.queue, "cloth: revise walls", c.vertices, 0,
+             DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
+}
+
+/// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
+/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
+/// the guard stops it.
+bool revise_holds(State& state, const ConstVecView& given, int round) {
+  ClothState& c = state.cloth;
+  ClothSystem& s = state.cloth_system;
+  const HoldRevision revise{.hold = cloth_hold_of(state),
+                            .position = c.position.view(),
+                            .velocity = c.velocity.view(),
+                            .path = path_velocity_of(state),
+                            .change = s.change.view(),
+                            .given = given,
+                            .right = s.answer.view(),
+                            .reaction = s.residual.view(),
+                            .rub = s.rub.view(),
+                            .slides = s.slides.data(),
+                            .cling = s.cling.data(),
+                            .mass = c.mass.data(),
+                            .inverse_mass = c.inverse_mass.data(),
+                            .dt = float(state.dt),
+                            .round = round};
+  return parallel_reduce(
+             state.queue, "cloth: revise", c.vertices, 0,
+             DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
+}
+
+}  // namespace
+
+void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     const ContactTolerances& tolerance) {
+  constexpr int most_rounds = 6;
+  ClothSystem& s = state.cloth_system;
+  const VecView change = s.change.view();
+  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
+  if (!obstacles && !sheets)
+    return solve_cloth(state, change, given, most_iterations, tolerance.first);
+  const VecView right = s.answer.view();
+  const ConstVecView rub = s.rub.view();
+  parallel_for(
+      state.queue, "cloth: given", state.cloth.padded,
+      DRENCH_LAMBDA(int i) { right.set(i, obstacles ? given[i] + rub[i] : given[i]); });
+  solve_cloth(state, change, right, most_iterations, tolerance.first);
+  for (int round = 0; round < most_rounds; ++round) {
+    find_reactions(state, given);
+    bool changed = obstacles && revise_holds(state, given, round);
+    const bool at_walls = sheets && revise_walls(state, round);
+    if (sheets) changed |= revise_sheet_rows(state, round);
+    if (!changed && !at_walls) break;
+    ClothLevels& levels = state.cloth_levels;
+    if (levels.on) levels.on = !anything_touches(state);
+    // Blocks that do not know what walls hold now would correct far too much.
+    if (levels.on && at_walls) build_cloth_levels(state);
+    solve_cloth(state, change, right, most_iterations, tolerance.between);
+  }
+}
+
 void finish_at_obstacles(State& state, const ConstVecView& given) {
   ClothState& c = state.cloth;
   const ConstVecView x = c.position.view(), v = c.velocity.view();

@@ -144,21 +144,6 @@ inline ConstVecView path_velocity_of(const State& state) {
 /// The straight paths, the blocks at their ends, and the sheet's own part of the right side.
 void linearise_shell(State& state);
 
-/// Whether the step that was solved for strains triangles by more than its linear forces know of.
-/// @param linearised  times in this step: once by linearise_shell, then by relinearise_shell
-bool shell_strains_unseen(State& state, int linearised);
-
-/// Whether all that is so strained has more energy than the velocity that the step gives the sheets.
-bool shell_ends_strained(State& state, int linearised);
-
-/// Goes back from the solve that was made, which started at ShellState::from, to where of a few
-/// places on that line the energy is least. @return the part of the line that is left.
-float search_line(State& state, const ConstVecView& right, int linearised);
-
-/// The shells' blocks and right sides anew, about where the step ends as it is solved for: the next
-/// iterate of Newton's method.
-void relinearise_shell(State& state);
-
 /// Notes what the next step needs of this one, whose end is in ClothState::next.
 void keep_shell_step(State& state);
 
