@@ -23,16 +23,12 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-void exact_grid(State& state) {
-  find_open_seams(state);
-  build_polygon_grid(state, state.parameters.support_radius);
-}
+void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
 /// Particles stand where sheets do: at the start of the step.
 ConstVecView beside_sheets(const State& state) {
   return state.parameters.incompressible ? state.fluid.start.view() : state.fluid.position.view();
 }
 void exact_nearest(State& state) {
-  look_at_seams(state);
   find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
 }
 void exact_sides(State& state) { find_cloth_sides(state, beside_sheets(state)); }
@@ -132,8 +128,8 @@ const Pass all_passes[] = {
     {"sort_particles", fluid, position, moving | pressure | cells | sorting, sort_particles,
      memory | near_cloth | start},
     {"polygon_grid", coupled, sheets, polygons | sorting, exact_grid},
-    {"nearest_triangle", coupled, position | start | sheets | polygons | memory,
-     near_cloth | memory, exact_nearest},
+    {"nearest_triangle", coupled, position | start | sheets | polygons | memory, near_cloth,
+     exact_nearest},
     {"sheet_side", coupled, position | start | sheets | polygons, near_cloth | memory, exact_sides},
     {"sort_near", strong, near_cloth, contact | sorting, sort_all_contacts},
     {"start_rows", strong, near_list | memory, rows | loads | memory | cloth_load, start_contacts},

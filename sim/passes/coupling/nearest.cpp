@@ -16,21 +16,6 @@ NearestOutput nearest_output(State& state, float reach) {
 
 }  // namespace
 
-void look_at_seams(State& state) {
-  FluidState& f = state.fluid;
-  const ClothState& c = state.cloth;
-  if (c.polygons == c.triangles) return;
-  const int *open = c.seam_open.data(), own = c.triangles;
-  int* memory = f.memory_triangle.data();
-  float* beyond_support = f.beyond_support.data();
-  const float nearer = c.seams_closed > 0 ? c.widest_seam : 0.f;
-  parallel_for(
-      state.queue, "fluid: seams", f.count, DRENCH_LAMBDA(int i) {
-        if (memory[i] >= own && open[memory[i] - own]) memory[i] = -1;
-        beyond_support[i] = beyond_support[i] - nearer;
-      });
-}
-
 #if defined(__CUDACC__)
 
 void find_nearest_triangles(State& state, const ConstVecView& position, float reach) {

@@ -133,10 +133,6 @@ class PackOfNeighbours {
 
 #endif
 
-/// Before that, what changed with the strips of seams: those that opened are no longer anyone's,
-/// and those that closed may be nearer than anything was.
-void look_at_seams(State& state);
-
 /// Into FluidState::triangle, the weights of its foot and beyond_support.
 /// @param position  m, of the particles. @param reach  m.
 void find_nearest_triangles(State& state, const ConstVecView& position, float reach);
