@@ -186,6 +186,11 @@ void for_each_cloth_column(S& state, const Visit& visit) {
   visit({"fan_start", "1", Group::cloth_fixed}, c.fan_start, none);
   visit({"fan_entry", "1", Group::cloth_fixed}, c.fan_entry, none);
   visit({"rim", "1", Group::cloth_fixed}, c.rim, none);
+  visit({"seam_pair", "1", Group::cloth_fixed}, c.seam_pair, none);
+  visit({"seam_reach", "m", Group::cloth_fixed}, c.seam_reach, none);
+  visit({"seam_fan_start", "1", Group::cloth_fixed}, c.seam_fan_start, none);
+  visit({"seam_fan_entry", "1", Group::cloth_fixed}, c.seam_fan_entry, none);
+  visit({"seam_open", "1", Group::polygons}, c.seam_open, none);
   visit({"corner_shift", "m", Group::cloth_fixed}, c.corner_shift, none);
   visit({"spring_shift", "m", Group::cloth_fixed}, c.spring_shift, none);
   visit({"rest_period", "m", Group::cloth_fixed}, c.rest_period, none);

@@ -47,6 +47,7 @@ struct Parameters {
   bool ties = false;             // pins that do more than hold where a vertex starts, or seams
   bool paper = false;            // coupling scheme
   bool every_path = false;       // is tested, also of what cannot meet a sheet: for tests
+  float shell_margin = 0;        // m, that walls keep from shells where nothing else is; 0: not so
   // air, which moves as WindNow says; 0: none
   float air_density = 0;                     // kg/m^3
   float cloth_drag = 0, cloth_friction = 0;  // coefficients across and along a sheet
@@ -82,6 +83,10 @@ inline bool viscosity_is_implicit(const Parameters& p, double dt) {
 /// Room for a particle (passes/coupling/collision_rounds.h) that walls leave before cloth,
 /// spacings.
 constexpr float cloth_wall_margin = 0.25f;
+
+/// The same where there are shells alone, which need room for themselves only: thicknesses of the
+/// thickest, of which half is in the sheet.
+constexpr float shell_wall_margin = 0.75f;
 
 /// Whether sheets make implicit steps (sim/passes/cloth/cloth_implicit.h), or explicit substeps:
 /// these have nothing that holds a vertex at an obstacle, or takes it along.

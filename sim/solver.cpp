@@ -333,19 +333,13 @@ class BackendSolver : public Solver {
       host.resize(c.padded, 0.f);  // a padding vertex is pinned and has no springs
       from_host(column, host);
     };
-    c.joined = t.corner_shift.size() > 0;
-    upload(c.corner_shift, t.corner_shift);
+    load_polygons(t);
     std::vector<Vec3<float>> rest_period;
     for (size_t k = 0; k < t.rest_period.size(); ++k)
       rest_period.push_back({t.rest_period.x[k], t.rest_period.y[k], t.rest_period.z[k]});
     from_host(c.rest_period, rest_period);
     pad(c.mass, t.mass), pad(c.inverse_mass, t.inverse_mass), pad(c.damping_rate, t.damping_rate);
     load_springs(t);
-    from_host(c.corner, t.corner), from_host(c.neighbour, t.neighbour), from_host(c.sheet, t.sheet);
-    from_host(c.half_thickness, t.half_thickness);
-    if (state_.parameters.no_slip_sheets) from_host(c.no_slip, t.no_slip);
-    if (state_.parameters.wets) from_host(c.wetting, t.wetting);
-    upload(c.rest_centroid, t.rest_centroid);
     from_host(c.fan_start, t.fan_start), from_host(c.fan_entry, t.fan_entry),
         from_host(c.rim, t.rim);
     for (VecColumn* v :
@@ -357,12 +351,6 @@ class BackendSolver : public Solver {
       for (VecColumn* v : {&c.air_diagonal, &c.air_cross, &c.air_push}) v->resize(c.padded);
       from_host(c.air_share, t.air_share);
     }
-    c.centroid.resize(c.triangles);
-    c.sorted_low.resize(c.triangles + 8);
-    c.sorted_high.resize(c.triangles + 8);
-    c.sorted_triangle.resize(c.triangles + 8);
-    c.cell.resize(c.triangles);
-    state_.contact.impulse.resize(size_t(3) * c.triangles);
     c.share.resize(c.vertices);
     load_pins(t);
     if (allocated_.contains(ColumnGroup::cloth_system))
@@ -374,6 +362,46 @@ class BackendSolver : public Solver {
     load_triangle_obstacles(state_, t);
     load_self_contact(state_, t);
     load_wet_cloth(state_, t);
+  }
+
+  /// The triangles of the sheets, and after them the strips of seams.
+  void load_polygons(const ClothTopology& t) {
+    ClothState& c = state_.cloth;
+    const SeamStrips& strips = t.strips;
+    const size_t count = strips.beside.size();
+    c.polygons = c.triangles + int(count);
+    const auto load = [&](auto& column, auto host) {
+      for (const int k : strips.beside) host.push_back(host[size_t(k)]);
+      from_host(column, host);
+    };
+    const auto joined = [](auto all, const auto& more) {
+      all.insert(all.end(), more.begin(), more.end());
+      return all;
+    };
+    from_host(c.corner, joined(t.corner, strips.corner));
+    from_host(c.neighbour, count > 0 ? strips.neighbour : t.neighbour);
+    load(c.sheet, t.sheet), load(c.half_thickness, t.half_thickness);
+    if (state_.parameters.no_slip_sheets) load(c.no_slip, t.no_slip);
+    if (state_.parameters.wets) load(c.wetting, t.wetting);
+    HostVec centre = t.rest_centroid;
+    for (const int k : strips.beside) {
+      const auto s = size_t(k);
+      centre.push(centre.x[s], centre.y[s], centre.z[s]);
+    }
+    upload(c.rest_centroid, centre);
+    c.joined = t.corner_shift.size() > 0;
+    upload(c.corner_shift,
+           {joined(t.corner_shift.x, strips.shift.x), joined(t.corner_shift.y, strips.shift.y),
+            joined(t.corner_shift.z, strips.shift.z)});
+    c.centroid.resize(c.polygons), c.cell.resize(c.polygons);
+    c.sorted_low.resize(c.polygons + 8), c.sorted_high.resize(c.polygons + 8);
+    c.sorted_triangle.resize(c.polygons + 8);
+    state_.contact.impulse.resize(size_t(3) * c.polygons);
+    if (count == 0) return;
+    from_host(c.seam_pair, strips.pair), from_host(c.seam_reach, strips.reach);
+    from_host(c.seam_open, std::vector<int>(count, 1));
+    from_host(c.seam_fan_start, strips.fan_start), from_host(c.seam_fan_entry, strips.fan_entry);
+    c.widest_seam = *std::max_element(strips.reach.begin(), strips.reach.end());
   }
 
   void load_pins(const ClothTopology& t) {

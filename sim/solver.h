@@ -48,6 +48,18 @@ struct SeamSpring {
   float rest_length, stiffness;  // m, once it is drawn; N/m
 };
 
+/// Triangles that close seams to the fluid, numbered after those of the sheets
+/// (sim/setup/seam_strips.h). They weigh nothing and have no stiffness.
+struct SeamStrips {
+  std::vector<int> corner;                // 3 a strip
+  std::vector<int> pair;                  // 4 a strip: two pairs of vertices that are sewn together
+  std::vector<float> reach;               // m, of a strip: open while one is farther apart
+  std::vector<int> beside;                // a strip's triangle of a sheet
+  HostVec shift;                          // m, of a corner; where ClothTopology has corner_shift
+  std::vector<int> neighbour;             // as ClothTopology's, of all triangles
+  std::vector<int> fan_start, fan_entry;  // as ClothTopology's, of all triangles
+};
+
 /// What never changes about the sheets, all in one.
 struct ClothTopology {
   std::vector<float> mass, inverse_mass, damping_rate;  // kg, dry; 0 where pinned; 1/s
@@ -73,6 +85,7 @@ struct ClothTopology {
   ShellTopology shell;
   std::vector<int> pin_vertex;  // of pins that do more than hold where the vertex starts
   std::vector<SeamSpring> seam;
+  SeamStrips strips;  // none without fluid
   int sheet_of(int vertex) const {
     return sheet[size_t(fan_entry[size_t(fan_start[size_t(vertex)])]) / 3];
   }

@@ -68,6 +68,7 @@ struct FluidState {
 /// All sheets in one: vertices, springs by vertex, triangles.
 struct ClothState {
   int vertices = 0, triangles = 0;
+  int polygons = 0;  // the triangles, and after them those that close seams to the fluid
   // kept from step to step
   VecColumn position, velocity;
   // fixed
@@ -88,6 +89,13 @@ struct ClothState {
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
   std::vector<VertexRange> loose;    // of the sheets without a pin or a seam
+  // where seams sew edges (SeamStrips), else empty
+  Column<int> seam_pair;                       // 4 a strip: two pairs of vertices that are sewn
+  Column<float> seam_reach;                    // m, of a strip: farther apart they leave it open
+  Column<int> seam_open;                       // of a strip, every step: 1 while it is
+  Column<int> seam_fan_start, seam_fan_entry;  // as fan_start, of all polygons
+  float widest_seam = 0;                       // m, that a strip may be
+  int seams_closed = 0;                        // strips that began to be closed with this step
   // where a sheet is joined to itself across a seam, else empty (passes/coupling/polygon_grid.h)
   bool joined = false;
   VecColumn corner_shift;           // m, of a triangle's corner from its vertex

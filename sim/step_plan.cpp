@@ -23,12 +23,16 @@ namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
 
-void exact_grid(State& state) { build_polygon_grid(state, state.parameters.support_radius); }
+void exact_grid(State& state) {
+  find_open_seams(state);
+  build_polygon_grid(state, state.parameters.support_radius);
+}
 /// Particles stand where sheets do: at the start of the step.
 ConstVecView beside_sheets(const State& state) {
   return state.parameters.incompressible ? state.fluid.start.view() : state.fluid.position.view();
 }
 void exact_nearest(State& state) {
+  bring_closed_seams_nearer(state);
   find_nearest_triangles(state, beside_sheets(state), state.parameters.support_radius);
 }
 void exact_sides(State& state) { find_cloth_sides(state, beside_sheets(state)); }

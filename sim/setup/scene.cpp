@@ -16,6 +16,7 @@
 #include "sim/setup/cloth_start.h"
 #include "sim/setup/pin_report.h"
 #include "sim/setup/probe_report.h"
+#include "sim/setup/seam_strips.h"
 
 namespace drench::sim {
 
@@ -160,6 +161,16 @@ void set_wetting(const Shot& shot, Parameters& p) {
   for (const Cloth& c : shot.cloth) p.wets |= wetting_of(c.contact_angle_deg) != 0;
 }
 
+/// m; 0 with sheets of springs.
+float shell_margin_of(const Shot& shot) {
+  double thickest = 0;
+  for (const Cloth& c : shot.cloth) {
+    if (c.model != ClothModel::shell) return 0;
+    thickest = std::max(thickest, c.thickness);
+  }
+  return float(shell_wall_margin * thickest);
+}
+
 Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const InitialFluid& fluid,
                             const std::vector<MeshEmitter>& emitters, const ObstacleSet& obstacles,
                             const FrameMotion& motion) {
@@ -213,6 +224,7 @@ Parameters build_parameters(const Shot& shot, const LocalFrame& frame, const Ini
     p.shells |= c.model == ClothModel::shell;
     p.wet_sheets |= is_ever_wet(c);
   }
+  if (!p.fluid) p.shell_margin = shell_margin_of(shot);
   p.fixed_dt = shot.time_step;
   return p;
 }
@@ -465,6 +477,7 @@ void place_fluid(const Shot& shot, const InitialFluid& fluid, Scene& scene) {
 void tie_sheets(const Shot& shot, Scene& scene) {
   scene.pins = ClothPins(shot, scene);
   scene.sewing = Sewing(shot, scene);
+  if (scene.parameters.fluid) scene.cloth.strips = seam_strips(scene.cloth, shot.fluid.spacing);
   Parameters& p = scene.parameters;
   p.ties = scene.pins.any() || !scene.cloth.seam.empty();
   // As automatic_sound_speed, which does not know the sheets yet.

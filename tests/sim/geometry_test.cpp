@@ -178,7 +178,7 @@ TEST(ContinuousCollision, FindsATriangleThatSpringsBackWithinTheStep) {
   state.parameters.spacing = 0.01f, state.parameters.support_radius = 0.02f;
   state.parameters.particle_mass = 1e-3f;
   sim::cpu::ClothState& c = state.cloth;
-  c.vertices = 3, c.triangles = 1, c.padded = 8;
+  c.vertices = 3, c.triangles = c.polygons = 1, c.padded = 8;
   for (sim::cpu::VecColumn* column : {&c.position, &c.start, &c.next}) column->resize(8);
   c.centroid.resize(1), c.cell.resize(1);
   c.sorted_low.resize(9), c.sorted_high.resize(9), c.sorted_triangle.resize(9);

@@ -279,5 +279,24 @@ TEST(TrianglesAtObstacles, ARodDoesNotComeThroughUnderWater) {
   EXPECT_LT(watch.nearest, 0.003);
 }
 
+// Walls leave particles a quarter of a spacing; where there are none, sheets lie a quarter of their
+// thickness above them.
+TEST(ShellsWithoutFluid, LieOnTheFloorByTheirThickness) {
+  Shot shot = coarse_sheet(0.004);
+  shot.domain.min.y = 0;
+  shot.domain.axis[1] = Axis::walls;
+  const auto lies_at = [](const Shot& one) {
+    Stepper run(one);
+    run.advance(0.3);
+    const sim::HostState state = run.solver->save();
+    const std::vector<float>& y = state.cloth_position.y;
+    EXPECT_LT(*std::max_element(y.begin(), y.end()) - *std::min_element(y.begin(), y.end()), 1e-6);
+    return run.scene.frame.to_world(1, y[0]);
+  };
+  EXPECT_NEAR(lies_at(shot), 0.75 * thickness, 1e-6);
+  shot.cloth[0].model = ClothModel::springs;
+  EXPECT_NEAR(lies_at(shot), 0.25 * shot.fluid.spacing, 1e-6);
+}
+
 }  // namespace
 }  // namespace drench::sim_tests

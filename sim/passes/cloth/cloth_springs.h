@@ -92,7 +92,7 @@ struct ClothWalls {
 };
 
 inline ClothWalls cloth_walls_of(const Parameters& p) {
-  const float margin = cloth_wall_margin * p.spacing;
+  const float margin = p.shell_margin > 0.f ? p.shell_margin : cloth_wall_margin * p.spacing;
   float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
     low[k] = p.wall[k] ? p.low[k] + margin : -1e30f;

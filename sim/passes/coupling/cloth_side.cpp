@@ -47,7 +47,8 @@ void find_cloth_sides(State& state, const ConstVecView& position) {
         const bool remembered =
             (by_memory || !clear) && old >= 0 && cloth.on_one_patch(old, t, patch);
         const int side = remembered ? memory_side[i] : seen;
-        memory_triangle[i] = t, memory_side[i] = side;
+        // The strip of a seam may not be there in the next step.
+        memory_triangle[i] = t < cloth.triangles ? t : -1, memory_side[i] = side;
         const Vec3<float> pseudo =
             foot.normal * (float(side) / maximum(length(foot.normal), 1e-20f));
         const float flip = side == seen ? 1.f : -1.f;

@@ -11,11 +11,19 @@ namespace drench::sim::DRENCH_BACKEND {
 struct ClothTopology {
   PolygonView polygons;
   const int *neighbour, *sheet, *fan_start, *fan_entry, *rim;
+  const int* seam_open;  // of strips, which stand behind the triangles
+  int triangles;
   ConstVecView rest_centroid;
   const float* half_thickness;
   Vec3<float> low, high;           // m, half a spacing inside the domain's walls
   const Vec3<float>* rest_period;  // m, by sheet; where one is joined to itself
 
+  DRENCH_HD bool open_strip(int t) const { return t >= triangles && seam_open[t - triangles]; }
+  /// The triangle across edge ab, bc or ca; -1: it is free, as that of a seam is until it closes.
+  DRENCH_HD int across(int t, int edge) const {
+    const int other = neighbour[3 * t + edge];
+    return open_strip(other) ? -1 : other;
+  }
   /// Is a free edge so near to a wall that no fluid passes between them? Not to a wall that the
   /// sheet lies along.
   DRENCH_HD bool closed_by_wall(Vec3<float> normal, int a, int b) const {
@@ -29,9 +37,10 @@ struct ClothTopology {
   DRENCH_HD bool closed_at(int vertex) const {
     for (int k = fan_start[vertex]; k < fan_start[vertex + 1]; ++k) {
       const int t = fan_entry[k] / 3, c = fan_entry[k] % 3;
+      if (open_strip(t)) continue;
       for (int side = 0; side < 2; ++side) {  // the two edges of the triangle at its corner c
         const int e = (c + 2 * side) % 3;
-        if (neighbour[3 * t + e] >= 0) continue;
+        if (across(t, e) >= 0) continue;
         const int a = polygons.corner[3 * t + e], b = polygons.corner[3 * t + (e + 1) % 3];
         if (!closed_by_wall(area_normal(t), a, b)) return false;
       }
@@ -64,6 +73,7 @@ struct ClothTopology {
     Vec3<float> sum{0.f, 0.f, 0.f};
     for (int k = fan_start[vertex]; k < fan_start[vertex + 1]; ++k) {
       const int t = fan_entry[k] / 3, corner = fan_entry[k] % 3;
+      if (open_strip(t)) continue;
       Vec3<float> v[3];
       polygons.corners(t, v[0], v[1], v[2]);
       const Vec3<float> e = v[(corner + 1) % 3] - v[corner], f = v[(corner + 2) % 3] - v[corner];
@@ -85,9 +95,11 @@ inline ClothTopology topology_of(const State& state) {
   return {.polygons = polygons_of(state),
           .neighbour = c.neighbour.data(),
           .sheet = c.sheet.data(),
-          .fan_start = c.fan_start.data(),
-          .fan_entry = c.fan_entry.data(),
+          .fan_start = polygon_fan_start(c),
+          .fan_entry = polygon_fan_entry(c),
           .rim = c.rim.data(),
+          .seam_open = c.seam_open.data(),
+          .triangles = c.triangles,
           .rest_centroid = c.rest_centroid.view(),
           .half_thickness = c.half_thickness.data(),
           .low = {low[0], low[1], low[2]},
@@ -112,7 +124,7 @@ DRENCH_HD FootNormal foot_normal(const ClothTopology& cloth, int t, float wa, fl
     return {cloth.vertex_normal(vertex), cloth.rim[vertex] != 0 && !cloth.closed_at(vertex)};
   }
   const int edge = zc ? 0 : za ? 1 : 2;  // ab, bc, ca
-  const int other = cloth.neighbour[3 * t + edge];
+  const int other = cloth.across(t, edge);
   if (other < 0) {
     const Vec3<float> n = cloth.unit_normal(t);
     return {n, !cloth.closed_by_wall(n, corner[edge], corner[(edge + 1) % 3])};
@@ -123,8 +135,7 @@ DRENCH_HD FootNormal foot_normal(const ClothTopology& cloth, int t, float wa, fl
 /// How far inside the nearest free edge of its triangle the foot lies, over half a spacing: 0..1.
 DRENCH_HD float edge_weight(const ClothTopology& cloth, int t, float wa, float wb, float wc,
                             float spacing) {
-  const int* neighbour = cloth.neighbour + 3 * t;
-  if (neighbour[0] >= 0 && neighbour[1] >= 0 && neighbour[2] >= 0) return 1.f;
+  if (cloth.across(t, 0) >= 0 && cloth.across(t, 1) >= 0 && cloth.across(t, 2) >= 0) return 1.f;
   float inside = 1.f;
   const float weight[3] = {wc, wa, wb};  // of the corner opposite edges ab, bc, ca
   Vec3<float> v[3];
@@ -133,7 +144,7 @@ DRENCH_HD float edge_weight(const ClothTopology& cloth, int t, float wa, float w
   const float twice_area = length(area);
   for (int e = 0; e < 3; ++e) {
     const int a = cloth.polygons.corner[3 * t + e], b = cloth.polygons.corner[3 * t + (e + 1) % 3];
-    if (neighbour[e] >= 0 || cloth.closed_by_wall(area, a, b)) continue;
+    if (cloth.across(t, e) >= 0 || cloth.closed_by_wall(area, a, b)) continue;
     const float edge_length = maximum(length(v[(e + 1) % 3] - v[e]), 1e-20f);
     inside = minimum(inside, weight[e] * twice_area / (edge_length * 0.5f * spacing));
   }

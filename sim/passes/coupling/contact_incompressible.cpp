@@ -138,7 +138,7 @@ void sum_row_sizes(State& state, const RowSize& size, const VecView& to) {
   const NearView near = near_list(state);
   const ContactRows c = contact_rows(state);
   const VecView impulse = state.contact.impulse.view();
-  const int triangles = state.cloth.triangles, *start = near.start, gap = c.soft_begin - c.close;
+  const int triangles = state.cloth.polygons, *start = near.start, gap = c.soft_begin - c.close;
   const float mass = state.parameters.particle_mass, *contact_weight = state.cloth.share.data();
   parallel_for(
       state.queue, "sheets: sizes by triangle", triangles, DRENCH_LAMBDA(int t) {

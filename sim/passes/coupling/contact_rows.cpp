@@ -3,7 +3,7 @@
 namespace drench::sim::DRENCH_BACKEND {
 
 void sort_contacts(State& state, float reach) {
-  const int triangles = state.cloth.triangles;
+  const int triangles = state.cloth.polygons;
   const int* triangle = state.fluid.triangle.data();
   const float *distance = state.fluid.cloth_distance.data(),
               *half_thickness = state.cloth.half_thickness.data();
@@ -27,7 +27,7 @@ void sort_contacts(State& state, float reach) {
 void sum_by_triangle(State& state, Rows which, IdleCorners idle) {
   const ContactRows c = contact_rows(state);
   const ConstVecView given = state.contact.change.view();
-  const int triangles = state.cloth.triangles, *start = state.contact.start.data();
+  const int triangles = state.cloth.polygons, *start = state.contact.start.data();
   const VecView impulse = state.contact.impulse.view();
   const int last = which == Rows::all ? 1 : 0, gap = c.soft_begin - c.close;
   const bool skip = which == Rows::close && idle == IdleCorners::zero;
@@ -76,7 +76,7 @@ void start_contacts(State& state) {
   }
   float* contact_weight = cloth.share.data();
   const float inverse_dt = 1.f / float(state.dt);
-  const int gap = c.soft_begin - c.close, triangles = cloth.triangles;
+  const int gap = c.soft_begin - c.close, triangles = cloth.polygons;
   parallel_for(
       state.queue, "contact: weights by vertex", cloth.vertices, DRENCH_LAMBDA(int v) {
         float weights = 0.f;

@@ -4,8 +4,7 @@
 // (eqs 10 and 11 with weights in place of thirds). Sorted by triangle, so that sums on triangles
 // and then on vertices have a fixed order.
 
-#include "sim/backend/parallel.h"
-#include "sim/state.h"
+#include "sim/passes/coupling/polygon_grid.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -44,8 +43,8 @@ inline NearView near_list(const State& state) {
           .edge = f.edge.data(),
           .order = state.contact.order.data(),
           .start = state.contact.start.data(),
-          .fan_start = c.fan_start.data(),
-          .fan_entry = c.fan_entry.data()};
+          .fan_start = polygon_fan_start(c),
+          .fan_entry = polygon_fan_entry(c)};
 }
 
 /// m, the gap to the sheet's surface that contact keeps.

@@ -16,6 +16,16 @@ NearestOutput nearest_output(State& state, float reach) {
 
 }  // namespace
 
+void bring_closed_seams_nearer(State& state) {
+  const ClothState& c = state.cloth;
+  if (c.seams_closed == 0) return;
+  float* beyond_support = state.fluid.beyond_support.data();
+  const float nearer = c.widest_seam;
+  parallel_for(
+      state.queue, "fluid: seams", state.fluid.count,
+      DRENCH_LAMBDA(int i) { beyond_support[i] = beyond_support[i] - nearer; });
+}
+
 #if defined(__CUDACC__)
 
 void find_nearest_triangles(State& state, const ConstVecView& position, float reach) {

@@ -133,6 +133,9 @@ class PackOfNeighbours {
 
 #endif
 
+/// Before that: strips of seams that have closed may be nearer than anything was.
+void bring_closed_seams_nearer(State& state);
+
 /// Into FluidState::triangle, the weights of its foot and beyond_support.
 /// @param position  m, of the particles. @param reach  m.
 void find_nearest_triangles(State& state, const ConstVecView& position, float reach);

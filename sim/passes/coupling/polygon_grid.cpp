@@ -13,7 +13,8 @@ namespace {
 /// Sorts the images of all triangles that the grid holds. Returns how many.
 int sort_images(State& state, const TriangleImages& images) {
   ClothState& c = state.cloth;
-  const int items = images.items(), triangles = c.triangles;
+  const int items = images.items(), triangles = c.polygons, own = c.triangles;
+  const int* open = c.seam_open.data();
   const GridShape grid = c.grid;
   const ConstVecView centroid = c.centroid.view();
   c.cell.resize(items);
@@ -21,7 +22,9 @@ int sort_images(State& state, const TriangleImages& images) {
   parallel_for(
       state.queue, "cloth: cells of images", items, DRENCH_LAMBDA(int k) {
         const Vec3<float> m = centroid[k % triangles], at = m + images.shift(k, m);
-        cell[k] = images.holds(at) ? grid.cell(at) : grid.cells();
+        const int t = k % triangles;
+        const bool stands = t < own || !open[t - own];
+        cell[k] = stands && images.holds(at) ? grid.cell(at) : grid.cells();
       });
   stable_sort_keys(state.queue, c.cell, items, grid.cells(), c.order, c.cell_start);
   const int held = value_at(c.cell_start, grid.cells());
@@ -38,20 +41,54 @@ int sort_images(State& state, const TriangleImages& images) {
   return held;
 }
 
+/// Sorts all polygons but strips of open seams, which come last.
+void sort_polygons(State& state) {
+  ClothState& c = state.cloth;
+  const GridShape grid = c.grid;
+  const ConstVecView centroid = c.centroid.view();
+  const int *open = c.seam_open.data(), own = c.triangles;
+  int* cell = c.cell.data();
+  parallel_for(
+      state.queue, "cloth: cells", c.polygons, DRENCH_LAMBDA(int t) {
+        cell[t] = t < own || !open[t - own] ? grid.cell(centroid[t]) : grid.cells();
+      });
+  stable_sort_keys(state.queue, c.cell, c.polygons, grid.cells(), c.order, c.cell_start);
+}
+
 }  // namespace
+
+void find_open_seams(State& state) {
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view();
+  const int* pair = c.seam_pair.data();
+  const float* reach = c.seam_reach.data();
+  int* open = c.seam_open.data();
+  if (c.polygons == c.triangles) return;
+  c.seams_closed = parallel_reduce(
+      state.queue, "cloth: open seams", c.polygons - c.triangles, 0,
+      DRENCH_LAMBDA(int k) {
+        const int *a = pair + 4 * k, was = open[k];
+        const float apart2 = maximum(length2(x[a[0]] - x[a[1]]), length2(x[a[2]] - x[a[3]]));
+        open[k] = apart2 > reach[k] * reach[k];
+        return was && !open[k] ? 1 : 0;
+      },
+      Plus{});
+}
 
 void build_polygon_grid(State& state, float room) {
   ClothState& c = state.cloth;
   const ConstVecView x = c.position.view();
   const VecView centroid = c.centroid.view();
   const Corners corner = corners_of(c);
+  const int *open = c.seam_open.data(), own = c.triangles;
   const float largest = parallel_reduce(
-      state.queue, "cloth: centroids", c.triangles, 0.f,
+      state.queue, "cloth: centroids", c.polygons, 0.f,
       DRENCH_LAMBDA(int t) {
         const Vec3<float> a = corner.at(x, 3 * t), b = corner.at(x, 3 * t + 1),
                           d = corner.at(x, 3 * t + 2);
         const Vec3<float> m = (a + b + d) * (1.f / 3.f);
         centroid.set(t, m);
+        if (t >= own && open[t - own]) return 0.f;
         return maximum(length2(a - m), maximum(length2(b - m), length2(d - m)));
       },
       Larger{});
@@ -61,16 +98,11 @@ void build_polygon_grid(State& state, float room) {
   const bool periodic = any_periodic(state.parameters);
   const TriangleImages images = triangle_images_of(state);
   c.grid = make_grid_shape(images.low, images.high, room + c.largest_radius);
-  int sorted_count = c.triangles;
+  int sorted_count = c.polygons;
   if (periodic) {
     sorted_count = sort_images(state, images);
   } else {
-    const GridShape grid = c.grid;
-    int* cell = c.cell.data();
-    parallel_for(
-        state.queue, "cloth: cells", c.triangles,
-        DRENCH_LAMBDA(int t) { cell[t] = grid.cell(centroid[t]); });
-    stable_sort_keys(state.queue, c.cell, c.triangles, grid.cells(), c.order, c.cell_start);
+    sort_polygons(state);
   }
   const int* order = c.order.data();
   const ConstVecView shift = c.sorted_shift.view();

@@ -66,6 +66,14 @@ inline Corners corners_of(const ClothState& c) {
   return {c.corner.data(), c.corner_shift.view(), c.joined};
 }
 
+/// Of every vertex the triangles that meet in it, and the strips of seams.
+inline const int* polygon_fan_start(const ClothState& c) {
+  return c.polygons > c.triangles ? c.seam_fan_start.data() : c.fan_start.data();
+}
+inline const int* polygon_fan_entry(const ClothState& c) {
+  return c.polygons > c.triangles ? c.seam_fan_entry.data() : c.fan_entry.data();
+}
+
 /// The images of every triangle that may come near the domain, and which of them do.
 struct TriangleImages {
   Vec3<float> period;      // m; 0 where an axis is not periodic
@@ -104,7 +112,7 @@ inline TriangleImages triangle_images_of(const State& state) {
                         .radius = c.largest_radius,
                         .first = {0, 0, 0},
                         .count = {1, 1, 1},
-                        .triangles = c.triangles};
+                        .triangles = c.polygons};
   const auto span = [&](int k, float period, float& low, float& high) {
     if (!(period > 0.f)) return;
     low = p.low[k] - margin, high = p.high[k] + margin;
@@ -116,6 +124,10 @@ inline TriangleImages triangle_images_of(const State& state) {
   span(2, images.period.z, images.low.z, images.high.z);
   return images;
 }
+
+/// Which strips stand for nothing in this step, since their seam is open: wider than that no fluid
+/// passes between what it sews (SeamStrips).
+void find_open_seams(State& state);
 
 /// Centroids, boxes and the sorted grid, its cells at least as wide as the largest
 /// centroid-to-corner distance plus `room`.
