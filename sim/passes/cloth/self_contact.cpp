@@ -73,7 +73,7 @@ struct RowMaker {
   }
 };
 
-/// Rows of vertices.
+/// The rows that bear, by vertices.
 void sort_rows(State& state) {
   SelfContact& s = state.self_contact;
   const SheetRow* row = s.row.data();
@@ -83,7 +83,7 @@ void sort_rows(State& state) {
   parallel_for(
       state.queue, "self: keys of rows", entries, DRENCH_LAMBDA(int e) {
         const SheetRow& r = row[e >> 2];
-        const bool counts = r.mass > 0.f && (r.obstacle < 0 || (e & 3) < 3);
+        const bool counts = r.stiffness > 0.f && (r.obstacle < 0 || (e & 3) < 3);
         key[e] = counts ? r.vertex[e & 3] : padded;
       });
   stable_sort_keys(state.queue, s.key, entries, padded, s.entry, s.start);
@@ -114,46 +114,73 @@ void load_by_rows(State& state, Sides sides) {
       });
 }
 
+/// Makes the blocks of the preconditioner anew from those without rows: with the rows as they are,
+/// on the directions that a vertex may go.
+struct BlockMaker {
+  SheetRows rows;
+  ConstraintProjection may;
+  BlockInverse block, free_block, without;
+  const float* inertia;
+
+  DRENCH_HD void operator()(int i) const {
+    block.copy(i, without);
+    if (rows.any && rows.touches(i)) add_rows(i);
+    const Vec3<float> axes = may.axis[i];
+    if (axes.x * axes.y * axes.z == 0.f)
+      block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+    if (!may.obstacles) return;
+    const Vec3<float> held = may.normal[i];
+    free_block.copy(i, block);
+    if (length2(held) == 0.f) return;
+    const float cling = may.cling[i], clung[6] = {cling, 0.f, 0.f, cling, 0.f, cling};
+    if (cling > 0.f) free_block.add(i, clung, inertia[i]);
+    free_block.put_free(i, free_block, axes, held, inertia[i]);
+  }
+  DRENCH_HD void add_rows(int i) const {
+    float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
+    for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
+      const SheetRow& r = rows.row[rows.entry[e] >> 2];
+      const float w = r.weight[rows.entry[e] & 3], across = r.grip * w * w,
+                  normal = (r.stiffness - r.grip) * w * w;
+      const Vec3<float> n = r.normal, m = n * normal;
+      more[0] += m.x * n.x + across, more[1] += m.x * n.y, more[2] += m.x * n.z;
+      more[3] += m.y * n.y + across, more[4] += m.y * n.z, more[5] += m.z * n.z + across;
+    }
+    block.add(i, more, inertia[i]);
+  }
+};
+
 BlockInverse blocks_without_rows(State& state) {
   return {state.self_contact.block.data(), state.cloth.padded};
 }
 
-/// Makes the blocks of the preconditioner anew, with the rows as they are, on the directions that a
-/// vertex may go.
-void put_rows_in_blocks(State& state, Sides sides) {
-  const SheetRows rows = sheet_rows_of(state);
-  ConstraintProjection may = constraint_projection(state);
-  const bool first = sides == Sides::base;
-  may.obstacles = may.obstacles && !first;  // before, normals are of the last step
-  const BlockInverse block = block_inverse(state), free_block = free_block_inverse(state),
-                     without = blocks_without_rows(state);
-  const float *inertia = state.cloth_system.inertia.data(),
-              *inverse_mass = state.cloth.inverse_mass.data();
+BlockMaker block_maker_of(State& state) {
+  return {.rows = sheet_rows_of(state),
+          .may = constraint_projection(state),
+          .block = block_inverse(state),
+          .free_block = free_block_inverse(state),
+          .without = blocks_without_rows(state),
+          .inertia = state.cloth_system.inertia.data()};
+}
+
+/// Before anything is held: of the vertices that have rows.
+void put_rows_in_blocks(State& state) {
+  BlockMaker make = block_maker_of(state);
+  make.may.obstacles = false;  // normals are of the last step
+  const float* inverse_mass = state.cloth.inverse_mass.data();
   parallel_for(
       state.queue, "self: blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (rows.start[i] == rows.start[i + 1] || inverse_mass[i] == 0.f) return;
-        if (first && !rows.touches(i)) return;
-        float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
-        for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
-          const SheetRow& r = rows.row[rows.entry[e] >> 2];
-          const float w = r.weight[rows.entry[e] & 3], across = r.grip * w * w,
-                      normal = (r.stiffness - r.grip) * w * w;
-          const Vec3<float> n = r.normal, m = n * normal;
-          more[0] += m.x * n.x + across, more[1] += m.x * n.y, more[2] += m.x * n.z;
-          more[3] += m.y * n.y + across, more[4] += m.y * n.z, more[5] += m.z * n.z + across;
-        }
-        block.copy(i, without);
-        block.add(i, more, inertia[i]);
-        const Vec3<float> axes = may.axis[i];
-        if (axes.x * axes.y * axes.z == 0.f)
-          block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
-        if (!may.obstacles) return;
-        const Vec3<float> held = may.normal[i];
-        free_block.copy(i, block);
-        if (length2(held) == 0.f) return;
-        const float cling = may.cling[i], clung[6] = {cling, 0.f, 0.f, cling, 0.f, cling};
-        if (cling > 0.f) free_block.add(i, clung, inertia[i]);
-        free_block.put_free(i, free_block, axes, held, inertia[i]);
+        if (make.rows.touches(i) && inverse_mass[i] > 0.f) make(i);
+      });
+}
+
+/// After rows changed, of what lost some as well.
+void remake_blocks(State& state) {
+  const BlockMaker make = block_maker_of(state);
+  const float* inverse_mass = state.cloth.inverse_mass.data();
+  parallel_for(
+      state.queue, "self: all blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] > 0.f) make(i);
       });
 }
 
@@ -276,7 +303,7 @@ void start_sheet_rows(State& state) {
   parallel_for(
       state.queue, "self: blocks without rows", c.vertices,
       DRENCH_LAMBDA(int i) { without.copy(i, block); });
-  put_rows_in_blocks(state, Sides::base);
+  put_rows_in_blocks(state);
 }
 
 bool revise_sheet_rows(State& state, int round) {
@@ -289,8 +316,9 @@ bool revise_sheet_rows(State& state, int round) {
                            state.queue, "self: revise", s.rows, 0,
                            DRENCH_LAMBDA(int k) { return int(revise(row[k])); }, Larger{}) > 0;
   if (!changed) return false;
+  sort_rows(state);
   load_by_rows(state, Sides::all);
-  put_rows_in_blocks(state, Sides::all);
+  remake_blocks(state);
   return true;
 }
 

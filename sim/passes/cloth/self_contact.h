@@ -29,7 +29,7 @@ DRENCH_HD Vec3<float> push_of(const SheetRow& r) {
   return r.normal * (r.stiffness * (r.target - r.gap)) + r.rub - r.slip * r.grip;
 }
 
-/// The rows' part of A.
+/// The rows' part of A. Entries are those of rows that bear.
 struct SheetRows {
   const SheetRow* row;
   const int *start, *entry;
@@ -45,12 +45,13 @@ struct SheetRows {
     Vec3<float> y{0.f, 0.f, 0.f};
     for (int e = start[i]; e < start[i + 1]; ++e) {
       const SheetRow& r = row[entry[e] >> 2];
-      if (r.stiffness > 0.f) y = y + pull(r, x) * r.weight[entry[e] & 3];
+      y = y + pull(r, x) * r.weight[entry[e] & 3];
     }
     return y;
   }
 #if !defined(__CUDACC__)
   DRENCH_HD_CALL Vec3<Pack> times(const ConstVecView& x, Lanes i) const {
+    if (start[i.base] == start[i.base + 8]) return {Pack(0.f), Pack(0.f), Pack(0.f)};
     alignas(32) float lane[3][8] = {};
     for (int k = 0; k < 8; ++k) {
       const Vec3<float> y = times(x, i.base + k);
@@ -59,16 +60,11 @@ struct SheetRows {
     return {Pack::load(lane[0]), Pack::load(lane[1]), Pack::load(lane[2])};
   }
 #endif
-  DRENCH_HD bool touches(int i) const {
-    for (int e = start[i]; e < start[i + 1]; ++e)
-      if (row[entry[e] >> 2].stiffness > 0.f) return true;
-    return false;
-  }
+  DRENCH_HD bool touches(int i) const { return start[i] < start[i + 1]; }
   /// Whether an obstacle or a vertex beyond a range does: a shift of all of it meets resistance.
   DRENCH_HD bool touches_beyond(int i, VertexRange range) const {
     for (int e = start[i]; e < start[i + 1]; ++e) {
       const SheetRow& r = row[entry[e] >> 2];
-      if (r.stiffness == 0.f) continue;
       if (r.obstacle >= 0 || !range.contains(r.vertex[0]) || !range.contains(r.vertex[3]))
         return true;
     }
