@@ -349,17 +349,6 @@ sim::Scene scene_of(const Situation& situation, const Shot& shot) {
   return scene;
 }
 
-/// Every coordinate at the start is its next float, the one before, or itself.
-sim::Scene jostled(sim::Scene scene, uint64_t seed) {
-  Random random(seed);
-  for (sim::HostVec* column : {&scene.start.position, &scene.start.cloth_position}) {
-    for (std::vector<float>* x : {&column->x, &column->y, &column->z})
-      for (float& coordinate : *x)
-        coordinate = std::nextafter(coordinate, coordinate + float(std::floor(3 * random())) - 1);
-  }
-  return scene;
-}
-
 using MakeSolver = decltype(&sim::cuda::make_solver);
 
 sim::Stepper stepper(const sim::Scene& scene, MakeSolver make) {
@@ -428,7 +417,7 @@ TEST_P(ShellsOnCuda, AgreesWithCpuToRounding) {
   const Differences found = difference(cpu, gpu),
                     matters = difference(cpu, on_cpu(scene_of(GetParam(), without)));
   for (size_t k = 0; k < noise.size(); ++k) EXPECT_LE(found[k], 2 * noise[k]) << compared[k];
-  EXPECT_GT(matters[of_sheets_velocity], 10 * noise[of_sheets_velocity]);
+  EXPECT_GT(matters[of_sheets_velocity], 5 * noise[of_sheets_velocity]);
 }
 
 // No float atomics and fixed trees: nothing may depend on how blocks are scheduled.

@@ -16,6 +16,7 @@
 #include "sim/setup/scene.h"
 #include "sim/solver.h"
 #include "sim/stepper.h"
+#include "tests/sim/support.h"
 
 namespace drench {
 namespace {
@@ -185,10 +186,18 @@ TEST_P(Cuda, AgreesWithCpuWithinTenThousandthOfSpacingAfterTenSteps) {
 }
 
 // Single particles diverge by then, means do not: 1 % of a spacing over a fall of about one
-// spacing.
+// spacing. What a drain has taken may differ by twice what it does between CPU runs that start an
+// ulp apart.
 TEST_P(Cuda, KeepsMeanHeightsOfCpuAfterHundredSteps) {
   const sim::HostState cpu = on_cpu(scene, 100), gpu = on_cuda(scene, 100);
-  ASSERT_EQ(cpu.id.size(), gpu.id.size());
+  const auto off = [&](const sim::HostState& one) {
+    return std::abs(int(one.id.size()) - int(cpu.id.size()));
+  };
+  int noise = 0;
+  const bool drained = cpu.id.size() < scene.start.position.size();
+  for (uint64_t seed = 1; drained && seed <= 10; ++seed)
+    noise = std::max(noise, off(on_cpu(sim_tests::jostled(scene, seed), 100)));
+  EXPECT_LE(off(gpu), 2 * noise);
   EXPECT_NEAR(height(cpu.position), height(gpu.position), 0.01 * spacing);
   if (scene.cloth.vertices() == 0) return;
   EXPECT_NEAR(height(cpu.cloth_position), height(gpu.cloth_position), 0.01 * spacing);
@@ -216,6 +225,7 @@ std::vector<double> probed(const sim::Scene& scene, std::unique_ptr<sim::Solver>
   return all;
 }
 
+// Within twice what CPU runs that start an ulp apart differ by, and what a sum loses.
 TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
   const auto cuda = [&] {
     return probed(scene, sim::cuda::make_solver(scene.parameters, scene.cloth));
@@ -224,8 +234,15 @@ TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
                                 probed(scene, sim::cpu::make_solver(scene.parameters, scene.cloth)),
                             gpu = cuda();
   ASSERT_EQ(cpu.size(), gpu.size());
+  std::vector<double> noise(cpu.size());
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const sim::Scene other = sim_tests::jostled(scene, seed);
+    const auto one = probed(other, sim::cpu::make_solver(scene.parameters, scene.cloth));
+    for (size_t k = 0; k < noise.size(); ++k)
+      noise[k] = std::max(noise[k], std::abs(one[k] - cpu[k]));
+  }
   for (size_t k = 0; k < cpu.size(); ++k)
-    EXPECT_NEAR(cpu[k], gpu[k], 1e-3 * std::abs(cpu[k]) + 1e-3) << k;
+    EXPECT_NEAR(cpu[k], gpu[k], 2 * noise[k] + 1e-4 * std::abs(cpu[k])) << k;
   EXPECT_EQ(gpu, cuda());
 }
 

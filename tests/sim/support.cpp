@@ -1,6 +1,7 @@
 #include "tests/sim/support.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -102,6 +103,16 @@ V3d centre_of_mass(const sim::HostState& state) {
   V3d sum(0);
   for (size_t i = 0; i < state.id.size(); ++i) sum += at(state.position, i);
   return sum / double(state.id.size());
+}
+
+sim::Scene jostled(sim::Scene scene, uint64_t seed) {
+  Random random(seed);
+  for (sim::HostVec* column : {&scene.start.position, &scene.start.cloth_position}) {
+    for (std::vector<float>* x : {&column->x, &column->y, &column->z})
+      for (float& coordinate : *x)
+        coordinate = std::nextafter(coordinate, coordinate + float(std::floor(3 * random())) - 1);
+  }
+  return scene;
 }
 
 std::vector<std::vector<std::string>> read_validation(const std::string& name) {

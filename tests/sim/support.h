@@ -53,6 +53,9 @@ double momentum_scale(const sim::Scene& scene, const sim::HostState& state, doub
 /// Centre of mass of the particles, m local.
 V3d centre_of_mass(const sim::HostState& state);
 
+/// Every coordinate at the start is its next float, the one before, or itself.
+sim::Scene jostled(sim::Scene scene, uint64_t seed);
+
 /// Rows of a CSV file of tests/validation/data without its comment lines; the first is the header.
 std::vector<std::vector<std::string>> read_validation(const std::string& name);
 
