@@ -186,6 +186,7 @@ struct HoldRevision {
   const float *mass, *inverse_mass;
   float dt;
   int round;
+  static constexpr int last_release = 4;
 
   DRENCH_HD bool free_too_near(int i) const {
     const Vec3<float> straight = position[i] + path[i] * dt;
@@ -220,11 +221,13 @@ struct HoldRevision {
   /// Whether anything is to change.
   DRENCH_HD bool operator()(int i) const {
     const int k = hold.grip[i];
-    if (k < 0) return k == -1 && inverse_mass[i] > 0.f && free_too_near(i);
+    if (k < 0) {
+      return (k == -1 || hold.is_shell(i)) && inverse_mass[i] > 0.f && free_too_near(i);
+    }
     const ObstacleView& o = hold.obstacles.obstacle[k];
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;
-    if (normal < 0.f) return let_go(i);
+    if (normal < 0.f) return (round < last_release || !hold.is_shell(i)) && let_go(i);
     if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + path[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);
