@@ -204,7 +204,8 @@ TEST_P(Cuda, KeepsMeanHeightsOfCpuAfterHundredSteps) {
 }
 
 /// What probes of every kind read after ten steps.
-std::vector<double> probed(const sim::Scene& scene, std::unique_ptr<sim::Solver> solver) {
+std::vector<std::vector<double>> probed(const sim::Scene& scene,
+                                        std::unique_ptr<sim::Solver> solver) {
   std::vector<sim::ProbeQuery> queries(6);
   queries[0].kind = sim::ProbeKind::height;
   queries[1].kind = sim::ProbeKind::wall_force, queries[1].axis = 1;
@@ -219,31 +220,35 @@ std::vector<double> probed(const sim::Scene& scene, std::unique_ptr<sim::Solver>
   queries[4].kind = sim::ProbeKind::volume;
   queries[5].kind = sim::ProbeKind::cloth_force, queries[5].end = scene.cloth.vertices();
   solver = advance(scene, std::move(solver), 10);
-  std::vector<double> all;
-  for (const auto& answer : solver->probe(queries))
-    all.insert(all.end(), answer.begin(), answer.end());
-  return all;
+  return solver->probe(queries);
 }
 
-// Within twice what CPU runs that start an ulp apart differ by, and what a sum loses.
+// Within three times what CPU runs that start an ulp apart differ by: a pressure of next to nothing
+// comes in steps of that. Of one probe's figures some are nothing but rounding of others.
 TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
-  const auto cuda = [&] {
-    return probed(scene, sim::cuda::make_solver(scene.parameters, scene.cloth));
+  const auto on = [&](const sim::Scene& start, auto make) {
+    return probed(start, make(scene.parameters, scene.cloth));
   };
-  const std::vector<double> cpu =
-                                probed(scene, sim::cpu::make_solver(scene.parameters, scene.cloth)),
-                            gpu = cuda();
-  ASSERT_EQ(cpu.size(), gpu.size());
-  std::vector<double> noise(cpu.size());
-  for (uint64_t seed = 1; seed <= 10; ++seed) {
-    const sim::Scene other = sim_tests::jostled(scene, seed);
-    const auto one = probed(other, sim::cpu::make_solver(scene.parameters, scene.cloth));
-    for (size_t k = 0; k < noise.size(); ++k)
-      noise[k] = std::max(noise[k], std::abs(one[k] - cpu[k]));
+  const auto cpu = on(scene, sim::cpu::make_solver), gpu = on(scene, sim::cuda::make_solver);
+  auto noise = cpu;
+  for (auto& answer : noise) std::fill(answer.begin(), answer.end(), 0.);
+  const auto each = [&](const auto& f) {
+    for (size_t q = 0; q < cpu.size(); ++q)
+      for (size_t k = 0; k < cpu[q].size(); ++k) f(q, k);
+  };
+  for (uint64_t seed = 1; seed <= 30; ++seed) {
+    const auto one = on(sim_tests::jostled(scene, seed), sim::cpu::make_solver);
+    each([&](size_t q, size_t k) {
+      noise[q][k] = std::max(noise[q][k], std::abs(one[q][k] - cpu[q][k]));
+    });
   }
-  for (size_t k = 0; k < cpu.size(); ++k)
-    EXPECT_NEAR(cpu[k], gpu[k], 2 * noise[k] + 1e-4 * std::abs(cpu[k])) << k;
-  EXPECT_EQ(gpu, cuda());
+  each([&](size_t q, size_t k) {
+    double largest = 0;
+    for (const double figure : cpu[q]) largest = std::max(largest, std::abs(figure));
+    EXPECT_NEAR(cpu[q][k], gpu[q][k], 3 * noise[q][k] + 1e-4 * std::abs(cpu[q][k]) + 1e-6 * largest)
+        << q << ", " << k;
+  });
+  EXPECT_EQ(gpu, on(scene, sim::cuda::make_solver));
 }
 
 // No float atomics and fixed trees: nothing may depend on how blocks are scheduled.
