@@ -2,6 +2,7 @@
 // The table of docs/stress.md: a line for every row of a test, printed as it
 // is measured, and the gates of the research notes.
 
+#include <limits>
 #include <string>
 
 #include "tests/stress/watch.h"
@@ -13,8 +14,9 @@ namespace drench::stress_tests {
 bool long_form();
 
 /// In place of a gate.
-constexpr double not_gated = 1e30;  // the row still says whether the common gate holds
-constexpr double no_rule = 1e300;   // there is none, something outside acts: it says nothing
+// The row still says whether the common gate holds.
+constexpr double not_gated = std::numeric_limits<double>::infinity();
+constexpr double no_rule = 1e300;  // there is none, something outside acts: it says nothing
 
 /// What all stress tests are to hold. A test that must ask for less says why.
 struct Gates {

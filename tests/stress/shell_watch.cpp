@@ -158,13 +158,15 @@ double ShellWatch::energy(const sim::HostState& state) const {
 }
 
 bool ShellWatch::until(double time) {
-  while (figures_.finite && run.time < time - 1e-12) {
+  while (figures_.finite && !thrown() && run.time < time - 1e-12) {
     const double before = cpu_seconds();
     run.step_towards(time, how_.step * run.next_dt());
     measure(cpu_seconds() - before);
   }
-  return figures_.finite;
+  return figures_.finite && !thrown();
 }
+
+bool ShellWatch::thrown() const { return figures_.max_speed > 100 * figures().speed_bound; }
 
 void ShellWatch::measure(double cpu_s) {
   sim::HostState now = run.solver->save();

@@ -46,7 +46,8 @@ class ShellWatch {
                       const LevelSetMaker& make_level_set = {});
   explicit ShellWatch(sim::Scene scene, const ShellRunOptions& how = {});
 
-  /// @return false once the state is not finite: the run is over.
+  /// @return false once the state is not finite, or something is a hundred times as fast as the
+  /// bound: the run is over.
   bool until(double time);
   const sim::HostState& state() const { return last_; }
   ShellFigures figures() const;
@@ -55,6 +56,7 @@ class ShellWatch {
   Stepper run;
 
  private:
+  bool thrown() const;
   void measure(double cpu_s);
   double energy(const sim::HostState& state) const;
 
