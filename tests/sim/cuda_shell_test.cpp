@@ -70,7 +70,7 @@ Start folded(V3d x) {
   if (x.x < 0) return {x};
   const double c = std::cos(turn), s = std::sin(turn);
   const double up = std::min(1., x.x / 0.005) * 1.1 * thickness;
-  return {V3d(-x.x * c + x.z * s, x.y + up, x.z * c + x.x * s), V3d(0.3, -0.1, 0.05)};
+  return {V3d(-x.x * c + x.z * s, x.y + up, x.z * c + x.x * s), V3d(0.3, -0.2, 0.05)};
 }
 
 // --- Shots ---------------------------------------------------------------------------------------
@@ -403,7 +403,7 @@ class ShellsOnCuda : public testing::TestWithParam<Situation> {
 };
 
 // Only rounding differs: no more than CPU runs that start an ulp apart do, twice. What the
-// situation is about makes five times as much.
+// situation is about makes five times as much as that.
 TEST_P(ShellsOnCuda, AgreesWithCpuToRounding) {
   const sim::HostState cpu = on_cpu(scene), gpu = on_cuda();
   ASSERT_EQ(cpu.id.size(), gpu.id.size());
@@ -417,7 +417,7 @@ TEST_P(ShellsOnCuda, AgreesWithCpuToRounding) {
   const Differences found = difference(cpu, gpu),
                     matters = difference(cpu, on_cpu(scene_of(GetParam(), without)));
   for (size_t k = 0; k < noise.size(); ++k) EXPECT_LE(found[k], 2 * noise[k]) << compared[k];
-  EXPECT_GT(matters[of_sheets_velocity], 5 * noise[of_sheets_velocity]);
+  EXPECT_GT(matters[of_sheets_velocity], 10 * noise[of_sheets_velocity]);
 }
 
 // No float atomics and fixed trees: nothing may depend on how blocks are scheduled.

@@ -223,8 +223,8 @@ std::vector<std::vector<double>> probed(const sim::Scene& scene,
   return solver->probe(queries);
 }
 
-// Within three times what CPU runs that start an ulp apart differ by: a pressure of next to nothing
-// comes in steps of that. Of one probe's figures some are nothing but rounding of others.
+// Within twice what CPU runs that start an ulp apart differ by. Some of a probe's figures are
+// nothing but rounding of others, and a pressure of next to nothing that of the block's weight.
 TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
   const auto on = [&](const sim::Scene& start, auto make) {
     return probed(start, make(scene.parameters, scene.cloth));
@@ -243,9 +243,9 @@ TEST_P(Cuda, ProbesReadTheSameAndTheSameBitsInEveryRun) {
     });
   }
   each([&](size_t q, size_t k) {
-    double largest = 0;
+    double largest = q == 2 ? 1000 * 9.81 * 0.08 : 0;  // Pa
     for (const double figure : cpu[q]) largest = std::max(largest, std::abs(figure));
-    EXPECT_NEAR(cpu[q][k], gpu[q][k], 3 * noise[q][k] + 1e-4 * std::abs(cpu[q][k]) + 1e-6 * largest)
+    EXPECT_NEAR(cpu[q][k], gpu[q][k], 2 * noise[q][k] + 1e-4 * std::abs(cpu[q][k]) + 1e-6 * largest)
         << q << ", " << k;
   });
   EXPECT_EQ(gpu, on(scene, sim::cuda::make_solver));
