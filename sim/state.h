@@ -188,6 +188,9 @@ struct ShellState {
   VecColumn curved_shift;                     // J
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
+  VecColumn about, from;      // m, off the straight paths: where triangles are linearised anew, and
+                              // where the last solve of the step started
+  int linearised = 1;         // times in the step
   Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix

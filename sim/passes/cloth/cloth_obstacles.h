@@ -196,8 +196,8 @@ struct HoldRevision {
     return true;
   }
   /// Whether what obstacle k lets go of in this step may be held again, and the last rounds only
-  /// hold: of shells, whose guard would move it through the next layer. Two obstacles would throw it
-  /// to and fro.
+  /// hold: of shells, whose guard would move it through the next layer. Two obstacles would throw
+  /// it to and fro.
   DRENCH_HD bool may_return(int i, int k) const {
     if (!hold.is_shell(i)) return false;
     if (!hold.shares) return true;
