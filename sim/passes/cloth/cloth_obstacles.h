@@ -186,7 +186,6 @@ struct HoldRevision {
   const float *mass, *inverse_mass;
   float dt;
   int round;
-  static constexpr int last_release = 3;  // round
 
   DRENCH_HD bool free_too_near(int i) const {
     const Vec3<float> straight = position[i] + path[i] * dt;
@@ -195,17 +194,8 @@ struct HoldRevision {
     change.set(i, w);
     return true;
   }
-  /// Whether what obstacle k lets go of in this step may be held again, and the last rounds only
-  /// hold: of shells, whose guard would move it through the next layer. Two obstacles would throw
-  /// it to and fro.
-  DRENCH_HD bool may_return(int i, int k) const {
-    if (!hold.is_shell(i)) return false;
-    if (!hold.shares) return true;
-    const float keep = hold.distance_to(hold.obstacles.obstacle[k], i);
-    return hold.shared(k, keep, position[i] + hold.home(position[i])) == keep;
-  }
   DRENCH_HD bool let_go(int i) const {
-    hold.grip[i] = -2 - hold.grip[i], slides[i] = 1.f, cling[i] = 0.f;
+    hold.grip[i] = -2, slides[i] = 1.f, cling[i] = 0.f;
     hold.normal.set(i, {0.f, 0.f, 0.f});
     hold.free_block.copy(i, hold.block);
     right.set(i, given[i]);
@@ -231,13 +221,13 @@ struct HoldRevision {
   DRENCH_HD bool operator()(int i) const {
     const int k = hold.grip[i];
     if (k < 0) {
-      if (inverse_mass[i] == 0.f || (k < -1 && !may_return(i, -2 - k))) return false;
-      return free_too_near(i);
+      // The guard would move a shell's vertex through the next layer.
+      return (k == -1 || hold.is_shell(i)) && inverse_mass[i] > 0.f && free_too_near(i);
     }
     const ObstacleView& o = hold.obstacles.obstacle[k];
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;
-    if (normal < 0.f) return (round <= last_release || !may_return(i, k)) && let_go(i);
+    if (normal < 0.f) return let_go(i);
     if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + path[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);

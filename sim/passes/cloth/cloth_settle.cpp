@@ -82,8 +82,8 @@ bool revise_walls(State& state, int round) {
 }
 
 /// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
-/// sticks and who slides; whether anything changed. What was let go is not held again in the step:
-/// the guard stops it.
+/// sticks and who slides; whether anything changed. Springs that were let go are not held again in
+/// the step: the guard stops them.
 bool revise_holds(State& state, const ConstVecView& given, int round) {
   ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
@@ -110,11 +110,12 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 /// Whether who is held, who slides and which pairs of sheets meet change by the solve that was
 /// made.
 bool revise_contacts(State& state, const ConstVecView& given, int round) {
-  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0;
-  if (!obstacles && !sheets) return false;
+  const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0,
+             walls = sheets || state.shell.any;
+  if (!obstacles && !walls) return false;
   find_reactions(state, given);
   bool changed = obstacles && revise_holds(state, given, round);
-  const bool at_walls = sheets && revise_walls(state, round);
+  const bool at_walls = walls && revise_walls(state, round);
   if (sheets) changed |= revise_sheet_rows(state, round);
   ClothLevels& levels = state.cloth_levels;
   if ((changed || at_walls) && levels.on) levels.on = !anything_touches(state);
@@ -136,53 +137,58 @@ bool anything_is_met(const State& state) {
              Larger{}) > 0;
 }
 
-/// Newton's method for contacts as they are, from where the displacement is. Its solves are exact
-/// once it is at its end. What nothing meets is linear: an impact strains, free motion hardly.
-/// @param linearised  times in this step
-void solve_to_the_end(State& state, const ConstVecView& right, int most_iterations,
-                      float tolerance, int& linearised) {
-  constexpr int most_solves = 8, most_linearisations = 24;
-  constexpr float loose = 30.f;
-  const VecView change = state.cloth_system.change.view(), from = state.shell.from.view();
-  const auto sweeps = [&] { return value_at(state.cloth_system.control, 0).sweeps; };
-  if (!state.shell.any || state.contact.near > 0 || !anything_is_met(state))
-    return solve_cloth(state, change, right, most_iterations, tolerance);
-  bool exact = linearised == 1;
-  for (int solves = 1, before = sweeps();; ++solves) {
-    for_each_lane(
-        state.queue, "shell: from", state.cloth.padded,
-        DRENCH_LAMBDA(auto i) { from.put(i, change.at(i)); });
-    solve_cloth(state, change, right, most_iterations, exact ? tolerance : loose * tolerance);
-    const bool moved = std::exchange(before, sweeps()) < before;
-    if (!moved || !shell_strains_unseen(state, linearised)) {
-      if (exact) return;
-      exact = true;
-      continue;
-    }
-    search_line(state, right, linearised);
-    if (solves > most_solves || linearised == most_linearisations) return;
-    relinearise_shell(state), ++linearised, exact = false;
-  }
+/// Whether triangles are to be linearised anew about where the solve that was made ends, of
+/// Newton's method on the energy, which a step is cut short for that would raise it.
+/// @param more  whether there may be another solve
+bool relinearise(State& state, const ConstVecView& right, bool more) {
+  int& linearised = state.shell.linearised;
+  if (!shell_strains_unseen(state, linearised)) return false;
+  search_line(state, right, linearised);
+  if (!more) return false;
+  relinearise_shell(state), ++linearised;
+  return true;
 }
 
 }  // namespace
 
 void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
                      const ContactTolerances& tolerance) {
-  constexpr int most_rounds = 6;
-  const bool obstacles = state.parameters.obstacles > 0,
-             meets = obstacles || state.self_contact.rows > 0;
-  const VecView right = state.cloth_system.answer.view();
+  // What nothing meets is nearly linear, and what fluid presses stays what the pressure solve saw.
+  const bool obstacles = state.parameters.obstacles > 0, shells = state.shell.any,
+             newton = shells && state.contact.near == 0;
+  constexpr int most_searches = 8, most_linearisations = 24;
+  constexpr float loose = 30.f;  // until contacts and triangles are the right ones
+  const int most_rounds = newton ? 20 : 6;
+  const VecView right = state.cloth_system.answer.view(), change = state.cloth_system.change.view(),
+                from = state.shell.from.view();
   const ConstVecView rub = state.cloth_system.rub.view();
   parallel_for(
       state.queue, "cloth: given", state.cloth.padded,
       DRENCH_LAMBDA(int i) { right.set(i, obstacles ? given[i] + rub[i] : given[i]); });
+  const auto all_sweeps = [&] { return value_at(state.cloth_system.control, 0).sweeps; };
   int& linearised = state.shell.linearised = 1;
-  solve_to_the_end(state, right, most_iterations, tolerance.first, linearised);
-  follow_sheet_rows(state);
-  for (int round = 0; meets && round < most_rounds; ++round) {
-    if (!revise_contacts(state, given, round)) return;
-    solve_to_the_end(state, right, most_iterations, tolerance.between, linearised);
+  bool met = newton && anything_is_met(state), exact = !met;
+  for (int round = 0, searches = 0, before = all_sweeps();;) {
+    if (met)
+      for_each_lane(
+          state.queue, "shell: from", state.cloth.padded,
+          DRENCH_LAMBDA(auto i) { from.put(i, change.at(i)); });
+    const bool first = round == 0 && linearised == 1;
+    solve_cloth(state, change, right, most_iterations,
+                exact && first ? tolerance.first : (exact ? 1.f : loose) * tolerance.between);
+    const int sweeps = all_sweeps() - std::exchange(before, all_sweeps());
+    // One that was given up is no place to start from.
+    const bool more =
+        searches < most_searches && linearised < most_linearisations && sweeps < most_iterations;
+    if (met && sweeps > 0 && relinearise(state, right, more)) {
+      ++searches, exact = false;
+    } else if (round < most_rounds && revise_contacts(state, given, round)) {
+      ++round, searches = 0, met = newton, exact = !newton;
+    } else if (exact) {
+      return;
+    } else {
+      exact = true;
+    }
   }
 }
 

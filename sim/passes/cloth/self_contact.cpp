@@ -78,10 +78,6 @@ void sort_rows(State& state) {
   SelfContact& s = state.self_contact;
   const SheetRow* row = s.row.data();
   const int entries = 4 * s.rows, padded = state.cloth.padded;
-  if (entries == 0) {
-    s.start.resize(size_t(padded) + 1), s.start.clear_bytes(state.queue, 0);
-    return;
-  }
   s.key.resize(entries);
   int* key = s.key.data();
   parallel_for(
@@ -187,8 +183,9 @@ struct RowRevision {
     for (int k = 0; k < 4; ++k) s = s + change[r.vertex[k]] * r.weight[k];
     const float along = dot(r.normal, s), gap = r.gap + along;
     if (r.stiffness == 0.f) {
-      // What was let go twice is the guard's.
-      if (gap >= r.target - 0.02f * r.thickness || r.released > 1) return false;
+      // What two obstacles press is thrown to and fro if all of it is held.
+      const bool thrown = r.obstacle >= 0 && r.released > 1;
+      if (gap >= r.target - 0.02f * r.thickness || thrown) return false;
       r.stiffness = row_stiffness * r.mass;
       return true;
     }
@@ -199,6 +196,7 @@ struct RowRevision {
       return true;
     }
     if (force < 0.f) {
+      if (r.released > 1) return false;  // it would come too near once more
       r.stiffness = r.grip = 0.f, r.rub = {0.f, 0.f, 0.f};
       ++r.released;
       return true;
@@ -245,40 +243,6 @@ float slack_of(const State& state, float gravity) {
   return std::max(least, std::min(1.5f * dt * dt * std::sqrt(fastest2), 0.1f * s.edge));
 }
 
-RowMaker row_maker_of(const State& state) {
-  const float* g = state.parameters.gravity;
-  return {.pieces = sheet_pieces_of(state),
-          .owned = state.self_contact.owned.data(),
-          .inverse_mass = state.cloth.inverse_mass.data(),
-          .position = state.cloth.position.view(),
-          .rounding = state.shell.rounding.view(),
-          .velocity = state.cloth.velocity.view(),
-          .path = path_velocity_of(state),
-          .dt = float(state.dt),
-          .gravity = std::hypot(g[0], g[1], g[2])};
-}
-
-/// The pairs of paths that end at SelfContact::to, and their rows; those bear that straight paths
-/// bring too near.
-void find_rows(State& state) {
-  SelfContact& s = state.self_contact;
-  const float* g = state.parameters.gravity;
-  const float gravity = std::hypot(g[0], g[1], g[2]);
-  find_sheet_pairs(state, slack_of(state, gravity));
-  find_triangles_at_obstacles(state);
-  s.rows = s.pairs + state.triangle_obstacles.touches;
-  if (s.rows > 0) {
-    s.row.resize(s.rows);
-    const RowMaker make = row_maker_of(state);
-    const SheetPair* pair = s.pair.data();
-    SheetRow* row = s.row.data();
-    parallel_for(
-        state.queue, "self: rows", s.pairs, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
-    put_touch_rows(state, s.pairs);
-  }
-  sort_rows(state);
-}
-
 /// Rows with a stiffness, of pairs of sheets and at obstacles.
 struct BearingRows {
   int sheets = 0, obstacles = 0;
@@ -291,42 +255,43 @@ struct BearingRows {
 
 void start_sheet_rows(State& state) {
   SelfContact& s = state.self_contact;
+  const ClothState& c = state.cloth;
   s.pairs = s.rows = 0;
   if (!s.any) return;
-  const float dt = float(state.dt);
-  const ConstVecView x = state.cloth.position.view(), path = path_velocity_of(state);
+  const float* g = state.parameters.gravity;
+  const float dt = float(state.dt), gravity = std::hypot(g[0], g[1], g[2]);
+  const ConstVecView x = c.position.view(), path = path_velocity_of(state);
   const VecView to = s.to.view();
   parallel_for(
-      state.queue, "self: paths", state.cloth.vertices,
+      state.queue, "self: paths", c.vertices,
       DRENCH_LAMBDA(int i) { to.set(i, x[i] + path[i] * dt); });
-  find_rows(state);
+  find_sheet_pairs(state, slack_of(state, gravity));
+  find_triangles_at_obstacles(state);
+  s.rows = s.pairs + state.triangle_obstacles.touches;
   if (s.rows == 0) return;
+  s.row.resize(s.rows);
+  const RowMaker make{.pieces = sheet_pieces_of(state),
+                      .owned = s.owned.data(),
+                      .inverse_mass = c.inverse_mass.data(),
+                      .position = x,
+                      .rounding = state.shell.rounding.view(),
+                      .velocity = c.velocity.view(),
+                      .path = path,
+                      .dt = dt,
+                      .gravity = gravity};
+  const SheetPair* pair = s.pair.data();
+  SheetRow* row = s.row.data();
+  parallel_for(
+      state.queue, "self: rows", s.pairs, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
+  put_touch_rows(state, s.pairs);
+  sort_rows(state);
   s.load.clear(state.queue);
   load_by_rows(state, Sides::base);
   const BlockInverse block = block_inverse(state), without = raw_block_inverse(state);
   parallel_for(
-      state.queue, "self: blocks without rows", state.cloth.vertices,
+      state.queue, "self: blocks without rows", c.vertices,
       DRENCH_LAMBDA(int i) { without.copy(i, block); });
   put_rows_in_blocks(state);
-}
-
-void follow_sheet_rows(State& state) {
-  SelfContact& s = state.self_contact;
-  if (s.rows == 0) return;
-  const float dt = float(state.dt);
-  const ConstVecView x = state.cloth.position.view(), path = path_velocity_of(state),
-                     change = state.cloth_system.change.view();
-  const VecView to = s.to.view();
-  const float off2 = parallel_reduce(
-      state.queue, "self: off the straight paths", state.cloth.vertices, 0.f,
-      DRENCH_LAMBDA(int i) { return length2(change[i]); }, Larger{});
-  if (off2 <= s.slack * s.slack) return;
-  parallel_for(
-      state.queue, "self: solved paths", state.cloth.vertices,
-      DRENCH_LAMBDA(int i) { to.set(i, x[i] + path[i] * dt + change[i]); });
-  find_rows(state);
-  load_by_rows(state, Sides::all);
-  remake_blocks(state);
 }
 
 bool revise_sheet_rows(State& state, int round) {

@@ -81,10 +81,6 @@ inline SheetRows sheet_rows_of(const State& state) {
 /// system from the start. After linearise_cloth.
 void start_sheet_rows(State& state);
 
-/// Finds the pairs anew where the first solve takes vertices farther off their straight paths than
-/// they were found for.
-void follow_sheet_rows(State& state);
-
 /// Lets go the rows that pull by the solve that was made, takes in what came too near, and finds
 /// who sticks and who slides; the right sides follow. Whether anything changed.
 bool revise_sheet_rows(State& state, int round);

@@ -64,8 +64,10 @@ enum class About { path, end };
 /// Along a line of displacements from where triangles are linearised, kg m^2: the slope and the
 /// curvature of their energy as the matrix has them, and what it gains up to parts of the line.
 struct LineEnergies {
-  static constexpr int places = 5;
-  static DRENCH_HD float part(int place) { return 1.f / float(1 << place); }
+  static constexpr int places = 8;
+  static DRENCH_HD float part(int place) {
+    return 1.f / float(1 << (place < 5 ? place : 2 * place - 4));
+  }
   double slope = 0, curvature = 0, gain[places] = {};
 
   DRENCH_HD LineEnergies operator+(const LineEnergies& other) const {
