@@ -15,7 +15,9 @@ struct WallRevision {
   ClothWalls walls;
   ConstVecView position, path, reaction;
   VecView free, change;
-  BlockInverse block;
+  BlockInverse block, free_block;
+  ConstVecView normal;  // of what holds the vertex; only with obstacles
+  bool obstacles;
   const float *inertia, *inverse_mass;
   float dt, reach;
   bool release;
@@ -42,7 +44,13 @@ struct WallRevision {
     along(walls.low.z, walls.high.z, from.z, straight.z, to.z, push.z, axes.z, w.z);
     if (!held && !freed) return false;
     free.set(i, axes), change.set(i, w);
-    if (held) block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+    if (!held) return true;
+    block.put_free(i, block, axes, {0.f, 0.f, 0.f}, inertia[i]);
+    if (!obstacles) return true;
+    if (length2(normal[i]) > 0.f)
+      free_block.put_free(i, block, axes, normal[i], inertia[i]);
+    else
+      free_block.copy(i, block);
     return true;
   }
 };
@@ -71,6 +79,9 @@ bool revise_walls(State& state, int round) {
                             .free = s.free.view(),
                             .change = s.change.view(),
                             .block = block_inverse(state),
+                            .free_block = free_block_inverse(state),
+                            .normal = s.normal.view(),
+                            .obstacles = state.parameters.obstacles > 0,
                             .inertia = s.inertia.data(),
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),

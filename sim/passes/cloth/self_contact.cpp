@@ -174,7 +174,7 @@ void put_rows_in_blocks(State& state) {
 struct RowRevision {
   ConstVecView change;
   float inverse_dt, dt;
-  int round;
+  int round, obstacles;
 
   /// Whether anything is to change.
   DRENCH_HD bool operator()(SheetRow& r) const {
@@ -184,7 +184,7 @@ struct RowRevision {
     const float along = dot(r.normal, s), gap = r.gap + along;
     if (r.stiffness == 0.f) {
       // What two obstacles press is thrown to and fro if all of it is held.
-      const bool thrown = r.obstacle >= 0 && r.released > 1;
+      const bool thrown = r.obstacle >= 0 && r.released > 1 && obstacles > 1;
       if (gap >= r.target - 0.02f * r.thickness || thrown) return false;
       r.stiffness = row_stiffness * r.mass;
       return true;
@@ -298,7 +298,8 @@ bool revise_sheet_rows(State& state, int round) {
   SelfContact& s = state.self_contact;
   if (s.rows == 0) return false;
   const float dt = float(state.dt);
-  const RowRevision revise{state.cloth_system.change.view(), 1.f / dt, dt, round};
+  const RowRevision revise{state.cloth_system.change.view(), 1.f / dt, dt, round,
+                           state.obstacles.count};
   SheetRow* row = s.row.data();
   const bool changed = parallel_reduce(
                            state.queue, "self: revise", s.rows, 0,
