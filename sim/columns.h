@@ -282,6 +282,8 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"shell.normal", "1", Group::shell_system}, s.normal, none);
   visit({"turning", "J", Group::shell_system}, s.turning, none);
   visit({"shell.path", "m/s", Group::shell_system}, s.path, none);
+  visit({"about", "m", Group::shell_system}, s.about, none);
+  visit({"from", "m", Group::shell_system}, s.from, none);
   visit({"element", "", Group::shell_system}, s.element, none);
   visit({"block", "kg", Group::shell_system}, s.block, none);
   visit({"shell.tension", "kg", Group::shell_system}, s.tension, none);

@@ -188,6 +188,9 @@ struct ShellState {
   VecColumn curved_shift;                     // J
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
+  VecColumn about, from;      // m, off the straight paths: where triangles are linearised anew, and
+                              // where the last solve of the step started
+  int linearised = 1;         // times in the step
   Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix
@@ -286,6 +289,7 @@ struct SheetRow {
   Vec3<float> normal;     // unit, from the second to the first
   float gap;              // m, at the end of the straight paths
   float thickness;        // m, that the pair keeps apart
+  bool pressed;           // by two obstacles, less than four thicknesses apart
   float target;           // m, gap that is asked for
   Vec3<float> slip;       // m, across the normal along the straight paths
   Vec3<float> speed;      // m/s, across the normal at the start of the step

@@ -122,7 +122,8 @@ constexpr ColumnSet walls =
 constexpr ColumnSet sheets = cloth | cloth_fixed;
 constexpr ColumnSet near_list = near_cloth | contact | rows | cloth_fixed;
 /// What a pressure solve writes beside cloth.
-constexpr ColumnSet response = cloth_system | cloth_obstacles | loads | self_contact | sorting;
+constexpr ColumnSet response =
+    cloth_system | shell_system | cloth_obstacles | loads | self_contact | sorting;
 
 const Pass all_passes[] = {
     {"turn_frame", turning, moving | cloth, velocity, turn_frame, cloth},

@@ -36,7 +36,15 @@ Shot with_layers(Shot shot) {
   return shot;
 }
 
-/// The shots whose bits are kept, which use every pass, two of them with layers of shells, and
+/// Fluid in a corner of the domain, far from the sheets.
+Shot beside_fluid(Shot shot) {
+  shot.fluid.spacing = 0.04, shot.fluid.solver = FluidSolver::incompressible;
+  const V3d size(0.2, 0.08, 0.2);
+  shot.fluid.box = {{.min = shot.domain.min, .max = shot.domain.min + size}};
+  return shot;
+}
+
+/// The shots whose bits are kept, which use every pass, three of them with layers of shells, and
 /// cloth alone in wind.
 std::map<std::string, Shot> kept_shots() {
   std::map<std::string, Shot> shots;
@@ -47,6 +55,7 @@ std::map<std::string, Shot> kept_shots() {
   wind.wind.present = true, wind.wind.velocity = Animated<V3d>(V3d(3, 0, 0));
   shots["napkin in wind"] = wind;
   shots["layers"] = with_layers(shots.at("napkin"));
+  shots["layers beside water"] = beside_fluid(shots.at("layers"));
   shots["layers in water"] = with_layers(shots.at("splash"));
   return shots;
 }

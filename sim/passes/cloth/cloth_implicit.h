@@ -197,6 +197,12 @@ inline BlockInverse free_block_inverse(State& state) {
   return {state.cloth_system.free_factor.data(), state.cloth.padded};
 }
 
+/// Of the blocks without rows of contact (self_contact.h), on all directions where a vertex has
+/// any.
+BlockInverse raw_block_inverse(State& state);
+/// The blocks of the preconditioner from these.
+void remake_blocks(State& state);
+
 /// The matrix at the positions and the right side without loads; w = 0.
 void linearise_cloth(State& state);
 

@@ -220,7 +220,10 @@ struct HoldRevision {
   /// Whether anything is to change.
   DRENCH_HD bool operator()(int i) const {
     const int k = hold.grip[i];
-    if (k < 0) return k == -1 && inverse_mass[i] > 0.f && free_too_near(i);
+    if (k < 0) {
+      // The guard would move a shell's vertex through the next layer.
+      return (k == -1 || hold.is_shell(i)) && inverse_mass[i] > 0.f && free_too_near(i);
+    }
     const ObstacleView& o = hold.obstacles.obstacle[k];
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;

@@ -150,16 +150,12 @@ struct BlockMaker {
   }
 };
 
-BlockInverse blocks_without_rows(State& state) {
-  return {state.self_contact.block.data(), state.cloth.padded};
-}
-
 BlockMaker block_maker_of(State& state) {
   return {.rows = sheet_rows_of(state),
           .may = constraint_projection(state),
           .block = block_inverse(state),
           .free_block = free_block_inverse(state),
-          .without = blocks_without_rows(state),
+          .without = raw_block_inverse(state),
           .inertia = state.cloth_system.inertia.data()};
 }
 
@@ -171,16 +167,6 @@ void put_rows_in_blocks(State& state) {
   parallel_for(
       state.queue, "self: blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
         if (make.rows.touches(i) && inverse_mass[i] > 0.f) make(i);
-      });
-}
-
-/// After rows changed, of what lost some as well.
-void remake_blocks(State& state) {
-  const BlockMaker make = block_maker_of(state);
-  const float* inverse_mass = state.cloth.inverse_mass.data();
-  parallel_for(
-      state.queue, "self: all blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (inverse_mass[i] > 0.f) make(i);
       });
 }
 
@@ -197,8 +183,8 @@ struct RowRevision {
     for (int k = 0; k < 4; ++k) s = s + change[r.vertex[k]] * r.weight[k];
     const float along = dot(r.normal, s), gap = r.gap + along;
     if (r.stiffness == 0.f) {
-      // What was let go twice is the guard's.
-      if (gap >= r.target - 0.02f * r.thickness || r.released > 1) return false;
+      // What two obstacles press is thrown to and fro if all of it is held.
+      if (gap >= r.target - 0.02f * r.thickness || (r.pressed && r.released > 1)) return false;
       r.stiffness = row_stiffness * r.mass;
       return true;
     }
@@ -209,6 +195,7 @@ struct RowRevision {
       return true;
     }
     if (force < 0.f) {
+      if (r.released > 1) return false;  // it would come too near once more
       r.stiffness = r.grip = 0.f, r.rub = {0.f, 0.f, 0.f};
       ++r.released;
       return true;
@@ -299,7 +286,7 @@ void start_sheet_rows(State& state) {
   sort_rows(state);
   s.load.clear(state.queue);
   load_by_rows(state, Sides::base);
-  const BlockInverse block = block_inverse(state), without = blocks_without_rows(state);
+  const BlockInverse block = block_inverse(state), without = raw_block_inverse(state);
   parallel_for(
       state.queue, "self: blocks without rows", c.vertices,
       DRENCH_LAMBDA(int i) { without.copy(i, block); });
@@ -320,6 +307,20 @@ bool revise_sheet_rows(State& state, int round) {
   load_by_rows(state, Sides::all);
   remake_blocks(state);
   return true;
+}
+
+BlockInverse raw_block_inverse(State& state) {
+  if (state.self_contact.rows == 0) return block_inverse(state);
+  return {state.self_contact.block.data(), state.cloth.padded};
+}
+
+void remake_blocks(State& state) {
+  const BlockMaker make = block_maker_of(state);
+  const float* inverse_mass = state.cloth.inverse_mass.data();
+  parallel_for(
+      state.queue, "self: all blocks", state.cloth.vertices, DRENCH_LAMBDA(int i) {
+        if (inverse_mass[i] > 0.f) make(i);
+      });
 }
 
 ClothContacts count_cloth_contacts(const State& state) {

@@ -139,8 +139,8 @@ void load_shell(State& state, const ClothTopology& cloth) {
   load_curvature(state, cloth);
   const size_t entries = size_t(8) * s.ring_slots, padded = state.cloth.padded;
   s.block.resize(9 * entries), s.tension.resize(entries), s.diagonal.resize(6 * padded);
-  for (VecColumn* v : {&s.path, &s.base, &s.landed, &s.rounding, &s.left, &s.lost, &s.acceleration,
-                       &s.friction, &s.internal})
+  for (VecColumn* v : {&s.path, &s.about, &s.from, &s.base, &s.landed, &s.rounding, &s.left,
+                       &s.lost, &s.acceleration, &s.friction, &s.internal})
     v->resize(padded);
   if (!state.cloth.joined) return;
   for (auto [column, host] : {std::pair(&s.push.x, &t.push_x), std::pair(&s.push.y, &t.push_y),

@@ -71,6 +71,12 @@ struct RestTriangle {
 template <class T>
 struct SurfaceGradient {
   Vec3<T> warp, weft;
+  friend DRENCH_HD SurfaceGradient operator+(const SurfaceGradient& a, const SurfaceGradient& b) {
+    return {a.warp + b.warp, a.weft + b.weft};
+  }
+  friend DRENCH_HD SurfaceGradient operator*(const SurfaceGradient& a, T s) {
+    return {a.warp * s, a.weft * s};
+  }
 };
 
 /// Of what has the values a, b, c at the corners. Of positions: the deformation gradient F.

@@ -1,153 +1,17 @@
 #include "sim/passes/cloth/shell_system.h"
 
 #include <algorithm>
+#include <limits>
 
+#include "sim/passes/cloth/cloth_implicit.h"
 #include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/self_contact.h"
 #include "sim/passes/cloth/shell_bending.h"
+#include "sim/passes/cloth/shell_elements.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
 namespace {
-
-/// Fields of a triangle: minus the blocks of corners 0 1, 0 2 and 1 2 by rows, times dt^2 and what
-/// of the new force counts; forces on corners 1 and 2 where straight paths end; tensions of the
-/// sides 0 1, 0 2, 1 2.
-enum ElementFields { blocks = 0, forces = 27, tensions = 33 };
-static_assert(tensions + 3 == shell_element_fields);
-
-/// What places the corners of triangles, where the step starts: positions with what they round off;
-/// or so much later on straight paths.
-struct ShellCorners {
-  ConstVecView position, rounding, path, edge_shift;
-  const int* corner;
-  int stride;   // from one corner to the next, of triangles
-  float later;  // s
-  bool joined;
-
-  template <class Index>
-  DRENCH_HD auto vertex(Index t, int c) const {
-    return load(corner + c * stride, t);
-  }
-  /// From one vertex to another, but for the shifts of seams.
-  template <class Index>
-  DRENCH_HD auto between(Index from, Index to) const {
-    const auto way = (position.at(to) - position.at(from)) + (rounding.at(to) - rounding.at(from)),
-               d = path.at(to) - path.at(from);
-    return way + d * decltype(d.x)(later);
-  }
-  /// From corner 0 to corner c.
-  template <class Index>
-  DRENCH_HD auto edge(Index t, int c) const {
-    auto e = between(vertex(t, 0), vertex(t, c));
-    if (joined) e = e + edge_shift.at(t + (c - 1) * stride);
-    return e;
-  }
-  /// What the paths change it by, m/s.
-  template <class Index>
-  DRENCH_HD auto opening(Index t, int c) const {
-    return path.at(vertex(t, c)) - path.at(vertex(t, 0));
-  }
-};
-
-struct ShellElements {
-  ShellCorners corners;  // at the start
-  const float *area, *gradient, *law;
-  const int* sheet;
-  float* element;
-  int sheets;
-  float dt, dt2;  // s; s^2 times what of the new force counts
-
-  template <class T, class Index>
-  DRENCH_HD MembraneLaw<T> law_of(Index sheet_of) const {
-    const auto field = [&](int k) { return load(law + k * sheets, sheet_of); };
-    return {.moduli = {field(0), field(1), field(2), field(3), T(0.f), T(0.f)},
-            .limit = {field(4), field(5)},
-            .damping_time = field(6)};
-  }
-
-  /// How far along its straight path a triangle is linearised, by the strain of the whole path.
-  /// What turns by a tenth has 0.005, which the step takes back; an impact has more.
-  template <class T>
-  DRENCH_HD static T followed_part(Symmetric2<T> strained) {
-    return T(1.f) / (T(1.f) + contract(strained, strained) * T(4e4f));
-  }
-
-  template <class Index>
-  DRENCH_HD void operator()(Index t) const {
-    using T = decltype(load(area, t));
-    const int stride = corners.stride;
-    const auto put = [&](int field, T value) { store(element + field * stride, t, value); };
-    RestTriangle<T> rest;
-    rest.area = load(area, t);
-    for (int k = 0; k < 2; ++k) {
-      rest.gradient_x[k] = load(gradient + k * stride, t);
-      rest.gradient_y[k] = load(gradient + (2 + k) * stride, t);
-    }
-    const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-    const MembraneLaw<T> of = law_of<T>(load(sheet, t));
-    const SurfaceGradient<T> start =
-        surface_gradient(rest, none, corners.edge(t, 1), corners.edge(t, 2));
-    const SurfaceGradient<T> rate =
-        surface_gradient(rest, none, corners.opening(t, 1), corners.opening(t, 2));
-    const auto later = [&](T time) {
-      return SurfaceGradient<T>{start.warp + rate.warp * time, start.weft + rate.weft * time};
-    };
-    const Symmetric2<T> still{T(0.f), T(0.f), T(0.f)}, first = green_strain(start);
-    const T part = followed_part(green_strain(later(T(dt))) + first * T(-1.f)),
-            left = (T(1.f) - part) * T(dt);
-    const SurfaceGradient<T> f = later(part * T(dt)), ahead{rate.warp * left, rate.weft * left};
-    // Strain is quadratic along the path: its mean rate is that halfway.
-    auto response =
-        of.at(green_strain(f), green_strain_rate(later(part * T(0.5f * dt)), rate) * part, T(dt));
-    response.stress = response.stress + response.moduli.times(green_strain_rate(f, ahead));
-    // Not at f: what the path stretches is taken back.
-    const Symmetric2<T> pull = positive_part(of.at(first, still, T(dt)).stress);
-    const T scale(-dt2);
-    for (int pair = 0; pair < 3; ++pair) {
-      const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
-      const Block3<T> k = membrane_block(rest, f, pull, response.moduli, a, b);
-      const Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
-      for (int r = 0; r < 3; ++r) {
-        put(blocks + 9 * pair + 3 * r, row[r].x), put(blocks + 9 * pair + 3 * r + 1, row[r].y);
-        put(blocks + 9 * pair + 3 * r + 2, row[r].z);
-      }
-    }
-    for (int c = 1; c < 3; ++c) {
-      const Vec3<T> force =
-          membrane_force(rest, f, response.stress, c) + membrane_force(rest, ahead, pull, c);
-      put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
-      put(forces + 3 * c - 1, force.z);
-    }
-    put_tensions(rest, pull, put);
-  }
-
-  /// Springs of no direction whose energy is nowhere above that of the stress in the triangle: its
-  /// own three, w = -A grad L_a . S grad L_b, of which at most one is negative. The two others make
-  /// up for that one, in the proportion of what they have.
-  template <class T, class Put>
-  DRENCH_HD void put_tensions(const RestTriangle<T>& rest, const Symmetric2<T>& pull,
-                              const Put& put) const {
-    T w[3];
-    for (int pair = 0; pair < 3; ++pair) {
-      const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
-      const T ax = rest.along_warp(a), ay = rest.along_weft(a), bx = rest.along_warp(b),
-              by = rest.along_weft(b);
-      w[pair] = T(-dt2) * rest.area *
-                (ax * (pull.xx * bx + pull.xy * by) + ay * (pull.xy * bx + pull.yy * by));
-    }
-    // c (a + b)^2 <= c (1 + s) a^2 + c (1 + 1/s) b^2 with s = sqrt(w_b / w_a) of the two others
-    const T lack[3] = {max0(-w[0]), max0(-w[1]), max0(-w[2])};
-    const T root[3] = {square_root(max0(w[0])), square_root(max0(w[1])), square_root(max0(w[2]))};
-    for (int k = 0; k < 3; ++k) {
-      const int p = (k + 1) % 3, q = (k + 2) % 3;
-      const T small(1e-30f);
-      const T by_q = lack[q] * (T(1.f) + root[p] / maximum(root[k], small)),
-              by_p = lack[p] * (T(1.f) + root[q] / maximum(root[k], small));
-      put(tensions + k, max0(max0(w[k]) - by_p - by_q));
-    }
-  }
-};
 
 /// The straight paths, where nothing has stopped a vertex since the last step.
 void find_paths(State& state) {
@@ -300,61 +164,157 @@ struct ShellVertices {
   }
 };
 
-}  // namespace
+ShellElements elements_of(State& state, About about) {
+  ShellState& s = state.shell;
+  return {.corners = {.position = state.cloth.position.view(),
+                      .rounding = s.rounding.view(),
+                      .path = s.path.view(),
+                      .change = s.about.view(),
+                      .edge_shift = s.edge_shift.view(),
+                      .corner = s.corner.data(),
+                      .stride = s.triangles,
+                      .later = 0.f,
+                      .off = false,
+                      .joined = state.cloth.joined},
+          .area = s.area.data(),
+          .gradient = s.gradient.data(),
+          .law = s.law.data(),
+          .sheet = s.sheet.data(),
+          .element = s.element.data(),
+          .sheets = s.sheets,
+          .dt = float(state.dt),
+          .dt2 = shell_matrix_of(state).dt2,
+          .about = about};
+}
 
-void linearise_shell(State& state) {
+/// What triangles give to the rows.
+ShellVertices linearise_triangles(State& state, About about) {
   ShellState& s = state.shell;
   const ClothState& c = state.cloth;
-  find_paths(state);
-  if (state.pins.count > 0) find_pin_paths(state);
-  const ShellCorners corners{.position = c.position.view(),
-                             .rounding = s.rounding.view(),
-                             .path = s.path.view(),
-                             .edge_shift = s.edge_shift.view(),
-                             .corner = s.corner.data(),
-                             .stride = s.triangles,
-                             .later = 0.f,
-                             .joined = c.joined};
-  const ShellElements elements{.corners = corners,
-                               .area = s.area.data(),
-                               .gradient = s.gradient.data(),
-                               .law = s.law.data(),
-                               .sheet = s.sheet.data(),
-                               .element = s.element.data(),
-                               .sheets = s.sheets,
-                               .dt = float(state.dt),
-                               .dt2 = shell_matrix_of(state).dt2};
+  const ShellElements elements = elements_of(state, about);
   for_each_lane(
       state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
-  ShellCorners at_end = corners;
-  at_end.later = float(state.dt);
+  ShellCorners at_end = elements.corners;
+  at_end.later = float(state.dt), at_end.off = about == About::end;
   const RestCurvature rest = rest_curvature_of(state, at_end);
   if (rest.any)
     parallel_for(
         state.queue, "shell: rest curvature", c.triangles,
         DRENCH_LAMBDA(int t) { rest.prepare(t); });
-  const ShellVertices vertices{.rest = rest,
-                               .matrix = shell_matrix_of(state),
-                               .position = c.position.view(),
-                               .rounding = s.rounding.view(),
-                               .path = s.path.view(),
-                               .push = s.push.view(),
-                               .internal = s.internal.view(),
-                               .fan_start = c.fan_start.data(),
-                               .fan_entry = c.fan_entry.data(),
-                               .fan_slot = s.fan_slot.data(),
-                               .element = s.element.data(),
-                               .triangles = s.triangles,
-                               .vertices = c.vertices,
-                               .block = s.block.data(),
-                               .tension = s.tension.data(),
-                               .diagonal = s.diagonal.data(),
-                               .base = s.base.view(),
-                               .dt = float(state.dt),
-                               .before = float(1 - new_force_share(state)),
-                               .joined = c.joined};
+  return {.rest = rest,
+          .matrix = shell_matrix_of(state),
+          .position = c.position.view(),
+          .rounding = s.rounding.view(),
+          .path = s.path.view(),
+          .push = s.push.view(),
+          .internal = s.internal.view(),
+          .fan_start = c.fan_start.data(),
+          .fan_entry = c.fan_entry.data(),
+          .fan_slot = s.fan_slot.data(),
+          .element = s.element.data(),
+          .triangles = s.triangles,
+          .vertices = c.vertices,
+          .block = s.block.data(),
+          .tension = s.tension.data(),
+          .diagonal = s.diagonal.data(),
+          .base = s.base.view(),
+          .dt = float(state.dt),
+          .before = float(1 - new_force_share(state)),
+          .joined = c.joined};
+}
+
+/// m^2, of the way that a step makes of weight.
+float fall2_of(const State& state) {
+  const float *g = state.parameters.gravity, dt = float(state.dt);
+  return (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]) * dt * dt * dt * dt;
+}
+
+About about_of(int linearised) { return linearised == 1 ? About::path : About::end; }
+
+}  // namespace
+
+void linearise_shell(State& state) {
+  find_paths(state);
+  if (state.pins.count > 0) find_pin_paths(state);
+  const ShellVertices vertices = linearise_triangles(state, About::path);
   parallel_for(
-      state.queue, "shell: rows", c.padded, DRENCH_LAMBDA(int i) { vertices(i); });
+      state.queue, "shell: rows", state.cloth.padded, DRENCH_LAMBDA(int i) { vertices(i); });
+}
+
+bool shell_strains_unseen(State& state, int linearised) {
+  constexpr float most = 0.01f;
+  const ShellElements elements = elements_of(state, about_of(linearised));
+  const float* mass = state.cloth.mass.data();
+  const ConstVecView change = state.cloth_system.change.view();
+  const float fall2 = fall2_of(state);
+  return any_lane(
+      state.queue, "shell: strained", state.cloth.triangles, DRENCH_LAMBDA(auto t) {
+        const auto energy = elements.unseen_strain(t, change, mass, fall2);
+        return energy.a > energy.b * decltype(energy.b)(most);
+      });
+}
+
+void search_line(State& state, const ConstVecView& right, int linearised) {
+  const ShellElements elements = elements_of(state, about_of(linearised));
+  const VecView change = state.cloth_system.change.view();
+  const ConstVecView from = state.shell.from.view();
+  const LineEnergies shells = parallel_reduce(
+      state.queue, "shell: energies of a line", state.cloth.triangles, LineEnergies{},
+      DRENCH_LAMBDA(int t) { return elements.along_line(t, from, change); }, Plus{});
+  const ClothMatrix matrix = cloth_matrix(state);
+  const Two<double> all = parallel_reduce(
+      state.queue, "cloth: energies of a line", state.cloth.vertices, Two<double>{0., 0.},
+      DRENCH_LAMBDA(int i) {
+        const Vec3<float> d = change[i] - from[i], image = matrix.times(from, i),
+                          lack = image - matrix.constraints.project(i, right[i]);
+        return Two<double>{dot_double(d, lack), dot_double(d, matrix.times(change, i) - image)};
+      },
+      Plus{});
+  // What is not of the membrane is quadratic.
+  const double slope = all.a - shells.slope, curvature = all.b - shells.curvature;
+  float best = 1.f;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < LineEnergies::places; ++k) {
+    const double part = LineEnergies::part(k),
+                 gain = part * slope + 0.5 * part * part * curvature + shells.gain[k];
+    if (gain < least) least = gain, best = float(part);
+  }
+  if (best < 1.f) {
+    for_each_lane(
+        state.queue, "cloth: back on a line", state.cloth.padded, DRENCH_LAMBDA(auto i) {
+          const auto start = from.at(i);
+          change.put(i, start + (change.at(i) - start) * decltype(start.x)(best));
+        });
+  }
+}
+
+void relinearise_shell(State& state) {
+  const VecView about = state.shell.about.view();
+  const ConstVecView change = state.cloth_system.change.view();
+  for_each_lane(
+      state.queue, "shell: about", state.cloth.padded,
+      DRENCH_LAMBDA(auto i) { about.put(i, change.at(i)); });
+  const ShellVertices vertices = linearise_triangles(state, About::end);
+  ClothSystem& s = state.cloth_system;
+  const VecView base = s.base.view(), right = s.right.view(), answer = s.answer.view();
+  const BlockInverse block = raw_block_inverse(state);
+  const float* inertia = s.inertia.data();
+  const int padded = state.cloth.padded;
+  parallel_for(
+      state.queue, "shell: rows anew", padded, DRENCH_LAMBDA(int i) {
+        const Vec3<float> before = vertices.base[i];
+        float more[6];
+        for (int k = 0; k < 6; ++k) more[k] = -vertices.diagonal[k * padded + i];
+        vertices(i);
+        if (i >= vertices.vertices) return;
+        const Vec3<float> gain = vertices.base[i] - before;
+        base.set(i, base[i] + gain), right.set(i, right[i] + gain);
+        answer.set(i, answer[i] + gain);
+        for (int k = 0; k < 6; ++k) more[k] += vertices.diagonal[k * padded + i];
+        block.add(i, more, inertia[i]);
+      });
+  remake_blocks(state);
+  if (state.cloth_levels.on) build_cloth_levels(state);
 }
 
 /// Whether no more than rounding of a vector is lost.
@@ -412,7 +372,8 @@ void keep_shell_step(State& state) {
                                lost(x.z[i], way.z, next.z[i])};
         rounding.set(i, is_rounding(rest, next[i]) ? rest : Vec3<float>{0.f, 0.f, 0.f});
       });
-  s.dt = state.dt;
+  // The next step is implicit Euler's: forces this far off their lines are not to count in it.
+  s.dt = s.linearised > 1 ? 0 : state.dt;
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -13,7 +13,7 @@
 // once; forces inside sum to zero step by step, so that momentum is kept. A vertex that something
 // stopped takes up its path anew.
 //
-// f is linearised once, the membrane triangle by triangle: where the straight paths end as long as
+// f is linearised, the membrane triangle by triangle: where the straight paths end as long as
 // these hardly strain it, so that turning costs no stretch, the farther back towards x_0 the more
 // they do. Its part of A are 3 x 3 blocks of vertices that share a triangle (shell_membrane.h, the
 // stress that pulls sideways projected and of x_0: with that of the end limp strips boil),
@@ -143,6 +143,18 @@ inline ConstVecView path_velocity_of(const State& state) {
 
 /// The straight paths, the blocks at their ends, and the sheet's own part of the right side.
 void linearise_shell(State& state);
+
+/// Whether the step that was solved for strains triangles by more than its linear forces know of.
+/// @param linearised  times in this step: once by linearise_shell, then by relinearise_shell
+bool shell_strains_unseen(State& state, int linearised);
+
+/// Goes back from the solve that was made, which started at ShellState::from, to where of a few
+/// places on that line the energy is least.
+void search_line(State& state, const ConstVecView& right, int linearised);
+
+/// The shells' blocks and right sides anew, about where the step ends as it is solved for: the next
+/// iterate of Newton's method.
+void relinearise_shell(State& state);
 
 /// Notes what the next step needs of this one, whose end is in ClothState::next.
 void keep_shell_step(State& state);

@@ -128,8 +128,10 @@ struct TouchRow {
     r.normal = o.turn(1, o.normal(own, o.blend[0]));
     if (inverse == 0.f || length2(r.normal) < 0.5f) return r;
     r.mass = 1.f / inverse;
-    r.thickness = pieces.distance_to(o, t);
-    if (pieces.hold.shares) r.thickness = pieces.hold.shared(touch.obstacle, r.thickness, x + in);
+    const float whole = pieces.distance_to(o, t), twice = 2.f * whole;
+    const float room = pieces.hold.shares ? pieces.hold.shared(touch.obstacle, twice, x + in) : twice;
+    r.thickness = minimum(room, whole);
+    r.pressed = room < twice;
     r.friction = o.friction;
     const Vec3<float> carried = o.to_frame(1, own) - o.to_frame(0, own);
     const float grown = o.distance(own, o.blend[0]) - o.distance(own, o.blend[1]);
