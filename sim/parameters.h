@@ -42,6 +42,7 @@ struct Parameters {
   bool fluid = true;             // any source of particles
   float cloth_dt_limit = 1e30f;  // s, of the stiffest vertex
   bool shells = false;           // any sheet is one
+  bool factors_sheets = true;    // beside fluid, on the CPU, where it pays; else only sweeps
   bool wet_sheets = false;       // any takes up water, or starts wet
   bool self_contact = false;     // any sheet meets itself and others
   bool ties = false;             // pins that do more than hold where a vertex starts, or seams

@@ -359,6 +359,7 @@ class BackendSolver : public Solver {
     c.stop_sum.resize(size_t(4) * c.vertices);
     load_shell(state_, t);
     load_cloth_levels(state_, t);
+    load_cloth_factor(state_);
     load_triangle_obstacles(state_, t);
     load_self_contact(state_, t);
     load_wet_cloth(state_, t);

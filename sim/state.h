@@ -2,6 +2,7 @@
 // The state of a simulation on one backend: columns of particles, vertices, springs and triangles.
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "sim/backend/queue.h"
@@ -496,6 +497,8 @@ struct ObstacleState {
   ObstacleViews views() const { return {view.data(), count}; }
 };
 
+struct ClothFactor;  // passes/cloth/cloth_factor.h
+
 struct State {
   Parameters parameters;
   WallTableData wall_table{};  // of the paper coupling
@@ -508,6 +511,7 @@ struct State {
   ShellState shell;
   WetState wet;
   ClothLevels cloth_levels;
+  std::shared_ptr<ClothFactor> cloth_factor;  // where it pays, on the CPU
   PinState pins;
   SelfContact self_contact;
   TriangleObstacles triangle_obstacles;

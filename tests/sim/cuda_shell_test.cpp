@@ -335,6 +335,7 @@ sim::Scene scene_of(const Situation& situation, const Shot& shot) {
   // The same iterations on both devices, whichever side of a tolerance the last bit falls.
   scene.parameters.tolerance = 0, scene.parameters.most_iterations = 10;
   scene.parameters.viscous_tolerance = 0, scene.parameters.most_viscous_iterations = 10;
+  scene.parameters.factors_sheets = false;  // as on the GPU
   if (!situation.start) return scene;
   sim::HostVec &x = scene.start.cloth_position, &u = scene.start.cloth_velocity;
   for (size_t v = 0; v < x.size(); ++v) {

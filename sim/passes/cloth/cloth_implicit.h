@@ -12,6 +12,7 @@
 // takes them there.
 
 #include "sim/backend/solve_control.h"
+#include "sim/passes/cloth/cloth_factor.h"
 #include "sim/passes/cloth/cloth_levels.h"
 #include "sim/passes/cloth/cloth_springs.h"
 #include "sim/passes/cloth/self_contact.h"
@@ -275,6 +276,12 @@ struct ClothIteration {
   }
 };
 
+/// ClothSystem::scaled from ClothSystem::residual, beyond the blocks of the vertices.
+template <class Matrix>
+void precondition_cloth(State& state, const Matrix& matrix) {
+  if (!apply_cloth_factor(state, matrix)) add_cloth_levels(state, matrix);
+}
+
 /// At most `most_iterations` iterations on A w = right from the w there is, until r . A_block^-1 r
 /// is below tolerance^2 of ClothControl::reference.
 template <class Matrix>
@@ -303,7 +310,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
         residual.put(i, r);
         scaled.put(i, matrix.scaled(i, r));
       });
-  add_cloth_levels(state, matrix);
+  precondition_cloth(state, matrix);
   for (int k = 0;; ++k) {
     sum_lanes_then(
         state.queue, "cloth: image", n,
@@ -316,7 +323,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
     if (ended(s.control, k, most_iterations)) break;
     for_each_lane(
         state.queue, "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
-    add_cloth_levels(state, matrix);
+    if (k + 1 < most_iterations) precondition_cloth(state, matrix);
   }
 }
 void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,

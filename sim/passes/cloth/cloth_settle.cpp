@@ -128,6 +128,7 @@ bool revise_contacts(State& state, const ConstVecView& given, int round) {
   bool changed = obstacles && revise_holds(state, given, round);
   const bool at_walls = walls && revise_walls(state, round);
   if (sheets) changed |= revise_sheet_rows(state, round);
+  if (changed || at_walls) drop_cloth_factor(state);
   ClothLevels& levels = state.cloth_levels;
   if ((changed || at_walls) && levels.on) levels.on = !anything_touches(state);
   // Blocks that do not know what walls hold now would correct far too much.

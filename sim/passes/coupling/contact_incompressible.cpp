@@ -200,7 +200,7 @@ void start_cloth(State& state) {
   if (state.parameters.obstacles > 0) hold_at_obstacles(state);
   add_cloth_to_diagonal(state);
   sum_loads(state, Base::none);
-  build_cloth_levels(state);
+  if (!factor_cloth(state)) build_cloth_levels(state);
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   add_to_reference(state, matrix, s.right.view(), 0.f, state.shell.any ? quiet_speed : 0.);
   add_to_reference(state, matrix, s.base.view(), 1.f, 0.);
@@ -211,7 +211,8 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::own);
-  solve_cloth(state, s.change.view(), s.right.view(), sweeps, tolerance);
+  solve_cloth(state, s.change.view(), s.right.view(), cloth_is_factored(state) ? 1 : sweeps,
+              tolerance);
 }
 
 namespace {
@@ -219,6 +220,7 @@ namespace {
 /// As start_cloth, where no fluid is near.
 void prepare_cloth_alone(State& state, const ConstVecView& given) {
   ClothSystem& s = state.cloth_system;
+  drop_cloth_factor(state);
   s.right.clear(state.queue);
   hold_at_walls(state);
   if (state.parameters.obstacles > 0) hold_at_obstacles(state);

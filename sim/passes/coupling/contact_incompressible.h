@@ -17,8 +17,9 @@ namespace drench::sim::DRENCH_BACKEND {
 
 /// Sweeps at most before the first, between further iterations of the pressures, and at the end: as
 /// few as leave the pressures the iterations that an exact answer takes
-/// (docs/decisions/0022-cloth-sweeps.md). What is left at the end is of how sheets bend; the
-/// momentum of those that nothing holds is whole (balance_loose_cloth).
+/// (docs/decisions/0022-cloth-sweeps.md); one where the sheets' matrix is factored
+/// (cloth_factor.h). What is left at the end is of how sheets bend; the momentum of those that
+/// nothing holds is whole (balance_loose_cloth).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
