@@ -36,8 +36,9 @@ Shot with_layers(Shot shot) {
   return shot;
 }
 
-/// Fluid in a corner of the domain, far from the sheets.
+/// Fluid in a corner of the domain, far from the sheets, which are coarser.
 Shot beside_fluid(Shot shot) {
+  for (Cloth& c : shot.cloth) c.cells = V2i(6, 6);
   shot.fluid.spacing = 0.04, shot.fluid.solver = FluidSolver::incompressible;
   const V3d size(0.2, 0.08, 0.2);
   shot.fluid.box = {{.min = shot.domain.min, .max = shot.domain.min + size}};
