@@ -152,8 +152,8 @@ TEST(SeamInWater, APillowKeepsItsWater) {
     EXPECT_NEAR(turns_around(run.scene.cloth, state, at(state.position, i)), 1, 0.05) << i;
 }
 
-// Water that slides into the seams of a free pillow takes it along. 2e-3: the guard of sheets,
-// which meet as they are drawn together, leaves 7e-4 to 1.3e-3 by what is rounded.
+// Water that slides into the seams of a free pillow takes it along. 7e-5 is left of the momentum;
+// 1e-3 where the sheets answer the pressures by sweeps.
 TEST(SeamInWater, KeepsMomentum) {
   Shot shot = pillow(0.01, V3d(0));
   shot.domain.min = V3d(-0.5), shot.domain.max = V3d(0.5);
@@ -164,7 +164,7 @@ TEST(SeamInWater, KeepsMomentum) {
   const V3d before = total_momentum(run.scene, run.solver->save());
   run.advance(0.35);
   const sim::HostState state = run.solver->save();
-  EXPECT_LT((total_momentum(run.scene, state) - before).length(), 2e-3 * before.length());
+  EXPECT_LT((total_momentum(run.scene, state) - before).length(), 1e-3 * before.length());
   V3d sheets(0);
   for (size_t v = 0; v < state.cloth_velocity.size(); ++v)
     sheets += at(state.cloth_velocity, v) / double(state.cloth_velocity.size());
