@@ -181,21 +181,10 @@ void weak_column(int side, Where where, const Emit& emit) {
 }
 
 void fluid_gpu(const Emit& emit) {
-  std::string reason = "this build has no CUDA";
-#if defined(DRENCH_HAS_CUDA)
-  if (sim::cuda::device_available(reason)) {
-    for (const int side : {40, 100, 200}) gpu_column(side, emit);
-    for (const int side : {40, 100, 200}) weak_column(side, Where::cuda, emit);
-    for (const Pool& pool : {Pool{64, 16, 90}, Pool{128, 64, 180}}) gpu_pool(pool, emit);
-    return;
-  }
-#else
-  (void)gpu_column, (void)gpu_pool;
-#endif
-  Line line;
-  line.device = name_of(Where::cuda);
-  line.more["skipped"] = "no usable GPU: " + reason;
-  emit(line);
+  if (!has_cuda(emit)) return;
+  for (const int side : {40, 100, 200}) gpu_column(side, emit);
+  for (const int side : {40, 100, 200}) weak_column(side, Where::cuda, emit);
+  for (const Pool& pool : {Pool{64, 16, 90}, Pool{128, 64, 180}}) gpu_pool(pool, emit);
 }
 
 const Registration gpu{"fluid_gpu", "the same on a CUDA device to 8M, and coupling there",

@@ -2,6 +2,7 @@
 // beside the same sheet that meets nothing and the same net of springs. shell_layers: piles of
 // sheets on a floor beside one sheet of as many triangles. shell_drape: a frame of a
 // fine sheet that hangs over a ball. shell_work_precision: what errors of closed forms cost.
+// shell_gpu, shell_gpu_layers, shell_gpu_drape: the same on a CUDA device.
 
 #include <algorithm>
 #include <cmath>
@@ -56,8 +57,10 @@ Shot flat_sheet(Flat flat, int cells) {
 
 /// A run and what its steps took.
 struct Taken {
-  explicit Taken(sim::Scene scene) : run(make_stepper(std::move(scene), Where::cpu)) {}
-  explicit Taken(const Shot& shot) : Taken(sim::build_scene(shot)) {}
+  explicit Taken(sim::Scene scene, Where where = Where::cpu)
+      : run(make_stepper(std::move(scene), where)), where(where) {}
+  explicit Taken(const Shot& shot, Where where = Where::cpu)
+      : Taken(sim::build_scene(shot), where) {}
 
   Measured step(double dt) {
     const Measured cost = measure([&] { run.step(dt); });
@@ -73,6 +76,7 @@ struct Taken {
   double triangles() const { return run.scene.cloth.triangles(); }
 
   sim::Stepper run;
+  Where where;
   std::vector<double> cpu, wall;  // s, of steps
   double sweeps = 0;              // in all of them
   int cut_short = 0;              // of them
@@ -84,6 +88,7 @@ Line line_of(const Taken& taken, const std::string& method) {
   line.method = method;
   line.resolution = std::to_string(int(taken.triangles())) + " triangles";
   line.time_step = time_step;
+  line.device = name_of(taken.where);
   line.threads = hardware_threads();
   line.cost = taken.total;
   const double steps = double(taken.cpu.size());
@@ -91,7 +96,8 @@ Line line_of(const Taken& taken, const std::string& method) {
   line.more["wall_ms_a_step"] = 1e3 * median(taken.wall);
   line.more["sweeps_a_step"] = taken.sweeps / steps;
   line.more["steps_cut_short"] = taken.cut_short;
-  line.more["ns_a_triangle_step"] = 1e9 * median(taken.cpu) / taken.triangles();
+  const double step = median(taken.where == Where::cpu ? taken.cpu : taken.wall);
+  line.more["ns_a_triangle_step"] = 1e9 * step / taken.triangles();
   double bytes = 0;
   for (const sim::ColumnMemory& group : taken.run.solver->memory()) bytes += double(group.bytes);
   line.more["bytes_a_triangle"] = bytes / taken.triangles();
@@ -159,15 +165,15 @@ void add_contacts(Line& line, const sim::Stepper& run) {
   line.more["fastest_mm_a_s"] = 1e3 * run.limits.max_speed;
 }
 
-/// Layers of 0.2 m and 512 triangles a thickness apart, the lowest on the floor, that press each
-/// other nearer by their weight.
-Shot layers_on_floor(int layers) {
+/// Layers of 0.2 m a thickness apart, the lowest on the floor, that press each other nearer by
+/// their weight.
+Shot layers_on_floor(int layers, int cells = 16) {
   Shot shot = shells_alone();
   shot.domain.min.y = 0, shot.domain.axis[1] = Axis::walls;
   const double keep = 0.25 * shot.fluid.spacing;  // m, that walls keep, and half the thickness
   for (int k = 0; k < layers; ++k) {
     const double height = keep + (k + 0.5) * Cloth{}.thickness;
-    add_shell(shot, V3d(-0.1, height, -0.1), V3d(0.2, 0, 0), V3d(0, 0, 0.2), 16).damping = 20;
+    add_shell(shot, V3d(-0.1, height, -0.1), V3d(0.2, 0, 0), V3d(0, 0, 0.2), cells).damping = 20;
   }
   return shot;
 }
@@ -227,26 +233,70 @@ sim::HostVec refined(const sim::HostVec& coarse, int cells, int by) {
   return fine;
 }
 
-/// The fine sheet begins as a coarse one lies after half a second, and has a frame to itself.
+/// How a sheet over a ball hangs after half a second, and one four times as fine that has a frame
+/// of 1/60 s to itself after another.
+struct Draped {
+  static constexpr int cells = 71, by = 4, steps = 5;
+
+  explicit Draped(Where where) : coarse(sheet_over_ball(cells)), fine(settled(), where) {
+    fine.warm(steps);
+    for (int k = 0; k < steps; ++k) fine.step(time_step);
+  }
+  sim::Scene settled() {
+    while (coarse.run.time < 0.5) coarse.step(time_step);
+    sim::Scene scene = sim::build_scene(sheet_over_ball(cells * by));
+    const sim::HostState draped = coarse.run.solver->save();
+    scene.start.cloth_position = refined(draped.cloth_position, cells, by);
+    scene.start.cloth_velocity = refined(draped.cloth_velocity, cells, by);
+    return scene;
+  }
+  Line line() const {
+    Line line = line_of(fine, "hangs over a ball, a frame of 1/60 s");
+    add_contacts(line, fine.run);
+    return line;
+  }
+  Taken coarse, fine;
+};
+
 void shell_drape(const Emit& emit) {
-  constexpr int cells = 71, by = 4, steps = 5;
-  Taken coarse(sheet_over_ball(cells));
-  while (coarse.run.time < 0.5) coarse.step(time_step);
-  Line first = line_of(coarse, "falls over a ball and hangs, half a second");
-  add_contacts(first, coarse.run);
+  const Draped draped(Where::cpu);
+  Line first = line_of(draped.coarse, "falls over a ball and hangs, half a second");
+  add_contacts(first, draped.coarse.run);
   emit(first);
-  sim::Scene scene = sim::build_scene(sheet_over_ball(cells * by));
-  const sim::HostState draped = coarse.run.solver->save();
-  scene.start.cloth_position = refined(draped.cloth_position, cells, by);
-  scene.start.cloth_velocity = refined(draped.cloth_velocity, cells, by);
-  Taken fine(std::move(scene));
-  fine.warm(steps);
-  for (int k = 0; k < steps; ++k) fine.step(time_step);
-  Line line = line_of(fine, "hangs over a ball, a frame of 1/60 s");
-  line.error = fine.total.cpu_s / 2, line.gate = 24;
+  Line line = draped.line();
+  line.error = draped.fine.total.cpu_s / 2, line.gate = 24;
   line.error_of = "CPU s a frame by two cores";
-  add_contacts(line, fine.run);
   emit(line);
+}
+
+void shell_gpu(const Emit& emit) {
+  if (!has_cuda(emit)) return;
+  for (const int cells : {smallest, 182, 360, 708}) {
+    Taken taken(flat_sheet(Flat::hangs, cells), Where::cuda);
+    taken.warm(2);
+    for (int k = 0; k < 10; ++k) taken.step(time_step);
+    emit(line_of(taken, "shell that hangs"));
+  }
+}
+
+void shell_gpu_layers(const Emit& emit) {
+  if (!has_cuda(emit)) return;
+  for (const int cells : {16, 69}) {  // 25,600 and 476,100 triangles
+    Taken pile(layers_on_floor(50, cells), Where::cuda);
+    pile.warm(5);
+    for (int k = 0; k < 10; ++k) pile.step(time_step);
+    Line line = line_of(pile, "50 layers on the floor");
+    if (cells > 16) {
+      line.error = 1e3 * median(pile.wall), line.gate = 5;
+      line.error_of = "ms a step";
+    }
+    add_contacts(line, pile.run);
+    emit(line);
+  }
+}
+
+void shell_gpu_drape(const Emit& emit) {
+  if (has_cuda(emit)) emit(Draped(Where::cuda).line());
 }
 
 /// A closed form at three resolutions.
@@ -309,6 +359,11 @@ const Registration layers{"shell_layers", "piles of ten and a hundred shells on 
                           shell_layers};
 const Registration drape{"shell_drape", "a frame of a fine shell that hangs over a ball",
                          shell_drape};
+const Registration gpu{"shell_gpu", "shells on a CUDA device to a million triangles", shell_gpu};
+const Registration gpu_layers{"shell_gpu_layers", "piles of fifty shells on a CUDA device",
+                              shell_gpu_layers};
+const Registration gpu_drape{"shell_gpu_drape", "shell_drape's fine shell on a CUDA device",
+                             shell_gpu_drape};
 const Registration precision{"shell_work_precision", "time and error of shells' closed forms",
                              shell_work_precision};
 

@@ -9,6 +9,18 @@ namespace drench::bench {
 
 const char* name_of(Where where) { return where == Where::cpu ? "cpu" : "cuda"; }
 
+bool has_cuda(const Emit& emit) {
+  std::string reason = "this build has no CUDA";
+#if defined(DRENCH_HAS_CUDA)
+  if (sim::cuda::device_available(reason)) return true;
+#endif
+  Line line;
+  line.device = name_of(Where::cuda);
+  line.more["skipped"] = "no usable GPU: " + reason;
+  emit(line);
+  return false;
+}
+
 std::unique_ptr<sim::Solver> make_solver(const sim::Parameters& parameters,
                                          const sim::ClothTopology& cloth, Where where) {
 #if defined(DRENCH_HAS_CUDA)

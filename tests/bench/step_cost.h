@@ -16,6 +16,8 @@ namespace drench::bench {
 
 enum class Where { cpu, cuda };
 const char* name_of(Where where);
+/// Whether steps can be taken on a CUDA device; where not, emits a line that says why.
+bool has_cuda(const Emit& emit);
 std::unique_ptr<sim::Solver> make_solver(const sim::Parameters& parameters,
                                          const sim::ClothTopology& cloth, Where where);
 sim::Stepper make_stepper(sim::Scene scene, Where where);
