@@ -363,6 +363,9 @@ void for_each_self_contact_column(S& state, const Visit& visit) {
   visit({"row.key", "1", Group::self_contact}, s.key, none);
   visit({"row.start", "1", Group::self_contact}, s.start, none);
   visit({"row.entry", "1", Group::self_contact}, s.entry, none);
+  visit({"row.entry_weight", "1", Group::self_contact}, s.entry_weight, none);
+  visit({"row.bears", "kg, m", Group::self_contact}, s.bears, none);
+  visit({"row.pull", "kg m", Group::cloth_system}, s.pull, none);
   visit({"row.block", "kg", Group::self_contact}, s.block, none);
   visit({"row.load", "kg m", Group::self_contact}, s.load, none);
   visit({"wanted", "m", Group::self_contact}, s.wanted, none);

@@ -301,13 +301,22 @@ struct SheetRow {
   int released;           // times that the row was let go in this step
 };
 
+/// What A has of a row that bears.
+struct BearingRow {
+  int vertex[4];
+  float weight[4];
+  Vec3<float> normal;
+  float along, across;  // kg, of the normal beyond what holds in all directions
+  int row;
+};
+
 /// Contact of shells with themselves and each other (passes/cloth/self_contact_pairs.h).
 struct SelfContact {
   bool any = false;     // sheets take part, or triangles meet obstacles
   float thickness = 0;  // m, of the thickest pair
   float edge = 0;       // m, mean
   float slack = 0;      // m, that a vertex may end off the path that the pairs were found for
-  int pairs = 0, rows = 0;
+  int pairs = 0, rows = 0, bearing = 0;
   // fixed
   Column<SheetVertex> vertex;
   Column<int> owned;  // of a triangle, bits: corners 0, 1, 2 and sides 01, 12, 20 that it stands
@@ -322,7 +331,10 @@ struct SelfContact {
   Column<int> count, first;  // of a triangle: its pairs
   Column<SheetPair> pair;
   Column<SheetRow> row;
-  Column<int> key, start, entry;       // of a vertex: 4 row + corner
+  Column<BearingRow> bears;
+  Column<Vec3<float>> pull;            // kg m, of rows that bear, of the vector asked for last
+  Column<int> key, start, entry;       // of a vertex: 4 bearing row + corner
+  Column<float> entry_weight;
   Column<float> block;                 // as ClothSystem::factor, without rows; where there are any
   VecColumn load;                      // kg m, of the rows on a vertex, as it is in the right side
   VecColumn wanted;                    // m, ends of the paths that the guard shortens

@@ -276,6 +276,22 @@ struct ClothIteration {
   }
 };
 
+/// A for products with one vector at a time, which ask_rows goes before.
+inline ScaledClothMatrix with_asked_rows(const State& state, ScaledClothMatrix matrix) {
+  matrix.matrix.contact.pulled = state.self_contact.pull.data();
+  return matrix;
+}
+inline void ask_rows(State& state, const ScaledClothMatrix&, const ConstVecView& x) {
+  pull_rows(state, x);
+}
+/// Other matrices have no rows.
+template <class Matrix>
+const Matrix& with_asked_rows(const State&, const Matrix& matrix) {
+  return matrix;
+}
+template <class Matrix>
+void ask_rows(State&, const Matrix&, const ConstVecView&) {}
+
 /// ClothSystem::scaled from ClothSystem::residual, beyond the blocks of the vertices.
 template <class Matrix>
 void precondition_cloth(State& state, const Matrix& matrix) {
@@ -285,8 +301,9 @@ void precondition_cloth(State& state, const Matrix& matrix) {
 /// At most `most_iterations` iterations on A w = right from the w there is, until r . A_block^-1 r
 /// is below tolerance^2 of ClothControl::reference.
 template <class Matrix>
-void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
-                        const ConstVecView& right, int most_iterations, float tolerance) {
+void solve_cloth_matrix(State& state, const Matrix& of, const VecView& w, const ConstVecView& right,
+                        int most_iterations, float tolerance) {
+  const Matrix matrix = with_asked_rows(state, of);
   const int n = state.cloth.vertices;
   ClothSystem& s = state.cloth_system;
   ClothControl* control = s.control.data();
@@ -304,6 +321,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
   parallel_for(
       state.queue, "cloth: start", 1,
       DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
+  ask_rows(state, matrix, w);
   for_each_lane(
       state.queue, "cloth: residual", n, DRENCH_LAMBDA(auto i) {
         const auto r = matrix.moving(i, right.at(i)) - matrix.times(w, i);
@@ -312,6 +330,7 @@ void solve_cloth_matrix(State& state, const Matrix& matrix, const VecView& w,
       });
   precondition_cloth(state, matrix);
   for (int k = 0;; ++k) {
+    ask_rows(state, matrix, scaled);
     sum_lanes_then(
         state.queue, "cloth: image", n,
         DRENCH_LAMBDA(auto i) {

@@ -20,23 +20,34 @@ struct RowMaker {
   ConstVecView position, rounding, velocity, path;
   float dt, gravity;
 
-  DRENCH_HD SheetRow operator()(const SheetPair& pair) const {
-    SheetRow r{};
-    r.obstacle = -1;
+  /// Where the pieces of a pair are nearest at the start.
+  struct Nearest {
+    PieceDistance<float> at;
+    float distance, inverse;  // m; 1/kg, of the pair's reduced mass
+  };
+  DRENCH_HD Nearest nearest(const SheetPair& pair) const {
     Vec3<float> x[4];
     const Vec3<float> from = position[pair.vertex[0]], low = rounding[pair.vertex[0]];
     for (int k = 0; k < 4; ++k) {
       const int v = pair.vertex[k];
       x[k] = (position[v] - from) + (rounding[v] - low);
     }
-    const PieceDistance<float> at = distance_of_pieces(pieces.edges(pair), x);
-    const float distance = length(at.apart);
-    float inverse = 0.f;
-    for (int k = 0; k < 4; ++k) {
-      r.vertex[k] = pair.vertex[k], r.weight[k] = at.weight[k];
-      inverse += at.weight[k] * at.weight[k] * inverse_mass[pair.vertex[k]];
-    }
-    if (!stands_for(pair, at) || inverse == 0.f || distance == 0.f) return r;
+    Nearest n{distance_of_pieces(pieces.edges(pair), x), 0.f, 0.f};
+    n.distance = length(n.at.apart);
+    for (int k = 0; k < 4; ++k)
+      n.inverse += n.at.weight[k] * n.at.weight[k] * inverse_mass[pair.vertex[k]];
+    return n;
+  }
+  /// Whether a pair has a row: of those that are near some nine in ten have none.
+  DRENCH_HD bool counts(const SheetPair& pair) const {
+    const Nearest n = nearest(pair);
+    return n.inverse > 0.f && n.distance > 0.f && stands_for(pair, n.at);
+  }
+  DRENCH_HD SheetRow operator()(const SheetPair& pair) const {
+    SheetRow r{};
+    r.obstacle = -1;
+    const auto [at, distance, inverse] = nearest(pair);
+    for (int k = 0; k < 4; ++k) r.vertex[k] = pair.vertex[k], r.weight[k] = at.weight[k];
     r.mass = 1.f / inverse;
     r.normal = at.apart * (1.f / distance);
     r.thickness = pieces.thickness(pair);
@@ -73,20 +84,63 @@ struct RowMaker {
   }
 };
 
-/// The rows that bear, by vertices.
+/// Lists in SelfContact::entry which of n have key 0. @return how many.
+int list_chosen(State& state, int n) {
+  SelfContact& s = state.self_contact;
+  stable_sort_keys(state.queue, s.key, n, 1, s.entry, s.start);
+  return value_at(s.start, 1);
+}
+
+/// Lists the pairs that have rows in SelfContact::entry. @return how many.
+int list_pairs_with_rows(State& state, const RowMaker& make) {
+  SelfContact& s = state.self_contact;
+  if (s.pairs == 0) return 0;
+  s.key.resize(s.pairs);
+  const SheetPair* pair = s.pair.data();
+  int* key = s.key.data();
+  parallel_for(
+      state.queue, "self: pairs with rows", s.pairs,
+      DRENCH_LAMBDA(int k) { key[k] = make.counts(pair[k]) ? 0 : 1; });
+  return list_chosen(state, s.pairs);
+}
+
+/// The rows that bear, and their entries by vertices.
 void sort_rows(State& state) {
   SelfContact& s = state.self_contact;
   const SheetRow* row = s.row.data();
-  const int entries = 4 * s.rows, padded = state.cloth.padded;
-  s.key.resize(entries);
+  s.key.resize(s.rows);
+  int* chooses = s.key.data();
+  parallel_for(
+      state.queue, "self: which bear", s.rows,
+      DRENCH_LAMBDA(int k) { chooses[k] = row[k].stiffness > 0.f ? 0 : 1; });
+  s.bearing = list_chosen(state, s.rows);
+  const int entries = 4 * s.bearing, padded = state.cloth.padded;
+  s.bears.resize(s.bearing), s.pull.resize(s.bearing), s.key.resize(entries);
+  const int* chosen = s.entry.data();
+  BearingRow* bears = s.bears.data();
   int* key = s.key.data();
   parallel_for(
-      state.queue, "self: keys of rows", entries, DRENCH_LAMBDA(int e) {
-        const SheetRow& r = row[e >> 2];
-        const bool counts = r.stiffness > 0.f && (r.obstacle < 0 || (e & 3) < 3);
-        key[e] = counts ? r.vertex[e & 3] : padded;
+      state.queue, "self: rows that bear", s.bearing, DRENCH_LAMBDA(int k) {
+        const SheetRow& r = row[chosen[k]];
+        BearingRow b{.vertex = {},
+                     .weight = {},
+                     .normal = r.normal,
+                     .along = r.stiffness - r.grip,
+                     .across = r.grip,
+                     .row = chosen[k]};
+        for (int c = 0; c < 4; ++c) {
+          b.vertex[c] = r.vertex[c], b.weight[c] = r.weight[c];
+          key[4 * k + c] = r.obstacle < 0 || c < 3 ? r.vertex[c] : padded;
+        }
+        bears[k] = b;
       });
   stable_sort_keys(state.queue, s.key, entries, padded, s.entry, s.start);
+  s.entry_weight.resize(entries);
+  const int* entry = s.entry.data();
+  float* weight = s.entry_weight.data();
+  parallel_for(
+      state.queue, "self: weights", entries,
+      DRENCH_LAMBDA(int e) { weight[e] = bears[entry[e] >> 2].weight[entry[e] & 3]; });
 }
 
 /// Whose right sides follow the rows.
@@ -104,8 +158,7 @@ void load_by_rows(State& state, Sides sides) {
       state.queue, "self: loads", state.cloth.vertices, DRENCH_LAMBDA(int i) {
         Vec3<float> sum{0.f, 0.f, 0.f};
         for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
-          const int at = rows.entry[e];
-          sum = sum + push_of(rows.row[at >> 2]) * rows.row[at >> 2].weight[at & 3];
+          sum = sum + push_of(rows.row_of(e)) * rows.weight[e];
         }
         const Vec3<float> more = sum - load[i];
         load.set(i, sum);
@@ -139,10 +192,9 @@ struct BlockMaker {
   DRENCH_HD void add_rows(int i) const {
     float more[6] = {0.f, 0.f, 0.f, 0.f, 0.f, 0.f};
     for (int e = rows.start[i]; e < rows.start[i + 1]; ++e) {
-      const SheetRow& r = rows.row[rows.entry[e] >> 2];
-      const float w = r.weight[rows.entry[e] & 3], across = r.grip * w * w,
-                  normal = (r.stiffness - r.grip) * w * w;
-      const Vec3<float> n = r.normal, m = n * normal;
+      const BearingRow& r = rows.bears[rows.entry[e] >> 2];
+      const float w = rows.weight[e], across = r.across * w * w, along = r.along * w * w;
+      const Vec3<float> n = r.normal, m = n * along;
       more[0] += m.x * n.x + across, more[1] += m.x * n.y, more[2] += m.x * n.z;
       more[3] += m.y * n.y + across, more[4] += m.y * n.z, more[5] += m.z * n.z + across;
     }
@@ -211,6 +263,7 @@ struct RowRevision {
       return size > most && slide(r, pull * (most / size));
     }
     if (now == 0.f) {  // holds what is slow enough for friction to stop it
+      if (most == 0.f) return false;
       const float size = length(r.speed);
       if (size * r.mass * dt <= most) return stick(r);
       return slide(r, r.speed * (-most / size));
@@ -266,9 +319,7 @@ void start_sheet_rows(State& state) {
       DRENCH_LAMBDA(int i) { to.set(i, x[i] + path[i] * dt); });
   find_sheet_pairs(state, slack_of(state, gravity));
   find_triangles_at_obstacles(state);
-  s.rows = s.pairs + state.triangle_obstacles.touches;
-  if (s.rows == 0) return;
-  s.row.resize(s.rows);
+  if (s.pairs + state.triangle_obstacles.touches == 0) return;
   const RowMaker make{.pieces = sheet_pieces_of(state),
                       .owned = s.owned.data(),
                       .inverse_mass = c.inverse_mass.data(),
@@ -278,11 +329,17 @@ void start_sheet_rows(State& state) {
                       .path = path,
                       .dt = dt,
                       .gravity = gravity};
+  const int of_pairs = list_pairs_with_rows(state, make);
+  s.rows = of_pairs + state.triangle_obstacles.touches;
+  if (s.rows == 0) return;
+  s.row.resize(s.rows);
   const SheetPair* pair = s.pair.data();
+  const int* chosen = s.entry.data();
   SheetRow* row = s.row.data();
   parallel_for(
-      state.queue, "self: rows", s.pairs, DRENCH_LAMBDA(int k) { row[k] = make(pair[k]); });
-  put_touch_rows(state, s.pairs);
+      state.queue, "self: rows", of_pairs,
+      DRENCH_LAMBDA(int k) { row[k] = make(pair[chosen[k]]); });
+  put_touch_rows(state, of_pairs);
   sort_rows(state);
   s.load.clear(state.queue);
   load_by_rows(state, Sides::base);
@@ -291,6 +348,18 @@ void start_sheet_rows(State& state) {
       state.queue, "self: blocks without rows", c.vertices,
       DRENCH_LAMBDA(int i) { without.copy(i, block); });
   put_rows_in_blocks(state);
+}
+
+void pull_rows(State& state, const ConstVecView& x) {
+  SelfContact& s = state.self_contact;
+  if (s.rows == 0) return;
+  const BearingRow* bears = s.bears.data();
+  Vec3<float>* pull = s.pull.data();
+  const ClothControl* control = state.cloth_system.control.data();
+  parallel_for(
+      state.queue, "self: pulls", s.bearing, DRENCH_LAMBDA(int k) {
+        if (!control->done) pull[k] = SheetRows::pull(bears[k], x);
+      });
 }
 
 bool revise_sheet_rows(State& state, int round) {

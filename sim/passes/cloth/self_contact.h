@@ -29,23 +29,29 @@ DRENCH_HD Vec3<float> push_of(const SheetRow& r) {
   return r.normal * (r.stiffness * (r.target - r.gap)) + r.rub - r.slip * r.grip;
 }
 
-/// The rows' part of A. Entries are those of rows that bear.
+/// The rows' part of A, of those that bear.
 struct SheetRows {
   const SheetRow* row;
+  const BearingRow* bears;
   const int *start, *entry;
+  const float* weight;        // of an entry
+  const Vec3<float>* pulled;  // by rows, of the vector that `times` is asked for; null: not known
   bool any;
 
   /// What a row gives at a displacement, kg m.
-  static DRENCH_HD Vec3<float> pull(const SheetRow& r, const ConstVecView& x) {
+  static DRENCH_HD Vec3<float> pull(const BearingRow& r, const ConstVecView& x) {
     Vec3<float> s{0.f, 0.f, 0.f};
     for (int k = 0; k < 4; ++k) s = s + x[r.vertex[k]] * r.weight[k];
-    return s * r.grip + r.normal * ((r.stiffness - r.grip) * dot(r.normal, s));
+    return s * r.across + r.normal * (r.along * dot(r.normal, s));
+  }
+  DRENCH_HD const SheetRow& row_of(int entry_at) const {
+    return row[bears[entry[entry_at] >> 2].row];
   }
   DRENCH_HD Vec3<float> times(const ConstVecView& x, int i) const {
     Vec3<float> y{0.f, 0.f, 0.f};
     for (int e = start[i]; e < start[i + 1]; ++e) {
-      const SheetRow& r = row[entry[e] >> 2];
-      y = y + pull(r, x) * r.weight[entry[e] & 3];
+      const int k = entry[e] >> 2;
+      y = y + (pulled ? pulled[k] : pull(bears[k], x)) * weight[e];
     }
     return y;
   }
@@ -64,7 +70,7 @@ struct SheetRows {
   /// Whether an obstacle or a vertex beyond a range does: a shift of all of it meets resistance.
   DRENCH_HD bool touches_beyond(int i, VertexRange range) const {
     for (int e = start[i]; e < start[i + 1]; ++e) {
-      const SheetRow& r = row[entry[e] >> 2];
+      const SheetRow& r = row_of(e);
       if (r.obstacle >= 0 || !range.contains(r.vertex[0]) || !range.contains(r.vertex[3]))
         return true;
     }
@@ -74,8 +80,13 @@ struct SheetRows {
 
 inline SheetRows sheet_rows_of(const State& state) {
   const SelfContact& s = state.self_contact;
-  return {s.row.data(), s.start.data(), s.entry.data(), s.rows > 0};
+  return {s.row.data(),          s.bears.data(), s.start.data(), s.entry.data(),
+          s.entry_weight.data(), nullptr,        s.rows > 0};
 }
+
+/// What the rows that bear give at a displacement, into SelfContact::pull, unless the solve has
+/// ended: for a product with the whole of A each is asked for by four vertices.
+void pull_rows(State& state, const ConstVecView& x);
 
 /// Finds the pairs and makes their rows; those that the straight paths bring too near are in the
 /// system from the start. After linearise_cloth.

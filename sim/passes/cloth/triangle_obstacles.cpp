@@ -253,13 +253,14 @@ void react_to_touch_rows(State& state) {
   if (state.triangle_obstacles.touches == 0) return;
   const ClothHold hold = cloth_hold_of(state);
   const ConstVecView change = state.cloth_system.change.view();
-  const SheetRow* row = s.row.data() + s.pairs;
+  const SheetRow* row = s.row.data();
+  const BearingRow* bears = s.bears.data();
   const float inverse_dt = 1.f / float(state.dt);
   parallel_for(
-      state.queue, "triangles: reactions", s.rows - s.pairs, DRENCH_LAMBDA(int k) {
-        const SheetRow& r = row[k];
-        if (r.mass == 0.f || r.stiffness == 0.f) return;
-        hold.react(r.obstacle, (push_of(r) - SheetRows::pull(r, change)) * inverse_dt);
+      state.queue, "triangles: reactions", s.bearing, DRENCH_LAMBDA(int k) {
+        const SheetRow& r = row[bears[k].row];
+        if (r.obstacle < 0) return;
+        hold.react(r.obstacle, (push_of(r) - SheetRows::pull(bears[k], change)) * inverse_dt);
       });
 }
 
