@@ -332,8 +332,8 @@ struct SelfContact {
   Column<SheetPair> pair;
   Column<SheetRow> row;
   Column<BearingRow> bears;
-  Column<Vec3<float>> pull;            // kg m, of rows that bear, of the vector asked for last
-  Column<int> key, start, entry;       // of a vertex: 4 bearing row + corner
+  Column<Vec3<float>> pull;       // kg m, of rows that bear, of the vector asked for last
+  Column<int> key, start, entry;  // of a vertex: 4 bearing row + corner
   Column<float> entry_weight;
   Column<float> block;                 // as ClothSystem::factor, without rows; where there are any
   VecColumn load;                      // kg m, of the rows on a vertex, as it is in the right side

@@ -201,7 +201,6 @@ void drop_cloth_factor(State& state) {
 bool apply_cloth_factor(State& state, const ScaledClothMatrix& matrix) {
   if (!cloth_is_factored(state)) return false;
   ClothSystem& s = state.cloth_system;
-  if (s.control.data()->done) return true;
   const VecView to = s.scaled.view();
   const ConstVecView from = s.residual.view();
   for (int i = 0; i < state.cloth.vertices; ++i) to.set(i, from[i]);

@@ -30,8 +30,7 @@ bool cloth_is_factored(const State& state);
 /// Once A is another one.
 void drop_cloth_factor(State& state);
 
-/// Puts A^-1 of ClothSystem::residual into ClothSystem::scaled unless the solve has ended. Whether
-/// there is a factor.
+/// Puts A^-1 of ClothSystem::residual into ClothSystem::scaled. Whether there is a factor.
 bool apply_cloth_factor(State& state, const ScaledClothMatrix& matrix);
 #endif
 

@@ -3,6 +3,7 @@
 #include "sim/passes/cloth/cloth_obstacles.h"
 #include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/cloth_springs.h"
+#include "sim/passes/cloth/cloth_sweeps.h"
 #include "sim/passes/cloth/triangle_obstacles.h"
 
 namespace drench::sim::DRENCH_BACKEND {

@@ -11,7 +11,6 @@
 // pin (cloth_pins.h), a wall of the domain or an obstacle (cloth_obstacles.h) holds have the w that
 // takes them there.
 
-#include "sim/backend/solve_control.h"
 #include "sim/passes/cloth/cloth_factor.h"
 #include "sim/passes/cloth/cloth_levels.h"
 #include "sim/passes/cloth/cloth_springs.h"
@@ -238,113 +237,7 @@ inline ScaledClothMatrix scaled_cloth_matrix(State& state) {
   return {cloth_matrix(state), free_block_inverse(state)};
 }
 
-/// What an iteration of conjugate gradients reads and writes: z is the scaled residual, p the
-/// direction, s = A p. In the order of Chronopoulos and Gear (1989), which sums twice in one place.
-template <class Matrix>
-struct ClothIteration {
-  Matrix matrix;
-  VecView w, residual, scaled;
-  ConstVecView image;
-  VecView direction, direction_image;
-  ClothControl* control;
-  float tolerance;  // of r . z, over the reference
-
-  /// After r . z and z . A z: how far to go and what is kept of the last direction.
-  DRENCH_HD void decide(double energy, double curvature) const {
-    ClothControl& c = *control;
-    if (c.done) return;
-    c.done = !(energy > double(tolerance) * c.reference);
-    c.turn = c.energy > 0 ? energy / c.energy : 0;
-    const double bend = c.energy > 0 ? curvature - c.turn * energy / c.step : curvature;
-    if (!(bend > 0)) c.done = 1;
-    if (c.done) return;
-    ++c.sweeps;
-    c.step = energy / bend, c.energy = energy;
-  }
-  template <class Index>
-  DRENCH_HD void move(Index i) const {
-    if (control->done) return;
-    const auto r = residual.at(i);
-    using T = decltype(r.x);
-    const T step(float(control->step)), turn(float(control->turn));
-    const Vec3<T> p = scaled.at(i) + direction.at(i) * turn,
-                  s = image.at(i) + direction_image.at(i) * turn, left = r - s * step;
-    direction.put(i, p), direction_image.put(i, s);
-    w.put(i, w.at(i) + p * step);
-    residual.put(i, left);
-    scaled.put(i, matrix.scaled(i, left));
-  }
-};
-
-/// A for products with one vector at a time, which ask_rows goes before.
-inline ScaledClothMatrix with_asked_rows(const State& state, ScaledClothMatrix matrix) {
-  matrix.matrix.contact.pulled = state.self_contact.pull.data();
-  return matrix;
-}
-inline void ask_rows(State& state, const ScaledClothMatrix&, const ConstVecView& x) {
-  pull_rows(state, x);
-}
-/// Other matrices have no rows.
-template <class Matrix>
-const Matrix& with_asked_rows(const State&, const Matrix& matrix) {
-  return matrix;
-}
-template <class Matrix>
-void ask_rows(State&, const Matrix&, const ConstVecView&) {}
-
-/// ClothSystem::scaled from ClothSystem::residual, beyond the blocks of the vertices.
-template <class Matrix>
-void precondition_cloth(State& state, const Matrix& matrix) {
-  if (!apply_cloth_factor(state, matrix)) add_cloth_levels(state, matrix);
-}
-
-/// At most `most_iterations` iterations on A w = right from the w there is, until r . A_block^-1 r
-/// is below tolerance^2 of ClothControl::reference.
-template <class Matrix>
-void solve_cloth_matrix(State& state, const Matrix& of, const VecView& w, const ConstVecView& right,
-                        int most_iterations, float tolerance) {
-  const Matrix matrix = with_asked_rows(state, of);
-  const int n = state.cloth.vertices;
-  ClothSystem& s = state.cloth_system;
-  ClothControl* control = s.control.data();
-  const VecView residual = s.residual.view(), scaled = s.scaled.view(), image = s.image.view();
-  const ClothIteration<Matrix> iteration{.matrix = matrix,
-                                         .w = w,
-                                         .residual = residual,
-                                         .scaled = scaled,
-                                         .image = image,
-                                         .direction = s.direction.view(),
-                                         .direction_image = s.direction_image.view(),
-                                         .control = control,
-                                         .tolerance = tolerance * tolerance};
-  s.direction.clear(state.queue), s.direction_image.clear(state.queue);
-  parallel_for(
-      state.queue, "cloth: start", 1,
-      DRENCH_LAMBDA(int) { control->energy = 0., control->done = 0; });
-  ask_rows(state, matrix, w);
-  for_each_lane(
-      state.queue, "cloth: residual", n, DRENCH_LAMBDA(auto i) {
-        const auto r = matrix.moving(i, right.at(i)) - matrix.times(w, i);
-        residual.put(i, r);
-        scaled.put(i, matrix.scaled(i, r));
-      });
-  precondition_cloth(state, matrix);
-  for (int k = 0;; ++k) {
-    ask_rows(state, matrix, scaled);
-    sum_lanes_then(
-        state.queue, "cloth: image", n,
-        DRENCH_LAMBDA(auto i) {
-          const auto z = scaled.at(i), image_of_z = matrix.times(scaled, i);
-          image.put(i, image_of_z);
-          return Two<decltype(z.x)>{dot(residual.at(i), z), dot(z, image_of_z)};
-        },
-        DRENCH_LAMBDA(double energy, double curvature) { iteration.decide(energy, curvature); });
-    if (ended(s.control, k, most_iterations)) break;
-    for_each_lane(
-        state.queue, "cloth: move", n, DRENCH_LAMBDA(auto i) { iteration.move(i); });
-    if (k + 1 < most_iterations) precondition_cloth(state, matrix);
-  }
-}
+/// Conjugate gradients on A w = right (cloth_sweeps.h).
 void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,
                  float tolerance);
 

@@ -1,8 +1,7 @@
 #include "sim/passes/cloth/cloth_levels.h"
 
-#include <algorithm>
-
 #include "sim/passes/cloth/cloth_implicit.h"
+#include "sim/passes/cloth/cloth_level_answers.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -221,168 +220,11 @@ struct BlockOfFunctions {
   }
 };
 
-/// Coefficients of an aggregate's functions, or what vertices have in them.
-template <class T>
-struct Coefficients {
-  Vec3<T> of[functions];
-
-  /// Of a child, whose centre is `off` from this one's, in this one's functions.
-  DRENCH_HD void take_moments(const Coefficients& child, Vec3<T> off) {
-    const Vec3<T> whole = child.of[0];
-    for (int k = 0; k < functions; ++k) of[k] = of[k] + child.of[k];
-    of[1] = of[1] + whole * off.x, of[2] = of[2] + whole * off.y, of[3] = of[3] + whole * off.z;
-  }
-  /// Of the parent, from whose centre this one's is `off`.
-  DRENCH_HD void take_answer(const Coefficients& parent, Vec3<T> off) {
-    for (int k = 0; k < functions; ++k) of[k] = of[k] + parent.of[k];
-    of[0] = of[0] + parent.at(off) - parent.of[0];
-  }
-  DRENCH_HD Vec3<T> at(Vec3<T> x) const { return of[0] + of[1] * x.x + of[2] * x.y + of[3] * x.z; }
+struct AddLevels {
+  LevelAnswers levels;
+  ScaledClothMatrix matrix;
+  DRENCH_DEVICE void operator()(const Team& team) const { levels.add(team, matrix); }
 };
-
-/// Columns of coefficients, by fields.
-struct CoefficientFields {
-  float* field;
-  int stride;
-
-  template <class Index>
-  DRENCH_HD auto at(Index i) const {
-    const auto entry = [&](int k) { return load(field + k * stride, i); };
-    Coefficients<decltype(entry(0))> c;
-    for (int f = 0; f < functions; ++f)
-      c.of[f] = {entry(3 * f), entry(3 * f + 1), entry(3 * f + 2)};
-    return c;
-  }
-  template <class Index, class T>
-  DRENCH_HD void put(Index i, const Coefficients<T>& c) const {
-    for (int f = 0; f < functions; ++f) {
-      store(field + 3 * f * stride, i, c.of[f].x),
-          store(field + (3 * f + 1) * stride, i, c.of[f].y);
-      store(field + (3 * f + 2) * stride, i, c.of[f].z);
-    }
-  }
-};
-
-/// f of places first to first + count - 1, and of those that pad them.
-template <class F>
-DRENCH_HD void for_each_lane_of(int first, int count, const F& f) {
-#if defined(__CUDACC__)
-  for (int k = 0; k < count; ++k) f(first + k);
-#else
-  for (int k = 0; k < count; k += 8) f(Lanes{first + k});
-#endif
-}
-
-/// What levels make of a residual: moments of vertices and of children, B_l^-1 of these, and the
-/// way back.
-struct LevelAnswers {
-  ClothLevels::Level level[ClothLevels::most];
-  const float *inverse, *leaf_weight;
-  ConstVecView centre, local, slot_local, residual;
-  const int *leaf_vertex, *leaf;
-  CoefficientFields moment, answer;
-  const ClothControl* control;
-
-  template <class Index, class T>
-  DRENCH_HD void solve(Index at, const Coefficients<T>& m) const {
-    const T from[unknowns] = {m.of[0].x, m.of[0].y, m.of[0].z, m.of[1].x, m.of[1].y, m.of[1].z,
-                              m.of[2].x, m.of[2].y, m.of[2].z, m.of[3].x, m.of[3].y, m.of[3].z};
-    T to[unknowns];
-    const float* entry = inverse;
-    for (int k = 0; k < unknowns; ++k) {
-      T sum(0.f);
-      for (int j = 0; j < k; ++j, entry += moment.stride) {
-        const T both = load(entry, at);
-        sum = sum + both * from[j], to[j] = to[j] + both * from[k];
-      }
-      to[k] = sum + load(entry, at) * from[k], entry += moment.stride;
-    }
-    answer.put(at, Coefficients<T>{{{to[0], to[1], to[2]},
-                                    {to[3], to[4], to[5]},
-                                    {to[6], to[7], to[8]},
-                                    {to[9], to[10], to[11]}}});
-  }
-  template <class Index>
-  DRENCH_HD void restrict_to_leaf(Index a) const {
-    if (control->done) return;
-    using T = decltype(load(inverse, a));
-    const Vec3<T> none{T(0.f), T(0.f), T(0.f)};
-    Coefficients<T> m{{none, none, none, none}};
-    for (int k = 0; k < most_vertices; ++k) {
-      const auto at = ClothLevels::slot(a, k);
-      const auto v = load(leaf_vertex, at);
-      const Vec3<T> r = residual.at(v) * load(leaf_weight, at), x = slot_local.at(at);
-      m.of[0] = m.of[0] + r, m.of[1] = m.of[1] + r * x.x, m.of[2] = m.of[2] + r * x.y,
-      m.of[3] = m.of[3] + r * x.z;
-    }
-    moment.put(a, m);
-    solve(a, m);
-  }
-  /// The children of aggregate a of a level end before.
-  DRENCH_HD int children_end(int l, int a) const {
-    const int count = level[l - 1].count;
-    return level[l - 1].first + (count < 4 * a + 4 ? count : 4 * a + 4);
-  }
-  DRENCH_HD void gather_moments(int l, int a) const {
-    const Vec3<float> none{0.f, 0.f, 0.f};
-    Coefficients<float> m{{none, none, none, none}};
-    const int at = level[l].first + a;
-    for (int c = level[l - 1].first + 4 * a; c < children_end(l, a); ++c)
-      m.take_moments(moment.at(c), centre[c] - centre[at]);
-    moment.put(at, m);
-  }
-  DRENCH_HD void restrict_to(int l, int a) const {
-    if (control->done) return;
-    gather_moments(l, a);
-    solve(level[l].first + a, moment.at(level[l].first + a));
-  }
-  /// All of a small level.
-  DRENCH_HD void restrict_to_all_of(int l) const {
-    for (int a = 0; a < level[l].count; ++a) gather_moments(l, a);
-    for_each_lane_of(level[l].first, level[l].count, [&](auto a) { solve(a, moment.at(a)); });
-  }
-  DRENCH_HD void give_to_children(int l, int a) const {
-    if (control->done) return;
-    const int at = level[l].first + a;
-    const Coefficients<float> parent = answer.at(at);
-    for (int c = level[l - 1].first + 4 * a; c < children_end(l, a); ++c) {
-      Coefficients<float> child = answer.at(c);
-      child.take_answer(parent, centre[c] - centre[at]);
-      answer.put(c, child);
-    }
-  }
-  /// What the levels give to a vertex, m.
-  template <class Index>
-  DRENCH_HD auto at_vertex(Index i) const {
-    return answer.at(load(leaf, i)).at(local.at(i));
-  }
-};
-
-LevelAnswers level_answers_of(State& state) {
-  ClothLevels& s = state.cloth_levels;
-  LevelAnswers all{.level = {},
-                   .inverse = s.inverse.data(),
-                   .leaf_weight = s.leaf_weight.data(),
-                   .centre = s.centre.view(),
-                   .local = s.local.view(),
-                   .slot_local = s.slot_local.view(),
-                   .residual = state.cloth_system.residual.view(),
-                   .leaf_vertex = s.leaf_vertex.data(),
-                   .leaf = s.leaf.data(),
-                   .moment = {s.moment.data(), s.aggregates},
-                   .answer = {s.answer.data(), s.aggregates},
-                   .control = state.cloth_system.control.data()};
-  std::copy(s.level, s.level + s.levels, all.level);
-  return all;
-}
-
-/// Aggregates of levels that are this small are one launch: of a core, or of a thread of a GPU, to
-/// which each of them is as long as a launch.
-#if defined(__CUDACC__)
-constexpr int small_level = 4;
-#else
-constexpr int small_level = 256;
-#endif
 
 }  // namespace
 
@@ -451,35 +293,9 @@ void build_cloth_levels(State& state) {
 }
 
 void add_cloth_levels(State& state, const ScaledClothMatrix& matrix) {
-  const ClothLevels& s = state.cloth_levels;
-  if (!s.on) return;
-  const LevelAnswers answers = level_answers_of(state);
-  for_each_lane(
-      state.queue, "levels: restrict", s.level[0].count,
-      DRENCH_LAMBDA(auto a) { answers.restrict_to_leaf(a); });
-  int l = 1;
-  for (; l < s.levels && s.level[l].count > small_level; ++l)
-    parallel_for(
-        state.queue, "levels: restrict further", s.level[l].count,
-        DRENCH_LAMBDA(int a) { answers.restrict_to(l, a); });
-  const int small = l, levels = s.levels;
-  parallel_for(
-      state.queue, "levels: coarse", 1, DRENCH_LAMBDA(int) {
-        if (answers.control->done) return;
-        for (int k = small; k < levels; ++k) answers.restrict_to_all_of(k);
-        for (int k = levels - 1; k >= small; --k)
-          for (int a = 0; a < answers.level[k].count; ++a) answers.give_to_children(k, a);
-      });
-  for (--l; l > 0; --l)
-    parallel_for(
-        state.queue, "levels: give", s.level[l].count,
-        DRENCH_LAMBDA(int a) { answers.give_to_children(l, a); });
-  const VecView scaled = state.cloth_system.scaled.view();
-  for_each_lane(
-      state.queue, "levels: prolong", state.cloth.vertices, DRENCH_LAMBDA(auto i) {
-        if (answers.control->done) return;
-        scaled.put(i, scaled.at(i) + matrix.moving(i, answers.at_vertex(i)));
-      });
+  if (state.cloth_levels.on)
+    run_together(state.queue, "levels: add", state.cloth.vertices,
+                 AddLevels{level_answers_of(state), matrix});
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

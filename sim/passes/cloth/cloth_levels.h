@@ -50,8 +50,7 @@ void build_cloth_levels(State& state);
 /// Whether obstacles or rows of sheets hold any vertex, as far as known.
 bool anything_touches(const State& state);
 
-/// Adds to ClothSystem::scaled what the levels make of ClothSystem::residual, unless the solve has
-/// ended.
+/// Adds to ClothSystem::scaled what the levels make of ClothSystem::residual.
 void add_cloth_levels(State& state, const ScaledClothMatrix& matrix);
 
 /// Of other matrices there are none.

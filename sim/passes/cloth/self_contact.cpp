@@ -350,18 +350,6 @@ void start_sheet_rows(State& state) {
   put_rows_in_blocks(state);
 }
 
-void pull_rows(State& state, const ConstVecView& x) {
-  SelfContact& s = state.self_contact;
-  if (s.rows == 0) return;
-  const BearingRow* bears = s.bears.data();
-  Vec3<float>* pull = s.pull.data();
-  const ClothControl* control = state.cloth_system.control.data();
-  parallel_for(
-      state.queue, "self: pulls", s.bearing, DRENCH_LAMBDA(int k) {
-        if (!control->done) pull[k] = SheetRows::pull(bears[k], x);
-      });
-}
-
 bool revise_sheet_rows(State& state, int round) {
   SelfContact& s = state.self_contact;
   if (s.rows == 0) return false;

@@ -84,10 +84,6 @@ inline SheetRows sheet_rows_of(const State& state) {
           s.entry_weight.data(), nullptr,        s.rows > 0};
 }
 
-/// What the rows that bear give at a displacement, into SelfContact::pull, unless the solve has
-/// ended: for a product with the whole of A each is asked for by four vertices.
-void pull_rows(State& state, const ConstVecView& x);
-
 /// Finds the pairs and makes their rows; those that the straight paths bring too near are in the
 /// system from the start. After linearise_cloth.
 void start_sheet_rows(State& state);

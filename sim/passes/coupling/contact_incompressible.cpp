@@ -1,6 +1,7 @@
 #include "sim/passes/coupling/contact_incompressible.h"
 
 #include "sim/passes/cloth/cloth_pins.h"
+#include "sim/passes/cloth/cloth_sweeps.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -96,7 +97,6 @@ void add_to_reference(State& state, const Matrix& matrix, const ConstVecView& of
                 scaled = state.cloth_system.scaled.view();
   parallel_for(
       state.queue, "cloth: scaled right side", state.cloth.vertices, DRENCH_LAMBDA(int i) {
-        if (i == 0) control->done = 0;
         const Vec3<float> r = matrix.moving(i, of[i]);
         residual.set(i, r), scaled.set(i, matrix.scaled(i, r));
       });
