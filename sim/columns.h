@@ -178,6 +178,7 @@ void for_each_cloth_column(S& state, const Visit& visit) {
   visit({"spring_damping", "N s/m", Group::cloth_fixed}, c.spring_damping, none);
   visit({"corner", "1", Group::cloth_fixed}, c.corner, none);
   visit({"neighbour", "1", Group::cloth_fixed}, c.neighbour, none);
+  visit({"loose_sheet", "1", Group::cloth_fixed}, c.loose_sheet, none);
   visit({"sheet", "1", Group::cloth_fixed}, c.sheet, none);
   visit({"half_thickness", "m", Group::cloth_fixed}, c.half_thickness, none);
   visit({"cloth.wetting", "1", Group::cloth_fixed}, c.wetting, none);

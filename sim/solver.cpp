@@ -442,14 +442,16 @@ class BackendSolver : public Solver {
 
   /// Those that nothing holds.
   void find_loose_sheets() {
-    state_.cloth.loose.clear();
+    std::vector<VertexRange> loose;
     for (const VertexRange& range : free_sheet_) {
       const auto begin = inverse_mass_.begin() + range.first;
       bool held = std::find(begin, begin + range.count, 0.f) != begin + range.count;
       for (size_t k = 0; k < pull_.size(); ++k)
         held |= pull_[k] > 0 && range.contains(pin_vertex_[k]);
-      if (!held) state_.cloth.loose.push_back(range);
+      if (!held) loose.push_back(range);
     }
+    state_.cloth.loose = int(loose.size());
+    from_host(state_.cloth.loose_sheet, loose);
   }
 
   void allocate_cloth_system() {

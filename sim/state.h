@@ -89,7 +89,8 @@ struct ClothState {
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
-  std::vector<VertexRange> loose;    // of the sheets without a pin or a seam
+  int loose = 0;                     // sheets without a pin or a seam
+  Column<VertexRange> loose_sheet;   // these
   // where seams sew edges (SeamStrips), else empty
   Column<int> seam_pair;                       // 4 a strip: two pairs of vertices that are sewn
   Column<float> seam_reach;                    // m, of a strip: farther apart they leave it open
@@ -128,7 +129,6 @@ struct ClothState {
 struct ClothControl {
   int done = 0, sweeps = 0;
   double reference = 0, energy = 0, step = 1, turn = 0;  // r . z of the loads, of the residual
-  Vec3<float> shift{0.f, 0.f, 0.f};                      // m, of a whole sheet
 };
 
 /// Columns of the implicit step of the sheets (passes/cloth/cloth_implicit.h), rebuilt every step.

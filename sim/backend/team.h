@@ -7,7 +7,8 @@
 //     team.for_each(n, f);                       // f(0..n-1)
 //     team.for_each_lane(n, f);                  // eight at once on a CPU core
 //     team.sum_lanes(n, f, then);                // f returns Two; then(a, b) once
-//     team.alone(f);                             // f(one): for_each, by one block or core
+//     team.alone(f);                             // f(one): for_each, by one block
+//     team.for_each_alone(n, f);                 // f(one, k): each by one block; one.sum
 //
 // Sums do not depend on how many threads there are.
 
@@ -34,6 +35,26 @@ struct OneOfTeam {
   __device__ void for_each_lane_of(int first, int n, const F& f) const {
     for_each(n, [&](int i) { f(first + i); });
   }
+  /// Of f(0..n-1), to all threads.
+  template <class T, class F>
+  __device__ T sum(int n, T start, const F& f) const {
+    for (int i = threadIdx.x; i < n; i += team_block) start = start + f(i);
+    return sum_of_block(start);
+  }
+  template <class T>
+  static __device__ T sum_of_block(const T& value) {
+    __shared__ alignas(16) char raw[team_block * sizeof(T)];
+    T* shared = reinterpret_cast<T*>(raw);
+    __syncthreads();
+    shared[threadIdx.x] = value;
+    for (int half = team_block / 2; half > 0; half /= 2) {
+      __syncthreads();
+      if (threadIdx.x < half)
+        shared[threadIdx.x] = shared[threadIdx.x] + shared[threadIdx.x + half];
+    }
+    __syncthreads();
+    return shared[0];
+  }
 };
 
 class Team {
@@ -59,14 +80,14 @@ class Team {
         const Two<float> one = f(i);
         sum = sum + Two<double>{one.a, one.b};
       }
-      sum = sum_of_block(sum);
+      sum = OneOfTeam::sum_of_block(sum);
       if (threadIdx.x == 0) partial_[b] = sum;
     }
     meet();
     if (blockIdx.x == 0) {
       Two<double> sum{0., 0.};
       for (int b = threadIdx.x; b < partials; b += team_block) sum = sum + partial_[b];
-      sum = sum_of_block(sum);
+      sum = OneOfTeam::sum_of_block(sum);
       if (threadIdx.x == 0) then(sum.a, sum.b);
     }
     meet();
@@ -76,21 +97,14 @@ class Team {
     if (blockIdx.x == 0) f(OneOfTeam{});
     meet();
   }
+  template <class F>
+  __device__ void for_each_alone(int n, const F& f) const {
+    for (int k = blockIdx.x; k < n; k += gridDim.x) f(OneOfTeam{}, k);
+    meet();
+  }
 
  private:
   static __device__ void meet() { cooperative_groups::this_grid().sync(); }
-  static __device__ Two<double> sum_of_block(Two<double> value) {
-    __shared__ double a[team_block], b[team_block];
-    __syncthreads();
-    a[threadIdx.x] = value.a, b[threadIdx.x] = value.b;
-    for (int half = team_block / 2; half > 0; half /= 2) {
-      __syncthreads();
-      if (threadIdx.x < half)
-        a[threadIdx.x] += a[threadIdx.x + half], b[threadIdx.x] += b[threadIdx.x + half];
-    }
-    __syncthreads();
-    return {a[0], b[0]};
-  }
 
   Two<double>* partial_;
 };
@@ -125,17 +139,6 @@ void run_together(Queue& queue, const char* name, int n, const Body& body) {
 
 #else
 
-struct OneOfTeam {
-  template <class F>
-  void for_each(int n, const F& f) const {
-    for (int i = 0; i < n; ++i) f(i);
-  }
-  template <class F>
-  void for_each_lane_of(int first, int n, const F& f) const {
-    for (int i = 0; i < n; i += 8) f(Lanes{first + i});
-  }
-};
-
 class Team {
  public:
   Team(Queue& queue, const char* name) : queue_(queue), name_(name) {}
@@ -148,19 +151,32 @@ class Team {
   void for_each_lane(int n, const F& f) const {
     sim::cpu::for_each_lane(queue_, name_, n, f);
   }
+  template <class F>
+  void for_each_lane_of(int first, int n, const F& f) const {
+    for_each_lane(n, [&](Lanes i) { f(Lanes{first + i.base}); });
+  }
   template <class F, class Then>
   void sum_lanes(int n, const F& f, const Then& then) const {
     sum_lanes_then(queue_, name_, n, f, then);
   }
+  template <class T, class F>
+  T sum(int n, T start, const F& f) const {
+    return parallel_reduce(queue_, name_, n, start, f, Plus{});
+  }
   template <class F>
   void alone(const F& f) const {
-    f(OneOfTeam{});
+    f(*this);
+  }
+  template <class F>
+  void for_each_alone(int n, const F& f) const {
+    for (int k = 0; k < n; ++k) f(*this, k);
   }
 
  private:
   Queue& queue_;
   const char* name_;
 };
+using OneOfTeam = Team;
 
 template <class Body>
 void run_together(Queue& queue, const char* name, int, const Body& body) {

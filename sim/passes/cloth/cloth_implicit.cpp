@@ -217,37 +217,71 @@ void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int 
   solve_cloth_matrix(state, scaled_cloth_matrix(state), w, right, most_iterations, tolerance);
 }
 
-void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& right) {
-  const ConstraintProjection constraints = constraint_projection(state);
-  const ClothMatrix matrix = cloth_matrix(state);
-  ClothControl* control = state.cloth_system.control.data();
-  // In single precision what seams of 1e6 N/m do to each other is 1e-4 of the momentum.
-  const bool seams = state.cloth.first_seam_slot < state.cloth.spring_slots;
-  for (const VertexRange& sheet : state.cloth.loose) {
-    const int first = sheet.first;
-    reduce_then(
-        state.queue, "cloth: lack", sheet.count, ClothImbalance{},
-        DRENCH_LAMBDA(int k) {
-          const int i = first + k;
-          const Vec3<float> left = right[i] - (seams ? matrix.outer(w, i) : matrix.times(w, i)),
-                            free = constraints.axis[i];
-          const double gripped =
-              constraints.obstacles && length2(constraints.normal[i]) > 0.f ? 1. : 0.;
-          const double met =
-              matrix.contact.any && matrix.contact.touches_beyond(i, sheet) ? 1. : 0.;
-          return ClothImbalance{left.x, left.y, left.z, matrix.inertia[i],
-                                3. - free.x - free.y - free.z + gripped + met};
-        },
-        Plus{},
-        DRENCH_LAMBDA(const ClothImbalance& lack) {
-          const double inverse = lack.held > 0 ? 0. : 1 / lack.inertia;
-          control->shift = {float(lack.x * inverse), float(lack.y * inverse),
-                            float(lack.z * inverse)};
-        });
-    parallel_for(
-        state.queue, "cloth: balance", sheet.count,
-        DRENCH_LAMBDA(int k) { w.set(first + k, w[first + k] + control->shift); });
+namespace {
+
+/// What the displacement of a sheet leaves of its right side, kg m, its mass, and how many of its
+/// axes are constrained.
+struct Imbalance {
+  double x = 0, y = 0, z = 0, inertia = 0, held = 0;
+  DRENCH_HD Imbalance operator+(const Imbalance& other) const {
+    return {x + other.x, y + other.y, z + other.z, inertia + other.inertia, held + other.held};
   }
+};
+
+struct Balance {
+  ClothMatrix matrix;
+  ClothSweepParts parts;
+  VecView w;
+  ConstVecView right;
+  VecView left;  // what `w` leaves of `right`, kg m
+  const VertexRange* sheet;
+  int sheets, vertices;
+  bool seams;
+
+  DRENCH_DEVICE void operator()(const Team& team) const {
+    parts.ask_rows(team, w);
+    team.for_each_lane(vertices, [&](auto i) {
+      left.put(i, right.at(i) - (seams ? matrix.outer(w, i) : matrix.times(w, i)));
+    });
+    team.for_each_alone(sheets, [&](const OneOfTeam& one, int k) { shift(one, sheet[k]); });
+  }
+  DRENCH_DEVICE void shift(const OneOfTeam& one, const VertexRange& of) const {
+    const Imbalance lack =
+        one.sum(of.count, Imbalance{}, [&](int k) { return lack_of(of.first + k, of); });
+    if (lack.held > 0) return;
+    const double inverse = 1 / lack.inertia;
+    const Vec3<float> by{float(lack.x * inverse), float(lack.y * inverse), float(lack.z * inverse)};
+    one.for_each(of.count, [&](int k) { w.set(of.first + k, w[of.first + k] + by); });
+  }
+  DRENCH_HD Imbalance lack_of(int i, const VertexRange& of) const {
+    const ConstraintProjection& may = matrix.constraints;
+    const Vec3<float> free = may.axis[i];
+    const double gripped = may.obstacles && length2(may.normal[i]) > 0.f ? 1. : 0.,
+                 met = matrix.contact.any && matrix.contact.touches_beyond(i, of) ? 1. : 0.;
+    return {left.x[i], left.y[i], left.z[i], matrix.inertia[i],
+            3. - free.x - free.y - free.z + gripped + met};
+  }
+};
+
+}  // namespace
+
+void balance_loose_cloth(State& state, const VecView& w, const ConstVecView& right) {
+  const ClothState& c = state.cloth;
+  if (c.loose == 0) return;
+  ScaledClothMatrix matrix = scaled_cloth_matrix(state);
+  const ClothSweepParts parts = sweep_parts_of(state, matrix);
+  run_together(state.queue, "cloth: balance", c.vertices,
+               Balance{.matrix = matrix.matrix,
+                       .parts = parts,
+                       .w = w,
+                       .right = right,
+                       .left = state.cloth_system.image.view(),
+                       .sheet = c.loose_sheet.data(),
+                       .sheets = c.loose,
+                       .vertices = c.vertices,
+                       // In single precision what seams of 1e6 N/m do to each other is 1e-4 of the
+                       // momentum.
+                       .seams = c.first_seam_slot < c.spring_slots});
 }
 
 void hold_at_obstacles(State& state) {

@@ -241,15 +241,6 @@ inline ScaledClothMatrix scaled_cloth_matrix(State& state) {
 void solve_cloth(State& state, const VecView& w, const ConstVecView& right, int most_iterations,
                  float tolerance);
 
-/// What the displacement of a sheet leaves of its right side, kg m, its mass, and how many of its
-/// axes are constrained.
-struct ClothImbalance {
-  double x = 0, y = 0, z = 0, inertia = 0, held = 0;
-  DRENCH_HD ClothImbalance operator+(const ClothImbalance& other) const {
-    return {x + other.x, y + other.y, z + other.z, inertia + other.inertia, held + other.held};
-  }
-};
-
 /// What a solve that ends early leaves of A w = right the fluid has given and the sheet not
 /// received. Springs give no sheet momentum as a whole: where nothing holds it a shift by the sum
 /// over its mass, on which they do not act, closes its momentum.

@@ -264,13 +264,15 @@ void build_cloth_levels(State& state) {
         state.queue, "levels: leaves", s.level[0].count, DRENCH_LAMBDA(int a) { leaves(a); });
     for (int k = 1; k <= l; ++k) {
       const ClothLevels::Level from = s.level[k - 1], to = s.level[k];
+      constexpr int part = 12;  // sums of one index: the coarse levels have few aggregates
       parallel_for(
-          state.queue, "levels: sums", to.count, DRENCH_LAMBDA(int a) {
-            double* sum = partial + size_t(sums) * (to.first + a);
-            for (int e = 0; e < sums; ++e) sum[e] = 0.;
+          state.queue, "levels: sums", to.count * (sums / part), DRENCH_LAMBDA(int i) {
+            const int a = i / (sums / part), first = i % (sums / part) * part;
+            double* sum = partial + size_t(sums) * (to.first + a) + first;
+            for (int e = 0; e < part; ++e) sum[e] = 0.;
             for (int c = 4 * a; c < 4 * a + 4 && c < from.count; ++c) {
-              const double* of = partial + size_t(sums) * (from.first + c);
-              for (int e = 0; e < sums; ++e) sum[e] += of[e];
+              const double* of = partial + size_t(sums) * (from.first + c) + first;
+              for (int e = 0; e < part; ++e) sum[e] += of[e];
             }
           });
     }
