@@ -33,7 +33,7 @@ inline ClothSweepParts sweep_parts_of(State& state, ScaledClothMatrix& matrix) {
   matrix.matrix.contact.pulled = s.pull.data();
   return {
     .levels = level_answers_of(state), .bears = s.bears.data(), .pull = s.pull.data(),
-    .bearing = s.rows > 0 ? s.bearing : 0,
+    .bearing = s.bearing,
 #if !defined(__CUDACC__)
     .state = &state
 #endif
@@ -104,9 +104,7 @@ struct ClothSweeps {
     scaled.put(i, matrix.scaled(i, left));
   }
   DRENCH_DEVICE void operator()(const Team& team) const {
-    team.alone([&](const OneOfTeam& one) {
-      one.for_each(1, [&](int) { control->energy = 0., control->done = 0; });
-    });
+    team.for_each(1, [&](int) { control->energy = 0., control->done = 0; });
     parts.ask_rows(team, w);
     team.for_each_lane(vertices, [&](auto i) { start(i); });
     for (int k = 0;; ++k) {

@@ -308,7 +308,7 @@ struct BearingRows {
 void start_sheet_rows(State& state) {
   SelfContact& s = state.self_contact;
   const ClothState& c = state.cloth;
-  s.pairs = s.rows = 0;
+  s.pairs = s.rows = s.bearing = 0;
   if (!s.any) return;
   const float* g = state.parameters.gravity;
   const float dt = float(state.dt), gravity = std::hypot(g[0], g[1], g[2]);
