@@ -77,7 +77,7 @@ box = {{min = [{right}, -1, -1], max = [1, 1, 1]}}
                      fmt::arg("left", 1e-3 * a), fmt::arg("right", span - 1e-3 * a));
 }
 
-/// Deflection of the middle, mean over time of 0.2 to 0.4 s, over that of the table.
+/// Deflection of the middle, mean over time of 0.2 to 0.6 s, over that of the table.
 double plate_under_water(int across) {
   double exact = 0;
   for (const auto& row : read_validation("hydrostatic_plate.csv"))
@@ -85,7 +85,7 @@ double plate_under_water(int across) {
   Stepper run(parse_shot(plate_text(across), "plate.toml"));
   const size_t middle = size_t(across) / 2 + 1;  // of the first row along u
   double sum = 0, time = 0;
-  while (run.time < 0.4) {
+  while (run.time < 0.6) {
     run.step();
     const double dt = run.limits.step;
     if (run.time > 0.2) sum -= moved(run, middle).y * dt, time += dt;
@@ -93,9 +93,9 @@ double plate_under_water(int across) {
   return sum / time / exact;
 }
 
-// Errors at 6, 10, 20 spacings across, %: 22, 9, 4; of plates as heavy without water, at 10, 20, 40
-// cells: 8, 2, 0.5. With steps of one length it is 1 at 20: the pressure comes and goes from step
-// to step, and the steps with it.
+// Errors at 6, 10, 20 spacings across, %: 23, 8, 4.5 (to 0.4 s, and by rounding of the start, 2.5
+// to 5.5); of plates as heavy without water, at 10, 20, 40 cells: 8, 2, 0.5. With steps of one
+// length it is 1 at 20: the pressure comes and goes from step to step, and the steps with it.
 TEST(ShellInWater, APlateUnderWaterSagsAsItsClosedForm) {
   EXPECT_NEAR(plate_under_water(6), 1, 0.3);
   EXPECT_NEAR(plate_under_water(10), 1, 0.12);

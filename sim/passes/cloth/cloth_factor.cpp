@@ -13,6 +13,8 @@ struct ClothFactor {
   BlockCholesky cholesky;
   std::vector<float> block;  // kg, by the pattern's columns
   bool on = false;           // it is of the matrix that there is
+  // Whether an answer by it is right within a tenth, and whether that is known.
+  bool exact = false, tried = false;
 };
 
 namespace {
@@ -178,7 +180,7 @@ void load_cloth_factor(State& state) {
   if (!pays(cholesky, n)) return;
   const size_t entries = 9 * pattern.column.size();
   state.cloth_factor = std::make_shared<ClothFactor>(
-      ClothFactor{std::move(pattern), std::move(cholesky), std::vector<float>(entries), false});
+      ClothFactor{std::move(pattern), std::move(cholesky), std::vector<float>(entries)});
 }
 
 bool factor_cloth(State& state) {
@@ -187,7 +189,7 @@ bool factor_cloth(State& state) {
   if (!f || anything_touches(state)) return false;
   const Assembly assembly{{cloth_matrix(state)}, f->pattern, f->block.data()};
   parallel_for(state.queue, "cloth: assemble", state.cloth.vertices, assembly);
-  f->on = f->cholesky.factor(f->block);
+  f->on = f->cholesky.factor(f->block), f->tried = false;
   if (f->on) state.cloth_levels.on = false;
   return f->on;
 }
@@ -206,6 +208,38 @@ bool apply_cloth_factor(State& state, const ScaledClothMatrix& matrix) {
   for (int i = 0; i < state.cloth.vertices; ++i) to.set(i, from[i]);
   state.cloth_factor->cholesky.solve(to.x, to.y, to.z);
   for (int i = 0; i < state.cloth.vertices; ++i) to.set(i, matrix.moving(i, to[i]));
+  return true;
+}
+
+namespace {
+
+/// What w leaves of `right`, into ClothSystem::residual, and what the factor answers to it, into
+/// ClothSystem::scaled. @return their product, kg m^2.
+double residual_by_factor(State& state, const VecView& w, const ConstVecView& right) {
+  const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
+  const VecView residual = state.cloth_system.residual.view();
+  for_each_lane(state.queue, "cloth: residual", state.cloth.vertices, [&](auto i) {
+    residual.put(i, matrix.moving(i, right.at(i)) - matrix.times(w, i));
+  });
+  apply_cloth_factor(state, matrix);
+  const ConstVecView answer = state.cloth_system.scaled.view();
+  double sum = 0;
+  for (int i = 0; i < state.cloth.vertices; ++i) sum += dot_double(residual[i], answer[i]);
+  return sum;
+}
+
+}  // namespace
+
+bool answer_by_factor(State& state, const VecView& w, const ConstVecView& right, float tolerance) {
+  ClothFactor* f = state.cloth_factor.get();
+  if (!cloth_is_factored(state) || (f->tried && !f->exact)) return false;
+  const ConstVecView answer = state.cloth_system.scaled.view();
+  ClothControl& control = *state.cloth_system.control.data();
+  const double before = residual_by_factor(state, w, right);
+  if (!(before > double(tolerance) * tolerance * control.reference)) return true;
+  for (int i = 0; i < state.cloth.vertices; ++i) w.set(i, w[i] + answer[i]);
+  ++control.sweeps;
+  if (!f->tried) f->exact = residual_by_factor(state, w, right) <= 1e-4 * before, f->tried = true;
   return true;
 }
 

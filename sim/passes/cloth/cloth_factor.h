@@ -17,6 +17,7 @@ inline bool factor_cloth(State&) { return false; }
 inline bool cloth_is_factored(const State&) { return false; }
 inline void drop_cloth_factor(State&) {}
 inline bool apply_cloth_factor(State&, const ScaledClothMatrix&) { return false; }
+inline bool answer_by_factor(State&, const VecView&, const ConstVecView&, float) { return false; }
 #else
 /// Order and fronts of shells beside fluid, where a factor pays. After load_cloth_levels.
 void load_cloth_factor(State& state);
@@ -32,6 +33,11 @@ void drop_cloth_factor(State& state);
 
 /// Puts A^-1 of ClothSystem::residual into ClothSystem::scaled. Whether there is a factor.
 bool apply_cloth_factor(State& state, const ScaledClothMatrix& matrix);
+
+/// w += A^-1 (right - A w), unless w is right within `tolerance` (solve_cloth). Whether there is a
+/// factor with which the answer is right within a hundredth of the energy's norm: the first one by
+/// a factor says so.
+bool answer_by_factor(State& state, const VecView& w, const ConstVecView& right, float tolerance);
 #endif
 
 /// Of other matrices there is none.

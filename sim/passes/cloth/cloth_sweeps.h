@@ -107,13 +107,13 @@ struct ClothSweeps {
     team.for_each(1, [&](int) { control->energy = 0., control->done = 0; });
     parts.ask_rows(team, w);
     team.for_each_lane(vertices, [&](auto i) { start(i); });
-    for (int k = 0;; ++k) {
-      if (k == 0 || k < most) parts.precondition(team, matrix);
+    for (int k = 0; k < most; ++k) {
+      parts.precondition(team, matrix);
       parts.ask_rows(team, scaled);
       team.sum_lanes(
           vertices, [&](auto i) { return multiply(i); },
           [&](double energy, double curvature) { decide(energy, curvature); });
-      if (k == most || control->done) return;
+      if (control->done) return;
       team.for_each_lane(vertices, [&](auto i) { move(i); });
     }
   }

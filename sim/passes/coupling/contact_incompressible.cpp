@@ -211,8 +211,10 @@ void respond_cloth(State& state, int sweeps, float tolerance) {
   ClothSystem& s = state.cloth_system;
   load_by_pressures(state);
   sum_loads(state, Base::own);
-  solve_cloth(state, s.change.view(), s.right.view(), cloth_is_factored(state) ? 1 : sweeps,
-              tolerance);
+  const VecView change = s.change.view();
+  const ConstVecView right = s.right.view();
+  if (answer_by_factor(state, change, right, tolerance)) return;
+  solve_cloth(state, change, right, cloth_is_factored(state) ? 1 : sweeps, tolerance);
 }
 
 namespace {
