@@ -1,9 +1,10 @@
 // Case coupled_momentum: what water and a free sheet lose of their momentum. Cases sheet_pool and
-// strip_pool: a pool on a pinned sheet of light cotton against the springs'
-// own static solution (tests/validation/coupled.h, strip_pool.h), run time against error.
+// strip_pool: a pool on a pinned sheet of light cotton, of springs and as a shell, against its own
+// static solution (tests/validation/coupled.h, strip_pool.h), run time against error.
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "tests/bench/bench.h"
 #include "tests/validation/coupled.h"
@@ -12,37 +13,42 @@
 namespace drench::bench {
 namespace {
 
-void pools(const Emit& emit) {
-  for (const int across : {15, 20, 30}) {
-    validation::PinnedPool pool;
-    Line line;
-    line.cost = measure([&] { pool = validation::pinned_pool(across, 1, 0.2); });
-    line.method = "incompressible, strong coupling";
-    line.resolution = std::to_string(across) + " across, " + std::to_string(pool.particles);
-    line.error = std::abs(pool.sag / pool.static_sag - 1), line.gate = 0.05;
-    line.error_of = "sag over that of the springs under the hydrostatic load, less 1";
-    line.more["volume"] = pool.volume;
-    line.more["speed_m_s"] = pool.speed;
-    line.more["steps"] = pool.steps;
-    emit(line);
+void add(Line& line, const validation::PinnedPool& pool) { line.more["volume"] = pool.volume; }
+void add(Line& line, const validation::StripPool& pool) {
+  line.more["shape"] = pool.shape, line.more["spread_m"] = pool.spread;
+}
+
+/// What a pool on springs and one on a shell have in common, of runs that follow each other.
+template <class Run>
+void both_models(const Emit& emit, const std::vector<int>& resolutions, const Run& run) {
+  for (const int across : resolutions) {
+    for (const ClothModel model : {ClothModel::springs, ClothModel::shell}) {
+      decltype(run(across, model)) pool;
+      Line line;
+      line.cost = measure([&] { pool = run(across, model); });
+      line.method = model == ClothModel::shell ? "shell" : "springs";
+      line.resolution = std::to_string(across) + " across, " + std::to_string(pool.particles);
+      line.error = std::abs(pool.sag / pool.static_sag - 1), line.gate = 0.05;
+      line.error_of = "sag over that of the same sheet under the hydrostatic load, less 1";
+      line.more["sag_m"] = pool.sag, line.more["speed_m_s"] = pool.speed;
+      line.more["steps"] = pool.steps;
+      line.more["iterations_a_step"] = pool.iterations, line.more["sweeps_a_step"] = pool.sweeps;
+      add(line, pool);
+      emit(line);
+    }
   }
 }
 
+void pools(const Emit& emit) {
+  both_models(emit, {15, 20, 30}, [](int across, ClothModel model) {
+    return validation::pinned_pool(across, 1, 0.2, model);
+  });
+}
+
 void strips(const Emit& emit) {
-  for (const int across : {15, 20, 30, 45}) {
-    validation::StripPool pool;
-    Line line;
-    line.cost = measure([&] { pool = validation::strip_pool(across, 1); });
-    line.method = "incompressible, strong coupling, joined across a periodic axis";
-    line.resolution = std::to_string(across) + " across, " + std::to_string(pool.particles);
-    line.error = std::abs(pool.sag / pool.static_sag - 1), line.gate = 0.05;
-    line.error_of = "sag over that of a plane chain of springs under the hydrostatic load, less 1";
-    line.more["shape"] = pool.shape;
-    line.more["spread_m"] = pool.spread;
-    line.more["speed_m_s"] = pool.speed;
-    line.more["steps"] = pool.steps;
-    emit(line);
-  }
+  both_models(emit, {15, 20, 30, 45}, [](int across, ClothModel model) {
+    return validation::strip_pool(across, 1, model);
+  });
 }
 
 void momentum(const Emit& emit) {

@@ -124,13 +124,19 @@ TEST(JoinedSheet, RefusesFluidInsideAnImage) {
 
 // --- Statics ------------------------------------------------------------------------------------
 
-class StripPool : public testing::TestWithParam<int> {};
-INSTANTIATE_TEST_SUITE_P(Across, StripPool, testing::Values(15, 20, 30));
+class StripPool : public testing::TestWithParam<std::tuple<ClothModel, int>> {};
+INSTANTIATE_TEST_SUITE_P(Springs, StripPool,
+                         testing::Combine(testing::Values(ClothModel::springs),
+                                          testing::Values(15, 20, 30)));
+INSTANTIATE_TEST_SUITE_P(Shell, StripPool,
+                         testing::Combine(testing::Values(ClothModel::shell),
+                                          testing::Values(15, 20, 30)));
 
 // Two-dimensional in all that can be measured: see strip_pool.h. Measured: docs/benchmarks.md.
-TEST_P(StripPool, HangsAsAPlaneChainOfSpringsDoes) {
-  const validation::StripPool pool = validation::strip_pool(GetParam(), 1);
-  const double spacing = 0.3 / GetParam();
+TEST_P(StripPool, HangsAsAPlaneChainDoes) {
+  const auto [model, across] = GetParam();
+  const validation::StripPool pool = validation::strip_pool(across, 1, model);
+  const double spacing = 0.3 / across;
   ASSERT_GT(pool.static_sag, 0.02);
   EXPECT_NEAR(pool.sag / pool.static_sag, 1, 0.02);
   EXPECT_LT(pool.shape, 0.02);

@@ -11,10 +11,13 @@
 namespace drench::sim_tests {
 namespace {
 
-// Error of the sag against the springs' own static solution: 0.3 % at 20 across (bench: 15, 20,
-// 30).
-TEST(StrongCoupling, APoolHangsAsDeepAsItsSheetsSpringsSay) {
-  const validation::PinnedPool pool = validation::pinned_pool(15, 1, 0.2);
+class PoolOnSheet : public testing::TestWithParam<ClothModel> {};
+INSTANTIATE_TEST_SUITE_P(Models, PoolOnSheet,
+                         testing::Values(ClothModel::springs, ClothModel::shell));
+
+// Error of the sag against the sheet's own static solution (bench: 15, 20, 30 across).
+TEST_P(PoolOnSheet, HangsAsDeepAsTheSheetSays) {
+  const validation::PinnedPool pool = validation::pinned_pool(15, 1, 0.2, GetParam());
   ASSERT_GT(pool.static_sag, 0.02);
   EXPECT_NEAR(pool.sag / pool.static_sag, 1, 0.02);
   EXPECT_NEAR(pool.volume, 0, 0.02);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/sim/support.h"
+#include "tests/validation/coupled.h"
 
 namespace drench::validation {
 
@@ -13,11 +14,10 @@ using namespace sim_tests;
 namespace {
 
 constexpr double width = 0.3, depth = 0.1, gravity = 9.81, density = 1000;  // m, m, m/s^2, kg/m^3
-constexpr double adjacent = 6000, diagonal = 3000, areal_density = 0.2;     // N/m, N/m, kg/m^2
-constexpr double thickness = 1e-3;                                          // m
+constexpr double areal_density = 0.2, thickness = 1e-3;                     // kg/m^2, m
 constexpr int around = 6;                                                   // spacings
 
-Shot pool_on_strip(int across, double offset) {
+Shot pool_on_strip(int across, ClothModel model, double offset) {
   const double a = width / across;
   Shot shot = empty_shot();
   shot.gravity = V3d(0, -gravity, 0);
@@ -26,9 +26,7 @@ Shot pool_on_strip(int across, double offset) {
   shot.domain.axis = {Axis::walls, Axis::walls, Axis::periodic};
   Cloth& sheet = add_sheet(shot, width, 0, across);
   sheet.corner.z = offset, sheet.v = V3d(0, 0, around * a), sheet.cells.y = around;
-  sheet.areal_density = areal_density, sheet.thickness = thickness;
-  sheet.adjacent_stiffness = adjacent, sheet.diagonal_stiffness = diagonal;
-  sheet.damping = 10;  // of its motion: at rest it makes no difference
+  make_light_cotton(sheet, model, areal_density);
   ClothPin pin;
   for (int j = 0; j <= around; ++j) {
     for (const int i : {0, across}) pin.vertices.push_back(uint32_t(j * (across + 1) + i));
@@ -39,12 +37,14 @@ Shot pool_on_strip(int across, double offset) {
   return shot;
 }
 
-/// What a slice of the sheet one cell wide is by symmetry: a chain of points in the plane, between
-/// neighbours one adjacent spring and two diagonal ones that keep their extent a along z, under the
-/// pressure of water that fills it to a level. In double, brought to rest by kinetic damping.
+/// What a slice of the sheet one cell wide is by symmetry: a chain of points in the plane, which
+/// keeps its extent a along z, under the pressure of water that fills it to a level. Between
+/// neighbours there are one adjacent spring and two diagonal ones, or the stress of a shell that
+/// stretches one way. In double, brought to rest by kinetic damping.
 class Chain {
  public:
-  Chain(int across, double area) : a_(width / across), area_(area) {
+  Chain(int across, double area, ClothModel model)
+      : a_(width / across), area_(area), model_(model) {
     for (int i = 0; i <= across; ++i) x_.push_back({i * a_, 0});
   }
   /// m, heights of the points.
@@ -83,9 +83,7 @@ class Chain {
     const double level = (area_ + below) / width;
     for (size_t i = 0; i + 1 < x_.size(); ++i) {
       const double dx = x_[i + 1].x - x_[i].x, dy = x_[i + 1].y - x_[i].y;
-      const double flat = std::hypot(dx, dy), slanted = std::hypot(flat, a_);
-      const double pull =
-          adjacent * (1 - a_ / flat) + 2 * diagonal * (1 - std::sqrt(2) * a_ / slanted);  // N/m
+      const double pull = pull_at(std::hypot(dx, dy));
       const double p = density * gravity * (level - height(i) - thickness / 2) * a_ / 2;
       const Point push{pull * dx, pull * dy}, load{p * dy, -p * dx};
       f[i].x += push.x + load.x, f[i].y += push.y + load.y;
@@ -94,9 +92,17 @@ class Chain {
     for (Point& p : f) p.y -= areal_density * a_ * a_ * gravity;
     return f;
   }
+  /// N/m, force over length of what joins two points that are `flat` m apart.
+  double pull_at(double flat) const {
+    if (model_ == ClothModel::shell)
+      return young / (1 - poisson * poisson) * (flat * flat / (a_ * a_) - 1) / 2;
+    const double slanted = std::hypot(flat, a_);
+    return adjacent * (1 - a_ / flat) + 2 * diagonal * (1 - std::sqrt(2) * a_ / slanted);
+  }
   double height(size_t i) const { return 0.5 * (x_[i].y + x_[i + 1].y); }
 
   double a_, area_;
+  ClothModel model_;
   std::vector<Point> x_;
 };
 
@@ -118,13 +124,13 @@ std::vector<double> lines(const sim::HostState& state, int across, double pinned
 
 }  // namespace
 
-StripPool strip_pool(int across, double seconds, double offset) {
-  const Shot shot = pool_on_strip(across, offset);
+StripPool strip_pool(int across, double seconds, ClothModel model, double offset) {
+  const Shot shot = pool_on_strip(across, model, offset);
   Stepper run(shot);
   StripPool pool;
   pool.particles = int(run.scene.start.id.size());
   const double a = shot.fluid.spacing;
-  const std::vector<double> chain = Chain(across, pool.particles * a * a / around).heights();
+  const std::vector<double> chain = Chain(across, pool.particles * a * a / around, model).heights();
   pool.static_sag = -*std::min_element(chain.begin(), chain.end());
   const double pinned = run.scene.start.cloth_position.y[0];
   std::vector<double> sum(chain.size(), 0.0);
@@ -133,6 +139,8 @@ StripPool strip_pool(int across, double seconds, double offset) {
   while (run.time < seconds - 1e-9) {
     run.step(std::min(run.stable_dt(), seconds - run.time));
     if (run.limits.bad_particle >= 0 || run.limits.bad_vertex >= 0) return pool;
+    pool.iterations += double(run.limits.iterations),
+        pool.sweeps += double(run.limits.sheet_sweeps);
     if (run.time < 0.75 * seconds) continue;
     state = run.solver->save(), pool.spread = 0, ++samples;
     const std::vector<double> y = lines(state, across, pinned, pool.spread);
@@ -143,7 +151,7 @@ StripPool strip_pool(int across, double seconds, double offset) {
     pool.sag = std::max(pool.sag, -sum[i]);
     pool.shape = std::max(pool.shape, std::abs(sum[i] - chain[i]) / pool.static_sag);
   }
-  pool.steps = run.steps;
+  pool.steps = run.steps, pool.iterations /= run.steps, pool.sweeps /= run.steps;
   const auto& y = state.position.y;
   pool.lowest = *std::min_element(y.begin(), y.end()) - pinned + pool.sag;
   for (size_t i = 0; i < state.id.size(); ++i)
