@@ -248,7 +248,8 @@ void settle_cloth(State& state) {
   }
   // No shift of the whole closes the momentum of a sheet that is held: to a tenth.
   settle_contacts(state, given, last_sweeps,
-                  {.first = last_tolerance, .between = 0.1f * last_tolerance});
+                  {.first = !near && state.shell.any ? alone_tolerance : last_tolerance,
+                   .between = 0.1f * last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 
