@@ -240,8 +240,6 @@ void settle_cloth(State& state) {
   ClothSystem& s = state.cloth_system;
   const bool near = state.contact.near > 0;
   const ConstVecView given = near ? s.right.view() : s.base.view();
-  const bool alone =
-      !near && state.shell.any && state.self_contact.rows == 0 && state.parameters.obstacles == 0;
   if (near) {
     load_by_pressures(state);
     sum_loads(state, Base::own);
@@ -249,9 +247,8 @@ void settle_cloth(State& state) {
     prepare_cloth_alone(state, given);
   }
   // No shift of the whole closes the momentum of a sheet that is held: to a tenth.
-  settle_contacts(
-      state, given, last_sweeps,
-      {.first = alone ? alone_tolerance : last_tolerance, .between = 0.1f * last_tolerance});
+  settle_contacts(state, given, last_sweeps,
+                  {.first = last_tolerance, .between = 0.1f * last_tolerance});
   balance_loose_cloth(state, s.change.view(), given);
 }
 

@@ -22,9 +22,6 @@ namespace drench::sim::DRENCH_BACKEND {
 /// nothing holds is whole (balance_loose_cloth).
 constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
 constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
-/// At the end, of shells that nothing is near, without obstacles: a third of it does not move the
-/// errors of closed forms (shell_work_precision) by 0.01 points.
-constexpr float alone_tolerance = 3e-4f;
 
 /// Rows of the near list as the pressure solve has them.
 struct ClothRows : ContactRows {
