@@ -13,7 +13,7 @@ struct ClothFactor {
   BlockCholesky cholesky;
   std::vector<float> block;  // kg, by the pattern's columns
   bool on = false;           // it is of the matrix that there is
-  // Whether an answer by it is right within a tenth, and whether that is known.
+  // Whether an answer by it is right within a hundredth, and whether that is known.
   bool exact = false, tried = false;
 };
 
