@@ -433,6 +433,13 @@ StepReport Simulator::advance_frame(const std::function<bool()>& keep_going) {
 }
 
 int Simulator::frame() const { return implementation_->frame; }
+
+double Simulator::share_of_frame() const {
+  const Implementation& s = *implementation_;
+  const double begin = s.frame_time(s.frame), end = s.frame_time(s.frame + 1);
+  return std::clamp((s.run.time - begin) / (end - begin), 0.0, 1.0);
+}
+
 ParticleFrame Simulator::particles() const { return implementation_->particles(); }
 std::vector<ClothFrame> Simulator::cloth() const { return implementation_->cloth(); }
 std::vector<ProbeText> Simulator::probes() const { return implementation_->probes.texts(); }

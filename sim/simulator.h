@@ -85,6 +85,8 @@ class Simulator {
   StepReport advance_frame(const std::function<bool()>& keep_going = {});
 
   int frame() const;  // film frame of the current state
+  /// How far the state is on the way to the next frame, 0 to 1; between steps.
+  double share_of_frame() const;
   ParticleFrame particles() const;
   std::vector<ClothFrame> cloth() const;
   /// What the shot's probes have measured from the start to now, a row for every step. It belongs

@@ -51,6 +51,8 @@ void log_info(std::string_view part, std::string_view text) {
   if (level != LogLevel::quiet) write_line(part, "", text);
 }
 
+void log_error(std::string_view part, std::string_view text) { write_line(part, "", text); }
+
 void log_verbose(std::string_view part, std::string_view text) {
   if (level == LogLevel::verbose) write_line(part, "", text);
 }

@@ -13,6 +13,7 @@ namespace drench {
 enum class LogLevel { quiet, normal, verbose };
 void set_log_level(LogLevel level);
 void log_info(std::string_view part, std::string_view text);
+void log_error(std::string_view part, std::string_view text);    // always shown
 void log_verbose(std::string_view part, std::string_view text);  // shown with -v
 
 /// What was dropped, guessed or mended: what, where, how many, what to do. Written once a cause;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +20,7 @@
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/process.h"
+#include "pipeline/driver/progress.h"
 
 namespace drench {
 
@@ -29,6 +31,7 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   std::filesystem::path folder, name;
+  std::vector<Step> steps;  // empty: all
   bool verbose = false, json = false, reference = false, strict = false;
 };
 
@@ -65,20 +68,53 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
 
 using Steps = std::vector<Step>;
 
+/// What CLI11 asks of a list of steps: the names, with an underscore for a space.
+std::map<std::string, Step> steps_by_name() {
+  std::map<std::string, Step> steps;
+  for (const Step step : all_steps()) {
+    std::string name(step_name(step));
+    std::replace(name.begin(), name.end(), ' ', '_');
+    steps[name] = step;
+  }
+  return steps;
+}
+
 CLI::App* add_make(CLI::App& app, Arguments& arguments, const std::string& name,
                    const std::string& what, const std::string& example, const Steps& steps) {
   CLI::App* command = app.add_subcommand(name, what);
   add_shot_options(*command, arguments);
   command->add_flag("--verify", arguments.shot.verify,
                     "hash every file first; damaged ones are made again");
+  command
+      ->add_option("--retry", arguments.shot.retry,
+                   "how often a frame that fails is tried again; default 0")
+      ->check(CLI::Range(0, 100));
+  command->add_flag("--shared", arguments.shot.shared,
+                    "others may work in the output folder, if all say so: on a farm");
+  command->add_flag("--openjd", arguments.shot.openjd,
+                    "progress as a farm's workers read it (Open Job Description), on stdout");
   command->footer(fmt::format("Example: drench {} {}", name, example));
   command->callback([&arguments, steps] { make_command(arguments.shot, steps); });
   return command;
 }
 
+void add_run(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = add_make(app, arguments, "run", "all stages, overlapped where they can be",
+                               "shots/pour.toml --quality preview", all_steps());
+  command
+      ->add_option("--steps", arguments.steps,
+                   "only these, with commas: simulate, mesh, foam, render, denoise, contact_sheet, "
+                   "movie")
+      ->transform(CLI::CheckedTransformer(steps_by_name(), CLI::ignore_case))
+      ->delimiter(',')
+      ->option_text("NAMES");
+  command->callback([&arguments] {
+    make_command(arguments.shot, arguments.steps.empty() ? all_steps() : arguments.steps);
+  });
+}
+
 void add_commands(CLI::App& app, Arguments& arguments) {
-  add_make(app, arguments, "run", "all stages, overlapped where they can be",
-           "shots/pour.toml --quality preview", all_steps());
+  add_run(app, arguments);
   add_make(app, arguments, "simulate", "a shot to cache", "shots/pour.toml --frames 1001-1024",
            {Step::simulate});
   add_make(app, arguments, "mesh", "caches to fluid surfaces and foam",
@@ -133,6 +169,12 @@ int say_of_parsing(const CLI::App& app, const CLI::ParseError& error) {
   return asked ? done : user_error;
 }
 
+/// A farm's line is one line.
+void tell_farm(const char* text) {
+  std::printf("%s%s\n", std::string(openjd_fail).c_str(), printable(text, Lines::one).c_str());
+  std::fflush(stdout);
+}
+
 int parse_and_run(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Shots of fluid and cloth, from physics to film frames.", "drench");
@@ -150,6 +192,9 @@ int parse_and_run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return say_of_parsing(app, error);
+  } catch (const std::exception& error) {
+    if (arguments.shot.openjd) tell_farm(error.what());
+    throw;
   }
   return done;
 }

@@ -15,12 +15,10 @@
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/contract/shot/view_check.h"
-#include "pipeline/driver/device.h"
 #include "pipeline/driver/execute.h"
-#include "pipeline/driver/frame_range.h"
 #include "pipeline/driver/inputs.h"
+#include "pipeline/driver/job.h"
 #include "pipeline/driver/layout.h"
-#include "pipeline/driver/plan.h"
 #include "pipeline/driver/plan_text.h"
 #include "pipeline/driver/process.h"
 #include "pipeline/driver/scene_text.h"
@@ -36,26 +34,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {
-
-/// A shot, what is to be made of it and where it goes.
-struct Job {
-  Shot shot;
-  fs::path folder;
-  Targets targets;
-};
-
-Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
-  Job job;
-  job.shot = read_shot(arguments.shot, {.quality = arguments.quality, .set = arguments.set});
-  job.folder =
-      arguments.out.empty() ? fs::path("out") / job.shot.name / arguments.quality : arguments.out;
-  std::vector<int> frames = arguments.frames.empty()
-                                ? all_frames(job.shot.timeline)
-                                : parse_frames(arguments.frames, job.shot.timeline);
-  job.targets =
-      targets_of(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
-  return job;
-}
 
 void report_beyond(const Plan& plan, const ShotArguments& arguments) {
   if (plan.beyond.empty()) return;
@@ -144,17 +122,11 @@ void report_done(const Job& job, const ShotArguments& arguments, const Plan& fir
   }
 }
 
-void refuse_problems(const Job& job, const Plan& plan) {
-  for (const std::string& warning : plan.warnings) log_warning("driver", warning);
-  if (!plan.problems.empty()) {
-    throw Error(fmt::format("{}: {}", job.folder.string(), plan.problems.front()));
-  }
-}
-
 ExecuteOptions execute_options(const ShotArguments& arguments) {
   ExecuteOptions options;
   options.threads = arguments.threads;
   options.memory_gib = arguments.memory_gib;
+  options.retry = arguments.retry;
   options.stop_requested = [] { return stop_requested(); };
   options.abandon = abandon;
   return options;
@@ -162,13 +134,12 @@ ExecuteOptions execute_options(const ShotArguments& arguments) {
 
 /// Plans and executes until nothing is left; a damaged input found on the way is planned again.
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
-  Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style());
+  Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style(), arguments.openjd);
   const std::unique_ptr<Stages> stages =
       shot_stages(job.shot, {arguments.device, arguments.memory_gib});
   Retries retries(job.folder, manifest);
   for (int attempt = 1;; ++attempt) {
-    const Plan plan =
-        make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+    const Plan plan = plan_of(job, manifest);
     if (retries.drop_damaged_inputs(job.targets, plan)) continue;
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
@@ -196,16 +167,17 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
   }
   const ArithmeticMode mode;
   const Job job = job_of(arguments, steps);
-  const FolderLock lock(job.folder);
-  remove_leftovers(job.folder);
+  const FolderLock lock(job.folder, arguments.shared ? LockKind::shared : LockKind::exclusive);
+  std::optional<SimulationLock> simulation_lock;
+  if (arguments.shared && job.targets.includes(Step::simulate)) simulation_lock.emplace(job.folder);
   Manifest manifest(job.folder / layout::manifest);
+  manifest.open_for_append();
   if (manifest.damaged_lines() > 0) {
     log_warning("driver",
                 fmt::format("{}: {} damaged records dropped; what they named is checked "
                             "or made again",
                             (job.folder / layout::manifest).string(), manifest.damaged_lines()));
   }
-  manifest.open_for_append();
   try {
     if (arguments.verify) drop_all_damaged(job.folder, manifest);
     const Plan plan = make_all(job, arguments, manifest);
@@ -223,7 +195,7 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
 void plan_command(const ShotArguments& arguments) {
   const Job job = job_of(arguments, all_steps());
   const Manifest manifest(job.folder / layout::manifest);
-  Plan plan = make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  Plan plan = plan_of(job, manifest);
   for (const std::string& warning : plan.warnings) log_warning("driver", warning);
   if (renders(plan)) warn_of_empty_pictures(job.shot);
   std::string text = plan_text(plan), scene_object;
@@ -251,11 +223,9 @@ void clean_command(const ShotArguments& arguments) {
                     job.folder.string()));
   }
   const FolderLock lock(job.folder);
-  remove_leftovers(job.folder);
   Manifest manifest(job.folder / layout::manifest);
   manifest.open_for_append();
-  const Plan plan =
-      make_plan(job.targets, take_snapshot(job.folder, manifest), job.shot.timeline.last);
+  const Plan plan = plan_of(job, manifest);
   for (const std::string& file : plan.beyond) {
     manifest.drop(file);
     std::error_code code;

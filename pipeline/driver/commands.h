@@ -25,6 +25,9 @@ struct ShotArguments {
   OutputFormat format = OutputFormat::text;
   bool quiet = false;
   bool verify = false;  // hash every file first instead of trusting sizes and times
+  int retry = 0;        // times that a frame is tried again which failed
+  bool shared = false;  // other drivers may work in the output folder
+  bool openjd = false;  // progress in a farm's lines on standard output
 };
 
 /// run, simulate, mesh, render: brings the output folder up to date as far as `steps` go.

@@ -15,6 +15,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/driver/channel.h"
 #include "pipeline/driver/checkpoints.h"
+#include "pipeline/driver/failures.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/make.h"
 #include "pipeline/driver/process.h"
@@ -50,6 +51,7 @@ class Executor {
   void simulate_frames();
   void produce(int frame);
   void start_simulation();
+  bool goes_on();
   void advance_to(int frame);
   std::string with_last_good(const char* text) const;
   void write_probes(int frame);
@@ -57,6 +59,8 @@ class Executor {
   void mesh_frames();
   void render_frames();
   std::vector<const Rule*> rules_of(Worker worker) const;
+  void make(const Rule& rule, int frame);
+  bool waits_to_retry(const Rule& rule, int frame, int tries, const char* why) const;
   void make_due(const Rule& rule, int frame);
   void make_up_to(const Rule& rule, int frame);
   void make_beside(const Rule& rule, int frame);
@@ -103,6 +107,7 @@ class Executor {
   std::mutex neighbours_mutex_;
   std::atomic<int> renderers_{0};
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
+  Failures failures_{targets_};
   std::atomic<bool> failed_{false};
   std::atomic<int> running_{0};
   std::atomic<bool> simulating_{false};
@@ -189,13 +194,19 @@ std::string Executor::with_last_good(const char* text) const {
                      good.empty() ? "none" : good.string());
 }
 
+/// Asked between steps.
+bool Executor::goes_on() {
+  progress_.share(Step::simulate, simulation_->frame() + 1, simulation_->share_of_frame());
+  return !stopping();
+}
+
 void Executor::advance_to(int frame) {
   while (simulation_->frame() < frame) {
     const Clock::time_point start = Clock::now();
     StageReport report;
     try {
       runner_.compute(Worker::simulate,
-                      [&] { report = simulation_->advance([this] { return !stopping(); }); });
+                      [&] { report = simulation_->advance([&] { return goes_on(); }); });
     } catch (const BlowUp& error) {
       // The simulator names a checkpoint it wrote or read itself; one of an earlier run it cannot
       // know.
@@ -245,10 +256,10 @@ void Executor::simulate_frames() {
     if (!simulation_ || !has_committed_ || simulation_->frame() != committed_) return;
     kept_work_ = checkpoints_.on_stop(*simulation_, committed_);
   };
+  int frame = to_simulate_.empty() ? targets_.frames.front() : targets_.first;
   try {
-    const int begin = to_simulate_.empty() ? targets_.frames.front() : targets_.first;
     size_t next = 0;
-    for (int frame = begin; frame <= targets_.frames.back(); ++frame) {
+    for (; frame <= targets_.frames.back(); ++frame) {
       if (stopping()) break;
       if (to_simulate_.contains(frame)) produce(frame);
       if (next >= targets_.frames.size() || targets_.frames[next] != frame) continue;
@@ -258,6 +269,8 @@ void Executor::simulate_frames() {
   } catch (const Stopped&) {
     keep_work();
     throw;
+  } catch (const Error& error) {  // frames before it are made all the same
+    failures_.add(Step::simulate, frame, error.what());
   }
   if (stopping()) keep_work();
   to_mesh_.finish();
@@ -273,11 +286,38 @@ std::vector<const Rule*> Executor::rules_of(Worker worker) const {
   return found;
 }
 
+/// A frame of a rule, unless it follows from one that failed.
+void Executor::make(const Rule& rule, int frame) {
+  if (failures_.leave_out(rule, frame)) return;
+  for (int tries = 0;; ++tries) {
+    try {
+      maker_.make(rule, frame);
+      return failures_.succeeded(rule.step);
+    } catch (const Error& error) {
+      if (waits_to_retry(rule, frame, tries, error.what())) continue;
+      failures_.add(rule.step, frame, error.what());
+      if (failures_.are_hopeless()) fail(nullptr);
+      return;
+    }
+  }
+}
+
+/// What fails for want of a network or a disk may go a little later. @return whether to try again
+bool Executor::waits_to_retry(const Rule& rule, int frame, int tries, const char* why) const {
+  if (tries >= options_.retry) return false;
+  log_info("driver", fmt::format("{} frame={} failed and is tried again: {}", step_name(rule.step),
+                                 frame, why));
+  const auto end = Clock::now() + std::chrono::milliseconds(500) * (1 << std::min(tries, 6));
+  while (Clock::now() < end && !stopping())
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  return !stopping();
+}
+
 /// What a rule makes as soon as the steps before it are done with a frame.
 void Executor::make_due(const Rule& rule, int frame) {
   switch (rule.frames) {
     case Frames::delivered:
-      return maker_.make(rule, frame);
+      return make(rule, frame);
     case Frames::from_first:
       return make_up_to(rule, frame);
     case Frames::with_neighbours:
@@ -290,7 +330,7 @@ void Executor::make_due(const Rule& rule, int frame) {
 /// In order, whichever frames are asked for.
 void Executor::make_up_to(const Rule& rule, int frame) {
   for (int& next = reached_[size_t(rule.step)].next; next <= frame && !stopping(); ++next)
-    maker_.make(rule, next);
+    make(rule, next);
 }
 
 /// Frames delivered that waited for this one and for no other.
@@ -308,7 +348,7 @@ void Executor::make_beside(const Rule& rule, int frame) {
   }
   for (const int near : due) {
     if (stopping()) return;
-    maker_.make(rule, near);
+    make(rule, near);
   }
 }
 
@@ -331,7 +371,7 @@ void Executor::make_rest(const Rule& rule) {
   if (rule.frames != Frames::with_neighbours) return;
   for (const int frame : frames_of(rule, targets_, maker_.lookup())) {
     if (stopping()) return;
-    if (reached_[size_t(rule.step)].started.insert(frame).second) maker_.make(rule, frame);
+    if (reached_[size_t(rule.step)].started.insert(frame).second) make(rule, frame);
   }
 }
 
@@ -406,10 +446,11 @@ void Executor::run() {
   watch();
   for (std::thread& thread : threads) thread.join();
   for (const Rule* rule : rules_of(Worker::last))
-    if (!stopping() && is_planned(*rule)) maker_.make(*rule, 0);
+    if (!stopping() && is_planned(*rule)) make(*rule, 0);
   progress_.finish();
   if (error_) std::rethrow_exception(error_);
   if (over_memory_ > 0) throw Error(memory_message());
+  if (failures_.any()) throw Error(failures_.text());
   if (stopping()) throw Stopped("stopped on request; the same command continues");
 }
 

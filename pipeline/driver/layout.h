@@ -10,9 +10,14 @@ namespace drench::layout {
 inline constexpr std::string_view manifest = "manifest.jsonl";
 inline constexpr std::string_view stats = "stats.jsonl";
 inline constexpr std::string_view lock = ".lock";
+inline constexpr std::string_view simulation_lock = ".simulation.lock";
 inline constexpr std::string_view shot_lock = "shot.lock.toml";
 inline constexpr std::string_view contact_sheet = "contact_sheet.png";
 inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
+
+/// What no record names.
+inline constexpr auto own =
+    std::to_array<std::string_view>({manifest, stats, lock, simulation_lock});
 
 /// All that files are written into; "" is the output folder itself.
 inline constexpr auto folders =

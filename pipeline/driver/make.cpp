@@ -53,6 +53,7 @@ Maker::Maker(const Targets& targets, const std::filesystem::path& folder, Manife
       }) {}
 
 void Maker::make(const Rule& rule, int frame) {
+  manifest_.refresh();  // another driver may have made it
   const std::optional<Decision> decision = decide(rule, targets_, frame, lookup_);
   if (!decision) throw DamagedInput(fmt::format(fmt::runtime(rule.inputs_missing), frame), "");
   if (!decision->make) return progress_.not_needed(rule.step, frame);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/driver/file_lock.h"
 
 namespace drench {
 
@@ -109,44 +110,84 @@ Manifest::Manifest(fs::path file) : file_(std::move(file)) {
   if (code) {
     throw Error(fmt::format("{}: cannot be read: {}", file_.string(), system_reason(code.value())));
   }
-  if (!there) return;
-  const std::string text = read_text(file_, uint64_t(1) << 32);
-  for (size_t begin = 0; begin < text.size();) {
-    const size_t end = text.find('\n', begin);
-    if (end == std::string::npos) {  // the writer was killed in the middle of this line
-      ++damaged_lines_;
-      break;
-    }
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
-    if (const std::optional<Record> record = parse_manifest_line(line)) {
-      records_[record->file] = *record;
-    } else if (const std::optional<json> object = checked(line);
-               object && object->contains("dropped") && object->contains("file") &&
-               object->at("file").is_string()) {
-      records_.erase(object->at("file").get<std::string>());
-    } else {
-      ++damaged_lines_;
-    }
-    begin = good_size_ = end + 1;
-  }
+  if (there) take_in(read_text(file_, uint64_t(1) << 32));
 }
 
 Manifest::~Manifest() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-void Manifest::open_for_append() {
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (descriptor_ < 0 || ::ftruncate(descriptor_, off_t(good_size_)) != 0 ||
-      ::lseek(descriptor_, off_t(good_size_), SEEK_SET) < 0) {
-    throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(errno)));
+void Manifest::fail_to_write(int reason) const {
+  throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(reason)));
+}
+
+void Manifest::take_line(std::string_view line) {
+  if (const std::optional<Record> record = parse_manifest_line(line)) {
+    records_[record->file] = *record;
+  } else if (const std::optional<json> object = checked(line);
+             object && object->contains("dropped") && object->contains("file") &&
+             object->at("file").is_string()) {
+    records_.erase(object->at("file").get<std::string>());
+  } else {
+    ++damaged_lines_;
   }
+}
+
+/// What follows in the file after good_size_.
+void Manifest::take_in(std::string_view text) {
+  size_t begin = 0;
+  for (size_t end; (end = text.find('\n', begin)) != text.npos; begin = end + 1)
+    take_line(text.substr(begin, end - begin));
+  good_size_ += begin;
+  torn_ = begin < text.size();  // the writer was killed in the middle of this line
+}
+
+/// Under the file's lock: reads what others appended and cuts off what one that was killed began.
+void Manifest::catch_up() {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) fail_to_write(errno);
+  const auto size = uint64_t(status.st_size);
+  if (size < good_size_) {
+    throw Error(
+        fmt::format("{}: became shorter while it was in use; does another program clean "
+                    "this folder? Run again",
+                    file_.string()));
+  }
+  if (size > good_size_) {
+    std::string text(size - good_size_, '\0');
+    for (size_t done = 0; done < text.size();) {
+      const ssize_t got =
+          ::pread(descriptor_, text.data() + done, text.size() - done, off_t(good_size_ + done));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) fail_to_write(got < 0 ? errno : EIO);
+      done += size_t(got);
+    }
+    take_in(text);
+  }
+  if (!torn_) return;
+  if (::ftruncate(descriptor_, off_t(good_size_)) != 0) fail_to_write(errno);
+  torn_ = false;
+  ++damaged_lines_;
+}
+
+void Manifest::open_for_append() {
+  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (descriptor_ < 0) fail_to_write(errno);
+  refresh();
+}
+
+void Manifest::refresh() {
+  const std::scoped_lock lock(mutex_);
+  const FileLock file_lock(descriptor_, file_);
+  catch_up();
 }
 
 void Manifest::append(std::string line) {
   if (descriptor_ < 0) throw std::logic_error("manifest: append before open_for_append");
   line += '\n';
-  int reason = 0;
+  const FileLock file_lock(descriptor_, file_);
+  catch_up();
+  int reason = ::lseek(descriptor_, off_t(good_size_), SEEK_SET) < 0 ? errno : 0;
   for (size_t done = 0; reason == 0 && done < line.size();) {
     const ssize_t count = ::write(descriptor_, line.data() + done, line.size() - done);
     if (count < 0 && errno == EINTR) continue;
@@ -159,10 +200,8 @@ void Manifest::append(std::string line) {
     return;
   }
   // The next record must not be glued to half a line, nor follow one that nobody counts.
-  if (::ftruncate(descriptor_, off_t(good_size_)) == 0) {
-    (void)::lseek(descriptor_, off_t(good_size_), SEEK_SET);
-  }
-  throw Error(fmt::format("{}: cannot be written: {}", file_.string(), system_reason(reason)));
+  (void)!::ftruncate(descriptor_, off_t(good_size_));
+  fail_to_write(reason);
 }
 
 void Manifest::add(const Record& record) {

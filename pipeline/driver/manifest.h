@@ -1,7 +1,8 @@
 #pragma once
 // OUT/manifest.jsonl: what every file of an output folder is and which key made it. Append-only,
 // one JSON object a line, each with a checksum, so that a torn or damaged line is dropped and never
-// used.
+// used. Several processes may append, on several machines: each takes the kernel's lock of the file
+// for a line, and reads what the others wrote before it writes its own.
 
 #include <cstdint>
 #include <filesystem>
@@ -32,8 +33,8 @@ struct Record {
   KeyParts parts;
 };
 
-/// Live records by file name. Readers take one snapshot; the driver, which holds the folder's lock,
-/// appends. Safe to use from several threads.
+/// Live records by file name. Readers take one snapshot; drivers, which hold the folder's lock,
+/// append. Safe to use from several threads.
 class Manifest {
  public:
   /// Reads what is there; a missing file is an empty manifest.
@@ -51,19 +52,26 @@ class Manifest {
   void add(const Record& record);
   /// Forgets `file`: it is gone, damaged or no longer wanted.
   void drop(const std::string& file);
+  /// Takes in what other processes appended. Call after open_for_append.
+  void refresh();
 
   std::optional<Record> find(const std::string& file) const;
   std::map<std::string, Record> records() const;
   /// Lines that failed their checksum, the torn tail among them.
-  int damaged_lines() const { return damaged_lines_; }
+  int damaged_lines() const { return damaged_lines_ + (torn_ ? 1 : 0); }
 
  private:
+  void take_line(std::string_view line);
+  void take_in(std::string_view text);
+  void catch_up();
   void append(std::string line);
+  [[noreturn]] void fail_to_write(int reason) const;
 
   std::filesystem::path file_;
   mutable std::mutex mutex_;
   std::map<std::string, Record> records_;
   int damaged_lines_ = 0;
+  bool torn_ = false;       // the file ends within a line
   uint64_t good_size_ = 0;  // bytes up to the end of the last whole line
   int descriptor_ = -1;
 };

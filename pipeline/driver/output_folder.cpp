@@ -1,17 +1,16 @@
 #include "pipeline/driver/output_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
+#include <chrono>
 #include <optional>
+#include <thread>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/descriptor.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/driver/layout.h"
 
@@ -23,19 +22,6 @@ namespace {
 
 int64_t mtime_of(const struct stat& status) {
   return int64_t(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec;
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
-}
-
-std::string holder_of(int descriptor) {
-  std::array<char, 256> text{};
-  const ssize_t size = ::pread(descriptor, text.data(), text.size() - 1, 0);
-  std::string holder(text.data(), size_t(std::max<ssize_t>(size, 0)));
-  std::replace(holder.begin(), holder.end(), '\n', ' ');
-  return holder.empty() ? "another process" : holder;
 }
 
 void make_folder(const fs::path& folder) {
@@ -66,35 +52,39 @@ std::optional<struct stat> status_of(const fs::path& path) {
   return {};
 }
 
-}  // namespace
-
-FolderLock::FolderLock(const fs::path& folder) {
-  make_folder(folder);
-  const fs::path file = folder / layout::lock;
-  descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (descriptor_ < 0) {
-    throw Error(fmt::format("{}: the output folder cannot be written: {}", file.string(),
-                            system_reason(errno)));
-  }
-  if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-    const int reason = errno;
-    const std::string holder = reason == EWOULDBLOCK ? holder_of(descriptor_) : "";
-    ::close(descriptor_);
-    if (reason != EWOULDBLOCK) {
-      throw Error(fmt::format("{}: cannot be locked: {}", file.string(), system_reason(reason)));
-    }
-    throw Error(
-        fmt::format("{}: {} is working in this folder; wait until it has ended, or give "
-                    "another --out",
-                    folder.string(), holder));
-  }
-  const std::string note = fmt::format("process {} on {}\n", ::getpid(), host_name());
-  // The note only serves the message above: the lock holds without it.
-  if (::ftruncate(descriptor_, 0) == 0) (void)!::pwrite(descriptor_, note.data(), note.size(), 0);
+void remove_leftovers(const fs::path& folder) {
+  int removed = 0;
+  for (const std::string_view part : layout::folders)
+    removed += remove_stale_temporaries(folder / part);
+  if (removed > 0) log_verbose("driver", fmt::format("removed {} half-written files", removed));
 }
 
-FolderLock::~FolderLock() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+}  // namespace
+
+FolderLock::FolderLock(const fs::path& folder, LockKind kind)
+    : file_((make_folder(folder), folder / layout::lock)) {
+  // Others that share it hold it alone for a moment at their start, and whoever has just taken it
+  // has yet to write its name.
+  const int tries = kind == LockKind::shared ? 60 : 1;
+  for (int k = 0; !file_.try_take(LockKind::exclusive); ++k) {
+    if (kind == LockKind::shared && file_.try_take(kind)) return;
+    if (k == tries) {
+      throw Error(
+          fmt::format("{}: {} is working in this folder; wait until it has ended, or give "
+                      "another --out",
+                      folder.string(), file_.holder()));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  remove_leftovers(folder);
+  if (kind == LockKind::shared) file_.try_take(kind);
+}
+
+SimulationLock::SimulationLock(const fs::path& folder) : file_(folder / layout::simulation_lock) {
+  for (bool said = false; !file_.try_take(LockKind::exclusive); said = true) {
+    if (!said) log_info("driver", fmt::format("waits for {}, which simulates", file_.holder()));
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
 }
 
 FileState state_of(const fs::path& folder, const Record& record) {
@@ -122,9 +112,8 @@ FileState state_by_digest(const fs::path& folder, const Record& record) {
   if (!S_ISREG(status->st_mode) || uint64_t(status->st_size) != record.size) {
     return FileState::changed;
   }
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
-  if (descriptor < 0 && says_nothing_of_the_file(errno)) fail_to_read(path, errno);
-  if (descriptor >= 0) ::close(descriptor);
+  const Descriptor file(path, O_RDONLY | O_NONBLOCK | O_NOFOLLOW);
+  if (!file.is_open() && says_nothing_of_the_file(errno)) fail_to_read(path, errno);
   try {
     return hash_file(path) == record.digest ? FileState::intact : FileState::changed;
   } catch (const Error&) {
@@ -160,7 +149,7 @@ std::vector<std::string> unlisted_files(const fs::path& folder, const Manifest& 
        entry.increment(code)) {
     if (entry->is_directory(code)) continue;
     const std::string file = entry->path().lexically_relative(folder).generic_string();
-    if (file == layout::manifest || file == layout::stats || file == layout::lock) continue;
+    if (std::find(layout::own.begin(), layout::own.end(), file) != layout::own.end()) continue;
     if (!records.contains(file) && !layout::is_frame_samples(file)) files.push_back(file);
   }
   if (code) fail_to_read(folder, code.value());
@@ -181,13 +170,6 @@ void remove_frame_samples(const fs::path& folder) {
           fmt::format("{}: cannot be removed: {}", file.string(), system_reason(code.value())));
     }
   }
-}
-
-void remove_leftovers(const fs::path& folder) {
-  int removed = 0;
-  for (const std::string_view part : layout::folders)
-    removed += remove_stale_temporaries(folder / part);
-  if (removed > 0) log_verbose("driver", fmt::format("removed {} half-written files", removed));
 }
 
 }  // namespace drench

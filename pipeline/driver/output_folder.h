@@ -13,23 +13,34 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/driver/file_lock.h"
 #include "pipeline/driver/manifest.h"
 
 namespace drench {
 
-/// Kernel lock on an output folder (flock): released by the kernel when its process ends, however
-/// it ends, so that none is ever stale.
+/// Kernel lock on an output folder: released by the kernel when its process ends, however it ends,
+/// so that none is ever stale.
 class FolderLock {
  public:
-  /// Makes the folder if needed. @throws Error if another driver holds it, saying who, or the
-  /// folder cannot be written.
-  explicit FolderLock(const std::filesystem::path& folder);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
+  /// Makes the folder if needed, and removes what killed runs left half-written in it, unless
+  /// others share it now.
+  /// @param kind  shared: drivers of one shot, on any machines, work in the folder at once.
+  /// @throws Error if another driver holds it, saying who, or the folder cannot be written.
+  explicit FolderLock(const std::filesystem::path& folder, LockKind kind = LockKind::exclusive);
 
  private:
-  int descriptor_ = -1;
+  LockFile file_;
+};
+
+/// One of several drivers that share a folder simulates at a time: a simulation is a chain.
+class SimulationLock {
+ public:
+  /// Waits while another driver simulates in the folder, and says so.
+  /// @throws Error if the folder cannot be written.
+  explicit SimulationLock(const std::filesystem::path& folder);
+
+ private:
+  LockFile file_;
 };
 
 enum class FileState { intact, missing, changed };
@@ -65,8 +76,5 @@ std::vector<std::string> unlisted_files(const std::filesystem::path& folder,
 
 /// Removes the samples of stopped frames. Call with the lock held.
 void remove_frame_samples(const std::filesystem::path& folder);
-
-/// Removes what killed runs left half-written. Call with the lock held.
-void remove_leftovers(const std::filesystem::path& folder);
 
 }  // namespace drench

@@ -126,12 +126,14 @@ void check_threads(int count) {
                   threads.size(), count));
 }
 
+uint64_t peak_memory() {
+  rusage usage{};
+  return ::getrusage(RUSAGE_SELF, &usage) == 0 ? uint64_t(usage.ru_maxrss) * 1024 : 0;
+}
+
 uint64_t resident_memory() {
   std::FILE* file = std::fopen("/proc/self/statm", "re");
-  if (!file) {
-    rusage usage{};
-    return ::getrusage(RUSAGE_SELF, &usage) == 0 ? uint64_t(usage.ru_maxrss) * 1024 : 0;
-  }
+  if (!file) return peak_memory();
   unsigned long long total = 0, resident = 0;
   const int count = std::fscanf(file, "%llu %llu", &total, &resident);
   std::fclose(file);

@@ -55,5 +55,7 @@ void check_threads(int count);
 /// Resident memory of this process in bytes; the most there was so far where the system has no
 /// /proc.
 uint64_t resident_memory();
+/// The most that this process had resident so far, in bytes.
+uint64_t peak_memory();
 
 }  // namespace drench

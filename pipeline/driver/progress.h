@@ -15,13 +15,24 @@ namespace drench {
 
 enum class ProgressStyle { quiet, lines, bar };
 
+/// What a farm's worker reads on standard output, by the Open Job Description: a share in percent,
+/// a line on what is done, and what went wrong.
+inline constexpr std::string_view openjd_progress = "openjd_progress: ",
+                                  openjd_status = "openjd_status: ", openjd_fail = "openjd_fail: ";
+
+/// "0:42", "1:02:03"
+std::string clock_text(double seconds);
+/// "[####----]", with this share of it filled.
+std::string bar_text(double share, int width);
+
 /// A bar if stderr is a terminal and nothing more is asked for.
 ProgressStyle progress_style();
 
 /// Counts what is done of what is planned, with rate and time left. Safe from several threads.
 class Progress {
  public:
-  explicit Progress(ProgressStyle style);
+  /// @param openjd  also prints a farm's lines, on standard output.
+  explicit Progress(ProgressStyle style, bool openjd = false);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -47,8 +58,13 @@ class Progress {
     std::map<int, double> share;  // by frame
   };
   void draw_until_finished();
+  static double finished(const Count& count);
+  double finished_share() const;
+  void tell_farm(std::string_view what);
 
   const ProgressStyle style_;
+  const bool openjd_;
+  std::chrono::steady_clock::time_point told_;
   mutable std::mutex mutex_;
   std::map<Step, Count> counts_;
   std::chrono::steady_clock::time_point start_;

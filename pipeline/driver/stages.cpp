@@ -87,6 +87,7 @@ class ShotSimulation final : public Simulation {
       : simulator_(shot, options), fluid_(shot.fluid.present()) {}
 
   int frame() const override { return simulator_.frame(); }
+  double share_of_frame() const override { return simulator_.share_of_frame(); }
   void preroll(const std::function<bool()>& keep_going) override { simulator_.preroll(keep_going); }
   StageReport advance(const std::function<bool()>& keep_going) override {
     const StepReport step = simulator_.advance_frame(keep_going);

@@ -27,6 +27,8 @@ class Simulation {
  public:
   virtual ~Simulation() = default;
   virtual int frame() const = 0;
+  /// How far it is on the way to the next frame, 0 to 1.
+  virtual double share_of_frame() const { return 0; }
   /// To the first frame, before it is written; nothing to do after read_checkpoint. @throws as
   /// advance.
   virtual void preroll(const std::function<bool()>& keep_going) = 0;

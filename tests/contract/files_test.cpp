@@ -188,11 +188,13 @@ TEST(StaleTemporaries, OfDeadProcessesAreRemovedAndNothingElse) {
   int status = 0;
   ::waitpid(child, &status, 0);
   ASSERT_EQ(folder.names().size(), 1u);
-  for (const char* name : {"fluid.1000.ply", ".hidden", ".note.tmp", ".a.1-x.tmp", "x.1-1.tmp"}) {
-    write_file_whole(folder / name, "kept");
-  }
-  EXPECT_EQ(remove_stale_temporaries(folder.path()), 1);
-  EXPECT_EQ(folder.names().size(), 5u);
+  const std::vector<std::string> others{"fluid.1000.ply",    ".hidden",
+                                        ".note.tmp",         ".a.1-x.tmp",
+                                        ".a.00000000.1.tmp", "x.00000000.1-1.tmp"};
+  for (const std::string& name : others) write_file_whole(folder / name, "kept");
+  write_file_whole(folder / ".of another machine.00000000.1-1.tmp.ply", "half");
+  EXPECT_EQ(remove_stale_temporaries(folder.path()), 2);
+  EXPECT_EQ(folder.names().size(), others.size());
   EXPECT_EQ(remove_stale_temporaries(folder / "missing"), 0);
 }
 

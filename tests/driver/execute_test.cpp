@@ -16,6 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::digests_in;
+using test::error_of;
 using test::Event;
 using test::flip_bit_quietly;
 using test::make_toy;
@@ -334,18 +335,76 @@ TEST(Execute, NamesTheLastGoodCheckpointWhenTheSimulationFails) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() / layout::particles(15)));
 }
 
-// When rendering fails, the simulation's work is kept in a checkpoint.
-TEST(Execute, KeepsTheSimulationWhenALaterStageFails) {
+TEST(Execute, GoesOnBesideAFrameThatFails) {
   const TemporaryFolder folder;
   const ToySettings settings;
   ToyStages first(settings), second(settings);
   first.hook = [](Step step, int frame) {
-    if (step == Step::render && frame == 3) throw Error("no such texture");
+    if (step == Step::mesh && frame == 3) throw Error("no such mesh");
+  };
+  EXPECT_EQ(error_of([&] { make_toy(settings, first, folder.path()); }),
+            "no such mesh\n2 of what follows was left out; the same command goes on with it");
+  EXPECT_EQ(first.count(Step::simulate), 24);
+  EXPECT_EQ(first.count(Step::render), 24);
+  EXPECT_EQ(first.count(Step::contact_sheet), 0);
+  make_toy(settings, second, folder.path());
+  EXPECT_EQ(second.frames(Step::mesh), std::vector<int>{3});
+  EXPECT_EQ(second.frames(Step::render), std::vector<int>{3});
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+/// What is made of the frame before, or of frames beside it, waits for the frame that failed.
+TEST(Execute, LeavesOutAllThatFollowsFromAFrameThatFails) {
+  ToySettings settings;
+  settings.foam = true;
+  settings.denoise_frames = 1;
+  settings.steps = all_steps();
+  for (const Step failing : {Step::simulate, Step::foam, Step::render}) {
+    const TemporaryFolder folder;
+    ToyStages first(settings), second(settings);
+    first.hook = [&](Step step, int frame) {
+      if (step == failing && frame == 20) throw Error("as asked");
+    };
+    const std::string text = error_of([&] { make_toy(settings, first, folder.path()); });
+    EXPECT_EQ(text.find("as asked"), 0u) << text;
+    const int rendered = first.count(Step::render) - int(failing == Step::render),
+              denoised = first.count(Step::denoise);
+    EXPECT_EQ(rendered, failing == Step::render ? 24 : 19) << step_name(failing);
+    EXPECT_EQ(denoised, failing == Step::render ? 22 : 18) << step_name(failing);
+    make_toy(settings, second, folder.path());
+    EXPECT_EQ(digests_in(folder.path()), undisturbed(settings)) << step_name(failing);
+    EXPECT_EQ(second.count(Step::render), 25 - rendered) << step_name(failing);
+    EXPECT_EQ(second.count(Step::denoise), 25 - denoised) << step_name(failing);
+  }
+}
+
+/// The rest would fail as well: it stops, and the simulation's work is kept in a checkpoint.
+TEST(Execute, GivesUpAfterThreeFramesThatFailInARow) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages first(settings), second(settings);
+  first.hook = [](Step step, int) {
+    if (step == Step::mesh) throw Error("the disk is full");
   };
   EXPECT_THROW(make_toy(settings, first, folder.path()), Error);
+  EXPECT_LE(first.count(Step::simulate), 8);
   const int reached = first.frames(Step::simulate).back();
   make_toy(settings, second, folder.path());
   EXPECT_GE(second.frames(Step::simulate).front(), reached);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+TEST(Execute, TriesAFrameAgainThatFails) {
+  const TemporaryFolder folder;
+  const ToySettings settings;
+  ToyStages stages(settings);
+  std::atomic<int> left{2};
+  stages.hook = [&](Step step, int frame) {
+    if (step == Step::mesh && frame == 3 && left-- > 0) throw Error("the network is away");
+  };
+  ExecuteOptions options;
+  options.retry = 2;
+  make_toy(settings, stages, folder.path(), options);
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
 }
 

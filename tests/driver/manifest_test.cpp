@@ -1,6 +1,8 @@
 #include "pipeline/driver/manifest.h"
 
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "pipeline/contract/error.h"
 #include "pipeline/driver/process.h"
@@ -129,6 +131,54 @@ TEST(Manifest, GivesClearErrorAndStaysWholeWhenTheDiskIsFull) {
   const Manifest again(file);
   EXPECT_EQ(again.damaged_lines(), 0);
   EXPECT_EQ(again.records().size(), 2u);
+}
+
+// Each writer reads what the others wrote before it writes, and cuts off what one that was killed
+// began.
+TEST(Manifest, TakesTheLinesOfSeveralWriters) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "manifest.jsonl";
+  Manifest first(file), second(file);
+  first.open_for_append();
+  second.open_for_append();
+  first.add(record_number(1));
+  EXPECT_FALSE(second.find(record_number(1).file));
+  second.refresh();
+  EXPECT_TRUE(second.find(record_number(1).file));
+  std::ofstream(file, std::ios::app) << manifest_line(record_number(9)).substr(0, 50);
+  second.add(record_number(2));
+  first.drop(record_number(1).file);
+  first.add(record_number(3));
+  EXPECT_TRUE(first.find(record_number(2).file));
+  second.refresh();
+  EXPECT_FALSE(second.find(record_number(1).file));
+  const Manifest again(file);
+  EXPECT_EQ(again.damaged_lines(), 0);
+  EXPECT_EQ(again.records().size(), 2u);
+  EXPECT_EQ(second.records().size(), 2u);
+}
+
+TEST(Manifest, LosesNoLineOfWritersAtOnce) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder.path() / "manifest.jsonl";
+  constexpr int writers = 4, lines = 100;
+  std::vector<pid_t> children;
+  for (int k = 0; k < writers; ++k) {
+    children.push_back(::fork());
+    if (children.back() != 0) continue;
+    Manifest manifest(file);
+    manifest.open_for_append();
+    for (int line = 0; line < lines; ++line) manifest.add(record_number(1000 * k + line));
+    ::_exit(manifest.damaged_lines());
+  }
+  for (const pid_t child : children) {
+    int status = -1;
+    ::waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+  }
+  const Manifest manifest(file);
+  EXPECT_EQ(manifest.damaged_lines(), 0);
+  EXPECT_EQ(manifest.records().size(), size_t(writers * lines));
 }
 
 }  // namespace

@@ -1,50 +1,28 @@
 #include "pipeline/contract/files/files.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <mutex>
 #include <new>
 #include <optional>
+#include <regex>
 #include <set>
 #include <system_error>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/files/descriptor.h"
 
 namespace drench {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A file descriptor that closes itself.
-class Descriptor {
- public:
-  Descriptor(const fs::path& path, int flags, mode_t mode = 0)
-      : value_(::open(path.c_str(), flags | O_CLOEXEC, mode)) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int value() const { return value_; }
-  bool is_open() const { return value_ >= 0; }
-  /// Closes and returns errno: some file systems report a full disk only here.
-  int close() {
-    const int result = ::close(value_);
-    value_ = -1;
-    return result == 0 ? 0 : errno;
-  }
-
- private:
-  int value_;
-};
 
 [[noreturn]] void fail_to_write(const fs::path& path, int error_number) {
   throw Error(fmt::format("{}: cannot be written: {}", path.string(), system_reason(error_number)));
@@ -64,14 +42,24 @@ LiveTemporaries& live_temporaries() {
   return live;
 }
 
+/// Names this machine: two may have processes of one number at work in a folder.
+const std::string& host_digits() {
+  static const std::string digits = [] {
+    const std::string name = host_name();
+    return hash_bytes(name.data(), name.size()).hex().substr(0, 8);
+  }();
+  return digits;
+}
+
 /// A name beside `path` that no other process or thread uses; removed unless kept. The extension is
 /// kept because some writers choose their format by it.
 class Temporary {
  public:
   explicit Temporary(const fs::path& path) {
     static std::atomic<unsigned> count{0};
-    name_ = path.parent_path() / fmt::format(".{}.{}-{}.tmp{}", path.stem().string(), ::getpid(),
-                                             count++, path.extension().string());
+    name_ =
+        path.parent_path() / fmt::format(".{}.{}.{}-{}.tmp{}", path.stem().string(), host_digits(),
+                                         ::getpid(), count++, path.extension().string());
     ::unlink(name_.c_str());
     const std::scoped_lock lock(live_temporaries().mutex);
     live_temporaries().paths.insert(key(name_));
@@ -92,21 +80,27 @@ class Temporary {
   fs::path name_;
 };
 
-/// Process id in `.STEM.PID-COUNT.tmp.EXT`, 0 if the name is not of that form.
-pid_t owner_of_temporary(const std::string& name) {
-  const size_t mark = name.rfind(".tmp");
-  if (name.empty() || name[0] != '.' || mark == std::string::npos || mark == 0) return 0;
-  const size_t after = mark + 4;
-  if (after != name.size() && name[after] != '.') return 0;
-  const size_t dot = name.rfind('.', mark - 1);
-  if (dot == std::string::npos || dot == 0) return 0;
-  const char* const end = name.data() + mark;
-  pid_t pid = 0;
-  unsigned count = 0;
-  const auto first = std::from_chars(name.data() + dot + 1, end, pid);
-  if (first.ec != std::errc() || first.ptr == end || *first.ptr != '-' || pid <= 0) return 0;
-  const auto second = std::from_chars(first.ptr + 1, end, count);
-  return second.ec == std::errc() && second.ptr == end ? pid : 0;
+struct Owner {
+  std::string host;  // host_digits() of its machine
+  pid_t process = 0;
+};
+
+/// Who wrote `.STEM.HOST.PID-COUNT.tmp.EXT`; nothing if the name is not of that form.
+std::optional<Owner> owner_of_temporary(const std::string& name) {
+  static const std::regex form(
+      R"(\.[\s\S]*\.([0-9a-f]{8})\.([1-9][0-9]{0,8})-[0-9]+\.tmp(\.[\s\S]*)?)");
+  std::smatch found;
+  if (!std::regex_match(name, found, form)) return {};
+  return Owner{found[1], pid_t(std::stol(found[2]))};
+}
+
+/// Whether a process may be writing it now. One on another machine is not: whoever clears a folder
+/// holds its lock.
+bool is_live(const Owner& owner, const fs::path& temporary) {
+  if (owner.host != host_digits()) return false;
+  if (owner.process != ::getpid()) return ::kill(owner.process, 0) == 0 || errno != ESRCH;
+  const std::scoped_lock lock(live_temporaries().mutex);
+  return live_temporaries().paths.contains(Temporary::key(temporary));
 }
 
 void ignore_file_size_signal() {
@@ -251,6 +245,11 @@ std::string system_reason(int error_number) {
   return advice ? fmt::format("{}: {}", reason, advice) : reason;
 }
 
+std::string host_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown host";
+}
+
 WrittenFile write_file_whole(const fs::path& path,
                              const std::function<void(const fs::path& temporary)>& write) {
   ignore_file_size_signal();
@@ -294,14 +293,8 @@ int remove_stale_temporaries(const fs::path& folder) {
   fs::directory_iterator entry(folder, code);
   int removed = 0;
   for (; !code && entry != fs::directory_iterator(); entry.increment(code)) {
-    const pid_t owner = owner_of_temporary(entry->path().filename().string());
-    if (owner == 0) continue;
-    if (owner == ::getpid()) {
-      const std::scoped_lock lock(live_temporaries().mutex);
-      if (live_temporaries().paths.contains(Temporary::key(entry->path()))) continue;
-    } else if (::kill(owner, 0) == 0 || errno != ESRCH) {
-      continue;
-    }
+    const std::optional<Owner> owner = owner_of_temporary(entry->path().filename().string());
+    if (!owner || is_live(*owner, entry->path())) continue;
     if (::unlink(entry->path().c_str()) != 0 && errno != ENOENT) {
       fail_to_write(entry->path(), errno);
     }

@@ -35,11 +35,15 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, uint64_t max
 std::string read_text(const std::filesystem::path& path, uint64_t max_bytes = 1 << 24);
 
 /// Removes the temporaries that killed runs left in `folder` (not below it): files that
-/// write_file_whole named, `.STEM.PID-COUNT.tmp.EXT`, whose process is gone. A missing folder holds
-/// none.
+/// write_file_whole named, `.STEM.HOST.PID-COUNT.tmp.EXT`, whose process is gone, or was one of
+/// another machine. A missing folder holds none. Call with the lock of whatever the folder belongs
+/// to, so that no other machine writes into it.
 /// @return how many were removed.
 /// @throws Error if the folder cannot be listed or a file not removed.
 int remove_stale_temporaries(const std::filesystem::path& folder);
+
+/// Name of this machine.
+std::string host_name();
 
 /// What the system means by an errno and what to do about it: "no space left on device; free ...".
 std::string system_reason(int error_number);
