@@ -40,6 +40,20 @@ drench_use_blender() {
 # ./bench render_skips counts instructions.
 drench_use_valgrind() { drench_packages+=("valgrind:/usr/bin/valgrind"); }
 
+# The cluster and the mounts that tests of the farm make; without them they are left out.
+drench_try_farm() {
+  if ! (
+    drench_packages=(
+      "slurm-wlm:/usr/sbin/slurmctld"
+      "munge:/usr/sbin/munged"
+      "bindfs:/usr/bin/bindfs"
+    )
+    drench_install
+  ); then
+    printf 'drench: no Slurm or bindfs, so their tests are left out\n' >&2
+  fi
+}
+
 drench_missing_packages() {
   local entry package files file found
   for entry in "${drench_packages[@]}"; do

@@ -19,6 +19,7 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/driver/commands.h"
+#include "pipeline/driver/farm/farm.h"
 #include "pipeline/driver/process.h"
 #include "pipeline/driver/progress.h"
 
@@ -30,9 +31,12 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 
 struct Arguments {
   ShotArguments shot;
+  FarmArguments farm;
   std::filesystem::path folder, name;
   std::vector<Step> steps;  // empty: all
   bool verbose = false, json = false, reference = false, strict = false;
+  bool status = false, cancel = false;  // of a farm
+  std::string job_template;
 };
 
 void add_common(CLI::App& command, Arguments& arguments) {
@@ -113,6 +117,39 @@ void add_run(CLI::App& app, Arguments& arguments) {
   });
 }
 
+void add_farm(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("farm", "all stages on a Slurm cluster, frame by frame");
+  FarmArguments& farm = arguments.farm;
+  add_shot_options(*command, arguments);
+  command->add_option("--chunk", farm.chunk, "frames a task; default by what a frame took")
+      ->check(CLI::Range(1, 1'000'000));
+  command->add_option("--cores", farm.cores, "of a task; default 1")->check(CLI::Range(1, 4096));
+  command
+      ->add_option("--sbatch", farm.sbatch,
+                   "handed on to sbatch, as --sbatch=--partition=film; may be given again")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--retry", farm.retry, "how often a task that fails is tried again; default 0")
+      ->check(CLI::Range(0, 100));
+  CLI::Option* status = command->add_flag("--status", arguments.status, "how far it is");
+  CLI::Option* cancel =
+      command->add_flag("--cancel", arguments.cancel, "end its tasks")->excludes(status);
+  command
+      ->add_option("--template", arguments.job_template,
+                   "openjd: print the job as an Open Job Description, for other farms")
+      ->check(CLI::IsMember({"openjd"}))
+      ->excludes(status)
+      ->excludes(cancel);
+  command->footer("Example: drench farm shots/pour.toml --cores 8 --sbatch=--partition=film");
+  command->callback([&arguments] {
+    arguments.farm.shot = arguments.shot;
+    if (arguments.status) return farm_status(arguments.farm);
+    if (arguments.cancel) return farm_cancel(arguments.farm);
+    if (!arguments.job_template.empty()) return farm_template(arguments.farm);
+    farm_submit(arguments.farm);
+  });
+}
+
 void add_commands(CLI::App& app, Arguments& arguments) {
   add_run(app, arguments);
   add_make(app, arguments, "simulate", "a shot to cache", "shots/pour.toml --frames 1001-1024",
@@ -122,6 +159,8 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   add_make(app, arguments, "render", "meshes to EXR frames, a contact sheet and a movie",
            "shots/pour.toml --set render.samples=256",
            {Step::render, Step::denoise, Step::contact_sheet, Step::movie});
+
+  add_farm(app, arguments);
 
   CLI::App* plan = app.add_subcommand("plan", "what would run and what is skipped, with reasons");
   add_shot_options(*plan, arguments);

@@ -19,6 +19,10 @@ inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
 inline constexpr auto own =
     std::to_array<std::string_view>({manifest, stats, lock, simulation_lock});
 
+/// What `drench farm` keeps: shots as they were submitted, numbers of jobs, logs.
+inline constexpr std::string_view farm = "farm", farm_logs = "farm/log",
+                                  farm_tasks = "farm/tasks.jsonl", farm_lock = "farm/.lock";
+
 /// All that files are written into; "" is the output folder itself.
 inline constexpr auto folders =
     std::to_array<std::string_view>({"", "sim", "sim/checkpoint", "mesh", "render", "noisy"});

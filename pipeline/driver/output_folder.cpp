@@ -150,6 +150,7 @@ std::vector<std::string> unlisted_files(const fs::path& folder, const Manifest& 
     if (entry->is_directory(code)) continue;
     const std::string file = entry->path().lexically_relative(folder).generic_string();
     if (std::find(layout::own.begin(), layout::own.end(), file) != layout::own.end()) continue;
+    if (*fs::path(file).begin() == layout::farm) continue;
     if (!records.contains(file) && !layout::is_frame_samples(file)) files.push_back(file);
   }
   if (code) fail_to_read(folder, code.value());
