@@ -40,17 +40,19 @@ drench_use_blender() {
 # ./bench render_skips counts instructions.
 drench_use_valgrind() { drench_packages+=("valgrind:/usr/bin/valgrind"); }
 
-# The cluster and the mounts that tests of the farm make; without them they are left out.
-drench_try_farm() {
+# The cluster and the mounts that tests of the farm make, and the browser that opens reports; without
+# them these tests are left out.
+drench_try_optional() {
   if ! (
     drench_packages=(
       "slurm-wlm:/usr/sbin/slurmctld"
       "munge:/usr/sbin/munged"
       "bindfs:/usr/bin/bindfs"
+      "chromium:/usr/bin/chromium"
     )
     drench_install
   ); then
-    printf 'drench: no Slurm or bindfs, so their tests are left out\n' >&2
+    printf 'drench: no Slurm, bindfs or Chromium, so their tests are left out\n' >&2
   fi
 }
 

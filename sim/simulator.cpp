@@ -352,24 +352,29 @@ struct Simulator::Implementation {
     report.time = run.time;
     report.particles = density.size();
     for (int t : run.solver->near_triangles()) report.near += t >= 0;
-    double sum = 0, energy = 0;
+    double sum = 0;
     for (float rho : density) {
       const double over = std::max(0.0, double(rho) / run.scene.parameters.rest_density - 1);
       sum += over;
       report.max_compression = std::max(report.max_compression, over);
     }
     if (!density.empty()) report.mean_compression = sum / double(density.size());
-    const auto kinetic = [](const sim::HostVec& v, size_t i) {
-      return 0.5 * (double(v.x[i]) * v.x[i] + double(v.y[i]) * v.y[i] + double(v.z[i]) * v.z[i]);
+    const auto add = [&](double mass, const sim::HostVec& v, size_t i) {
+      const std::array<double, 3> velocity{v.x[i], v.y[i], v.z[i]};
+      double square = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        square += velocity[c] * velocity[c];
+        report.momentum[c] += mass * velocity[c];
+      }
+      report.kinetic_energy += mass * (0.5 * square);
     };
     for (size_t i = 0; i < state.velocity.size(); ++i)
-      energy += run.scene.parameters.particle_mass * kinetic(state.velocity, i);
+      add(run.scene.parameters.particle_mass, state.velocity, i);
     for (size_t i = 0; i < state.cloth_velocity.size(); ++i) {
       const double water = sim::water_at(run.scene.cloth, state, int(i));
-      energy += (run.scene.cloth.mass[i] + water) * kinetic(state.cloth_velocity, i);
+      add(run.scene.cloth.mass[i] + water, state.cloth_velocity, i);
       report.water_in_cloth += water;
     }
-    report.kinetic_energy = energy;
     report.guard_hits = state.guard_hits;
     report.cloth_contacts = run.solver->cloth_contacts();
     for (const sim::ColumnMemory& group : run.solver->memory()) report.memory += group.bytes;

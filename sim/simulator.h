@@ -3,6 +3,7 @@
 // fluid is incompressible and the cloth implicit; the method of Harada, Koshizuka, Kawaguchi 2007
 // is there as well. docs/design.md lists equation, file and test.
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -34,6 +35,7 @@ struct StepReport {
   double max_speed = 0;            // m/s
   double mean_compression = 0, max_compression = 0;  // max(rho/rho0 - 1, 0)
   double kinetic_energy = 0;                         // J, fluid and cloth
+  std::array<double, 3> momentum{};                  // kg m/s, of the same
   int iterations = 0;           // of the incompressible solver's pressure solves
   int unconverged = 0;          // steps in which these did not reach fluid.tolerance
   double worst_residual = 0;    // mean density error that a solve left, the largest of the steps

@@ -32,7 +32,7 @@ enum ExitCode { done = 0, user_error = 1, our_bug = 2, stopped = 75 };
 struct Arguments {
   ShotArguments shot;
   FarmArguments farm;
-  std::filesystem::path folder, name;
+  std::filesystem::path folder, compared, name;
   std::vector<Step> steps;  // empty: all
   bool verbose = false, json = false, reference = false, strict = false;
   bool status = false, cancel = false;  // of a farm
@@ -179,6 +179,13 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   verify->footer("Example: drench verify out/pour/preview");
   verify->callback([&arguments] { verify_command(arguments.folder, arguments.shot.format); });
 
+  CLI::App* report = app.add_subcommand("report", "a page of frames, plots, warnings and commands");
+  report->add_option("DIR", arguments.folder, "output folder")->required();
+  report->add_option("--with", arguments.compared, "another output folder, to compare frames with");
+  add_common(*report, arguments);
+  report->footer("Example: drench report out/pour/preview");
+  report->callback([&arguments] { report_command(arguments.folder, arguments.compared); });
+
   CLI::App* fabrics = app.add_subcommand("fabrics", "constants of common fabrics, with sources");
   add_common(*fabrics, arguments);
   fabrics->footer("Example: drench fabrics");
@@ -216,6 +223,7 @@ void tell_farm(const char* text) {
 
 int parse_and_run(int argc, char** argv) {
   Arguments arguments;
+  arguments.shot.command.assign(argv, argv + argc);
   CLI::App app("Shots of fluid and cloth, from physics to film frames.", "drench");
   app.set_version_flag("--version", fmt::format("drench {}", build_id::version));
   app.require_subcommand(1);

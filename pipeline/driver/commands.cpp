@@ -1,13 +1,18 @@
 #include "pipeline/driver/commands.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "build_id.h"
 #include "pipeline/contract/error.h"
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/geometry/obstacle.h"
@@ -132,6 +137,31 @@ ExecuteOptions execute_options(const ShotArguments& arguments) {
   return options;
 }
 
+std::string processor_name() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name"))
+      return line.substr(std::min(line.size(), line.find(':') + 2));
+  return "unknown";
+}
+
+/// What made the rows that follow in stats.jsonl, and how to make them again.
+void record_run(const Job& job, const ShotArguments& arguments) {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  const int threads =
+      arguments.threads > 0 ? arguments.threads : tbb::this_task_arena::max_concurrency();
+  StatsFile(job.folder / layout::stats)
+      .add("run", json{{"started", fmt::format("{:%FT%TZ}", utc)},
+                       {"command", arguments.command},
+                       {"host", host_name()},
+                       {"cpu", processor_name()},
+                       {"threads", threads},
+                       {"version", build_id::version}}
+                      .dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
 /// Plans and executes until nothing is left; a damaged input found on the way is planned again.
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style(), arguments.openjd);
@@ -146,6 +176,7 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
     if (attempt == 1 && renders(plan)) warn_of_empty_pictures(job.shot);
     write_shot_lock(job, manifest);
     if (plan.nothing_to_do()) return plan;
+    if (attempt == 1) record_run(job, arguments);
     try {
       const GracefulStop graceful;
       execute(job.targets, plan, job.folder, manifest, *stages, progress,

@@ -21,6 +21,7 @@ struct ShotArguments {
   int threads = 0;        // 0: all cores
   double memory_gib = 0;  // 0: no limit
   std::vector<std::string> set;
+  std::vector<std::string> command;  // as it was typed
   std::string quality = "final";
   OutputFormat format = OutputFormat::text;
   bool quiet = false;
@@ -43,6 +44,9 @@ void verify_command(const std::filesystem::path& folder, OutputFormat format);
 /// Prints the constants of common fabrics, in SI: a line a fabric, tabs between, names and units
 /// first.
 void fabrics_command(OutputFormat format);
+/// Writes OUT/report.html, a page of what was made and what it took. @param compared  another
+/// output folder whose frames are shown beside; empty: none.
+void report_command(const std::filesystem::path& folder, const std::filesystem::path& compared);
 enum class InitialShot { commented, reference };
 /// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.
 void init_command(const std::filesystem::path& name, InitialShot kind);

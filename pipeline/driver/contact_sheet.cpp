@@ -52,7 +52,24 @@ void draw_glyph(Picture& picture, int x, int y, int scale, const Glyph& glyph, i
   }
 }
 
-/// Mean of the film's pixels under each thumbnail pixel, in linear light.
+std::vector<NumberedImage> evenly_picked(const std::vector<NumberedImage>& images) {
+  if (images.size() <= size_t(max_thumbnails)) return images;
+  std::vector<NumberedImage> picked;
+  for (size_t k = 0; k < size_t(max_thumbnails); ++k) {
+    picked.push_back(images[k * (images.size() - 1) / (max_thumbnails - 1)]);
+  }
+  return picked;
+}
+
+void place(Picture& sheet, const Picture& thumbnail, int x0, int y0) {
+  for (int y = 0; y < thumbnail.height; ++y) {
+    std::copy_n(&thumbnail.rgb[3 * size_t(y) * thumbnail.width], 3 * thumbnail.width,
+                &sheet.rgb[3 * (size_t(y0 + y) * sheet.width + x0)]);
+  }
+}
+
+}  // namespace
+
 render::Film shrink(const render::Film& film, int width, int height) {
   render::Film small{width, height, std::vector<float>(4 * size_t(width) * height)};
   for (int y = 0; y < height; ++y) {
@@ -74,24 +91,6 @@ render::Film shrink(const render::Film& film, int width, int height) {
   }
   return small;
 }
-
-std::vector<NumberedImage> evenly_picked(const std::vector<NumberedImage>& images) {
-  if (images.size() <= size_t(max_thumbnails)) return images;
-  std::vector<NumberedImage> picked;
-  for (size_t k = 0; k < size_t(max_thumbnails); ++k) {
-    picked.push_back(images[k * (images.size() - 1) / (max_thumbnails - 1)]);
-  }
-  return picked;
-}
-
-void place(Picture& sheet, const Picture& thumbnail, int x0, int y0) {
-  for (int y = 0; y < thumbnail.height; ++y) {
-    std::copy_n(&thumbnail.rgb[3 * size_t(y) * thumbnail.width], 3 * thumbnail.width,
-                &sheet.rgb[3 * (size_t(y0 + y) * sheet.width + x0)]);
-  }
-}
-
-}  // namespace
 
 void draw_number(Picture& picture, int x, int y, int scale, std::string_view text) {
   for (const bool rim : {true, false}) {

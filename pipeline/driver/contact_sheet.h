@@ -32,6 +32,9 @@ WrittenFile write_contact_sheet(const std::filesystem::path& path,
                                 const std::vector<NumberedImage>& images,
                                 const render::ViewTransform& view = {});
 
+/// Mean of the film's pixels under each pixel of a smaller one, in linear light.
+render::Film shrink(const render::Film& film, int width, int height);
+
 /// Writes digits and '-' of a built-in 5 x 7 font, white with a dark rim, `scale` pixels a dot,
 /// with the top left corner of the first character at (x, y). What lies outside the picture is cut
 /// off.

@@ -9,6 +9,7 @@ namespace drench::layout {
 
 inline constexpr std::string_view manifest = "manifest.jsonl";
 inline constexpr std::string_view stats = "stats.jsonl";
+inline constexpr std::string_view report = "report.html";
 inline constexpr std::string_view lock = ".lock";
 inline constexpr std::string_view simulation_lock = ".simulation.lock";
 inline constexpr std::string_view shot_lock = "shot.lock.toml";
@@ -17,7 +18,7 @@ inline constexpr std::string_view stop_checkpoint = "sim/checkpoint/stop.ckpt";
 
 /// What no record names.
 inline constexpr auto own =
-    std::to_array<std::string_view>({manifest, stats, lock, simulation_lock});
+    std::to_array<std::string_view>({manifest, stats, report, lock, simulation_lock});
 
 /// What `drench farm` keeps: shots as they were submitted, numbers of jobs, logs.
 inline constexpr std::string_view farm = "farm", farm_logs = "farm/log",

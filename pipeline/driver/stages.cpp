@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/files/foam_file.h"
@@ -45,6 +46,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"mean_compression", step.mean_compression},
                      {"max_compression", step.max_compression},
                      {"kinetic_energy", step.kinetic_energy},
+                     {"momentum", step.momentum},
                      {"iterations", step.iterations},
                      {"unconverged", step.unconverged},
                      {"viscous_iterations", step.viscous_iterations},
@@ -72,6 +74,16 @@ StageReport report_of(const StepReport& step, const std::string& device) {
   }
   if (step.lost > 0) report.line += fmt::format(" lost={}", step.lost);
   return report;
+}
+
+/// Of a closed surface, m^3.
+double enclosed_volume(const TriangleMesh& mesh) {
+  double six = 0;
+  for (const auto& t : mesh.triangle) {
+    const Imath::V3d a(mesh.position[t.x]), b(mesh.position[t.y]), c(mesh.position[t.z]);
+    six += a.dot(b.cross(c));
+  }
+  return six / 6;
 }
 
 /// Of the keys of all that a frame is made from.
@@ -162,6 +174,9 @@ class ShotStages final : public Stages {
     report.json = json{{"particles", particles.position.size()},
                        {"vertices", surface.position.size()},
                        {"triangles", surface.triangle.size()},
+                       {"surface_l", 1000 * enclosed_volume(surface)},
+                       {"particles_l", 1000 * double(particles.position.size()) *
+                                           std::pow(double(particles.spacing), 3)},
                        {"contact", stats.contact},
                        {"crossing", stats.crossing}}
                       .dump();
