@@ -20,6 +20,7 @@
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/contract/shot/view_check.h"
+#include "pipeline/driver/disk.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/inputs.h"
 #include "pipeline/driver/job.h"
@@ -162,6 +163,14 @@ void record_run(const Job& job, const ShotArguments& arguments) {
                       .dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
+void warn_of_small_disk(const Job& job, const Plan& plan, const Manifest& manifest) {
+  const DiskEstimate estimate = disk_estimate(plan, job.targets, manifest.records());
+  const double free = free_disk(job.folder);
+  if (estimate.bytes <= free) return;
+  log_warning("driver", fmt::format("{}: {}; free space or choose another output folder",
+                                    job.folder.string(), disk_text(estimate, free)));
+}
+
 /// Plans and executes until nothing is left; a damaged input found on the way is planned again.
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style(), arguments.openjd);
@@ -176,7 +185,10 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
     if (attempt == 1 && renders(plan)) warn_of_empty_pictures(job.shot);
     write_shot_lock(job, manifest);
     if (plan.nothing_to_do()) return plan;
-    if (attempt == 1) record_run(job, arguments);
+    if (attempt == 1) {
+      warn_of_small_disk(job, plan, manifest);
+      record_run(job, arguments);
+    }
     try {
       const GracefulStop graceful;
       execute(job.targets, plan, job.folder, manifest, *stages, progress,
@@ -229,19 +241,24 @@ void plan_command(const ShotArguments& arguments) {
   Plan plan = plan_of(job, manifest);
   for (const std::string& warning : plan.warnings) log_warning("driver", warning);
   if (renders(plan)) warn_of_empty_pictures(job.shot);
-  std::string text = plan_text(plan), scene_object;
+  const DiskEstimate disk = disk_estimate(plan, job.targets, manifest.records());
+  const double free = free_disk(job.folder);
+  std::string text = plan_text(plan);
+  if (const std::string line = disk_text(disk, free); !line.empty()) text += line + "\n";
+  std::map<std::string, std::string> more{
+      {"disk", json_line({{"needed_bytes", disk.bytes}, {"free_bytes", free}})}};
   if (plan.simulation.needed) {
     const sim::Scene scene = sim::build_scene(job.shot, level_sets_within(arguments.memory_gib));
     const sim::ProbeSeries probes(job.shot, scene);  // finds those that can never read
     for (const std::string& warning : sim::warnings_of(scene.report)) log_warning("sim", warning);
     text += scene_text(scene.report);
-    scene_object = json_line(scene_json(scene.report));
+    more["scene"] = json_line(scene_json(scene.report));
   }
   if (plan.simulation.needed || renders(plan)) check_obstacle_meshes(job.shot);
   if (renders(plan))
     render::check_pictures(job.shot, render::PictureMemory::within(arguments.memory_gib));
   plan.warnings = warning_texts();
-  if (arguments.format == OutputFormat::json) return write_plan_json(plan, scene_object, print);
+  if (arguments.format == OutputFormat::json) return write_plan_json(plan, more, print);
   print(printable(text, Lines::many));
 }
 

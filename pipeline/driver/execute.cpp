@@ -15,9 +15,11 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/driver/channel.h"
 #include "pipeline/driver/checkpoints.h"
+#include "pipeline/driver/disk.h"
 #include "pipeline/driver/failures.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/make.h"
+#include "pipeline/driver/memory_budget.h"
 #include "pipeline/driver/process.h"
 
 namespace drench {
@@ -75,7 +77,9 @@ class Executor {
   void guard(void (Executor::*work)());
   void start(std::vector<std::thread>& threads, void (Executor::*work)());
   void watch();
+  void watch_disk();
   std::string memory_message() const;
+  std::string disk_message() const;
 
   /// How far a rule has come.
   struct Reached {
@@ -100,14 +104,16 @@ class Executor {
   std::unique_ptr<Simulation> simulation_;
   int committed_ = 0;  // frame of the last commit of simulation_, or of the state it started with
   bool has_committed_ = false;
-  bool kept_work_ = false;  // in a checkpoint, when it was stopped
-  double over_memory_ = 0;  // bytes in use when that were too many
+  bool kept_work_ = false;           // in a checkpoint, when it was stopped
+  double over_memory_ = 0;           // bytes in use when that were too many
+  std::optional<double> disk_left_;  // bytes, when that were too few
 
   std::array<Reached, size_t(Step::count)> reached_;  // by step
   std::mutex neighbours_mutex_;
   std::atomic<int> renderers_{0};
   Channel<int> to_mesh_{queued_frames}, to_render_{queued_frames};
   Failures failures_{targets_};
+  MemoryBudget budget_;
   std::atomic<bool> failed_{false};
   std::atomic<int> running_{0};
   std::atomic<bool> simulating_{false};
@@ -129,7 +135,8 @@ Executor::Executor(const Targets& targets, const Plan& plan, const fs::path& fol
       maker_(targets, folder, manifest, stages, progress, runner_, [this] { return stopping(); }),
       keys_(simulation_keys(targets, targets.frames.back())),
       checkpoints_(folder, manifest, targets, keys_, options.checkpoint_every,
-                   options.checkpoints_kept) {
+                   options.checkpoints_kept),
+      budget_(options.memory_gib * double(1 << 30), [] { return double(resident_memory()); }) {
   for (Reached& reached : reached_) reached.next = targets.first;
   for (const Task& task : plan.tasks) {
     if (task.step == Step::simulate && task.action == Action::run) to_simulate_.insert(task.frame);
@@ -204,6 +211,7 @@ void Executor::advance_to(int frame) {
   while (simulation_->frame() < frame) {
     const Clock::time_point start = Clock::now();
     StageReport report;
+    const MemoryBudget::Frame in_work(budget_, Step::simulate, [this] { return !stopping(); });
     try {
       runner_.compute(Worker::simulate,
                       [&] { report = simulation_->advance([&] { return goes_on(); }); });
@@ -291,6 +299,7 @@ void Executor::make(const Rule& rule, int frame) {
   if (failures_.leave_out(rule, frame)) return;
   for (int tries = 0;; ++tries) {
     try {
+      const MemoryBudget::Frame in_work(budget_, rule.step, [this] { return !stopping(); });
       maker_.make(rule, frame);
       return failures_.succeeded(rule.step);
     } catch (const Error& error) {
@@ -403,6 +412,8 @@ void Executor::render_frames() {
 void Executor::watch() {
   const auto limit = uint64_t(options_.memory_gib * double(1 << 30));
   std::optional<Clock::time_point> stop_time;
+  constexpr int looks_a_second = 50;
+  int looks = 0;
   while (running_ > 0) {
     if (stopping()) {
       to_mesh_.close();
@@ -414,12 +425,22 @@ void Executor::watch() {
     if (asked && stop_time && !simulating_ && seconds_since(*stop_time) > options_.patience_s) {
       if (options_.abandon) options_.abandon();
     }
+    budget_.sample();
+    if (!stopping() && ++looks % looks_a_second == 0) watch_disk();
     if (limit > 0 && !stopping() && resident_memory() > limit) {
       over_memory_ = double(resident_memory());
       fail(nullptr);  // the message waits for what the simulation can keep
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+}
+
+/// On a full disk not even a checkpoint could be kept.
+void Executor::watch_disk() {
+  const double free = free_disk(folder_), reserve = disk_reserve(manifest_.records());
+  if (free >= reserve) return;
+  disk_left_ = free;
+  fail(nullptr);
 }
 
 void Executor::start(std::vector<std::thread>& threads, void (Executor::*work)()) {
@@ -450,6 +471,7 @@ void Executor::run() {
   progress_.finish();
   if (error_) std::rethrow_exception(error_);
   if (over_memory_ > 0) throw Error(memory_message());
+  if (disk_left_) throw Error(disk_message());
   if (failures_.any()) throw Error(failures_.text());
   if (stopping()) throw Stopped("stopped on request; the same command continues");
 }
@@ -459,6 +481,16 @@ std::string Executor::memory_message() const {
       "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was stopped{}. Give "
       "more, a larger spacing or smaller frames",
       folder_.string(), over_memory_ / double(1 << 30), options_.memory_gib,
+      kept_work_ ? " with a checkpoint" : "");
+}
+
+std::string Executor::disk_message() const {
+  return fmt::format(
+      "{}: the disk is nearly full: {:.0f} MB are left, and {:.0f} are kept for a checkpoint and "
+      "frames in work; the run was stopped{}. Free space, and the same command goes on, or choose "
+      "another output "
+      "folder",
+      folder_.string(), *disk_left_ / 1e6, disk_reserve(manifest_.records()) / 1e6,
       kept_work_ ? " with a checkpoint" : "");
 }
 

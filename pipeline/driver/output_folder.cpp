@@ -66,7 +66,12 @@ FolderLock::FolderLock(const fs::path& folder, LockKind kind)
   // Others that share it hold it alone for a moment at their start, and whoever has just taken it
   // has yet to write its name.
   const int tries = kind == LockKind::shared ? 60 : 1;
-  for (int k = 0; !file_.try_take(LockKind::exclusive); ++k) {
+  for (int k = 0;; ++k) {
+    if (file_.try_take(LockKind::exclusive)) {
+      remove_leftovers(folder);
+      if (kind == LockKind::exclusive) return;
+    }
+    // The kernel lets go of one kind before it gives the other: somebody may come in between.
     if (kind == LockKind::shared && file_.try_take(kind)) return;
     if (k == tries) {
       throw Error(
@@ -76,8 +81,6 @@ FolderLock::FolderLock(const fs::path& folder, LockKind kind)
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  remove_leftovers(folder);
-  if (kind == LockKind::shared) file_.try_take(kind);
 }
 
 SimulationLock::SimulationLock(const fs::path& folder) : file_(folder / layout::simulation_lock) {

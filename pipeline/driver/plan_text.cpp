@@ -36,7 +36,7 @@ std::string plan_text(const Plan& plan) {
   return text;
 }
 
-void write_plan_json(const Plan& plan, const std::string& scene,
+void write_plan_json(const Plan& plan, const std::map<std::string, std::string>& more,
                      const std::function<void(std::string_view)>& write) {
   const auto text_of = [](const nlohmann::json& value) {
     return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -50,7 +50,7 @@ void write_plan_json(const Plan& plan, const std::string& scene,
       "{{\n\"beyond\": {},\n\"problems\": {},\n\"simulation\": {},\n\"warnings\": "
       "{},\n\"tasks\": [",
       text_of(plan.beyond), text_of(plan.problems), text_of(simulation), text_of(plan.warnings));
-  if (!scene.empty()) text.insert(2, fmt::format("\"scene\": {},\n", scene));
+  for (const auto& [name, value] : more) text.insert(2, fmt::format("\"{}\": {},\n", name, value));
   constexpr size_t piece = 1 << 16;
   std::string_view before = "\n";
   for (const Task& task : plan.tasks) {

@@ -1,6 +1,7 @@
 #include "pipeline/driver/execute.h"
 
 #include <gtest/gtest.h>
+#include <sys/mount.h>
 
 #include <algorithm>
 #include <atomic>
@@ -392,6 +393,30 @@ TEST(Execute, GivesUpAfterThreeFramesThatFailInARow) {
   make_toy(settings, second, folder.path());
   EXPECT_GE(second.frames(Step::simulate).front(), reached);
   EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+}
+
+/// Before the disk is full: then not even a checkpoint could be kept.
+TEST(Execute, StopsWithACheckpointOnADiskThatIsNearlyFull) {
+  const TemporaryFolder folder;
+  const char* small = "size=4400k";  // of which 4 MiB are kept
+  if (::mount("none", folder.path().c_str(), "tmpfs", 0, small) != 0)
+    GTEST_SKIP() << "needs root to mount a small file system";
+  ToySettings settings;
+  settings.last = 80;
+  ToyStages first(settings), second(settings);
+  first.hook = [](Step step, int) {
+    if (step == Step::simulate) std::this_thread::sleep_for(50ms);
+  };
+  const std::string text = error_of([&] { make_toy(settings, first, folder.path()); });
+  EXPECT_NE(text.find("the disk is nearly full"), std::string::npos) << text;
+  EXPECT_NE(text.find("with a checkpoint"), std::string::npos) << text;
+  const int reached = first.frames(Step::simulate).back();
+  EXPECT_LT(reached, 80);
+  EXPECT_EQ(::mount("none", folder.path().c_str(), "tmpfs", MS_REMOUNT, "size=20m"), 0);
+  make_toy(settings, second, folder.path());
+  EXPECT_GE(second.frames(Step::simulate).front(), reached);
+  EXPECT_EQ(digests_in(folder.path()), undisturbed(settings));
+  ::umount(folder.path().c_str());
 }
 
 TEST(Execute, TriesAFrameAgainThatFails) {

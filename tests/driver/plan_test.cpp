@@ -225,7 +225,7 @@ TEST(Plan, ReportsFramesBeyondAShortenedRange) {
 
 std::string json_of(const Plan& plan) {
   std::string text;
-  write_plan_json(plan, "", [&](std::string_view piece) { text += piece; });
+  write_plan_json(plan, {}, [&](std::string_view piece) { text += piece; });
   return text;
 }
 

@@ -87,7 +87,7 @@ TEST(Drivers, OfOneFolderRefuseEachOther) {
   }
 }
 
-TEST(Drivers, ThatShareAFolderMakeItTogether) {
+TEST(Drivers, ThatShareAFolderEndWithOneResult) {
   for (int k = 0; k < races(); ++k) {
     const TinyShot shot(4);
     for (const Ended& ended : run_at_once(shot, {{"--shared"}, {"--shared"}, {"--shared"}}))
