@@ -32,6 +32,17 @@ foreach(header CLI/CLI.hpp toml++/toml.h xxhash.h)
   find_path(${variable} ${header} REQUIRED)
 endforeach()
 
+# Debian's cpp-httplib has no config; the library was built with all three, and its classes differ
+# without.
+find_path(HTTPLIB_INCLUDE httplib.h REQUIRED)
+find_library(HTTPLIB_LIBRARY cpp-httplib REQUIRED)
+add_library(httplib::httplib UNKNOWN IMPORTED)
+set_target_properties(httplib::httplib PROPERTIES
+  IMPORTED_LOCATION ${HTTPLIB_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${HTTPLIB_INCLUDE})
+target_compile_definitions(httplib::httplib INTERFACE
+  CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT CPPHTTPLIB_BROTLI_SUPPORT)
+target_link_libraries(httplib::httplib INTERFACE Threads::Threads)
+
 # Debian ships no OpenVDBConfig and its FindOpenVDB asks for Boost libraries that are not needed:
 # the library and its headers are enough.
 find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)

@@ -25,6 +25,7 @@ drench_packages=(
   "nlohmann-json3-dev:/usr/include/nlohmann/json.hpp"
   "libfmt-dev:/usr/include/fmt/format.h"
   "libxxhash-dev:/usr/include/xxhash.h"
+  "libcpp-httplib-dev:/usr/include/httplib.h"
   "libopencolorio-dev:/usr/include/OpenColorIO/OpenColorIO.h"
   "ffmpeg:/usr/bin/ffmpeg"
 )

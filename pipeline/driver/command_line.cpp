@@ -34,6 +34,7 @@ struct Arguments {
   FarmArguments farm;
   std::filesystem::path folder, compared, name;
   std::vector<Step> steps;  // empty: all
+  int port = 0;             // any
   bool verbose = false, json = false, reference = false, strict = false;
   bool status = false, cancel = false;  // of a farm
   std::string job_template;
@@ -185,6 +186,14 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   add_common(*report, arguments);
   report->footer("Example: drench report out/pour/preview");
   report->callback([&arguments] { report_command(arguments.folder, arguments.compared); });
+
+  CLI::App* view = app.add_subcommand("view", "plays caches in a browser, on this machine alone");
+  view->add_option("DIR", arguments.folder, "output folder")->required();
+  view->add_option("--port", arguments.port, "default any that is free")
+      ->check(CLI::Range(1, 65535));
+  add_common(*view, arguments);
+  view->footer("Example: drench view out/pour/preview");
+  view->callback([&arguments] { view_command(arguments.folder, arguments.port); });
 
   CLI::App* fabrics = app.add_subcommand("fabrics", "constants of common fabrics, with sources");
   add_common(*fabrics, arguments);

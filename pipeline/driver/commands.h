@@ -47,6 +47,9 @@ void fabrics_command(OutputFormat format);
 /// Writes OUT/report.html, a page of what was made and what it took. @param compared  another
 /// output folder whose frames are shown beside; empty: none.
 void report_command(const std::filesystem::path& folder, const std::filesystem::path& compared);
+/// Prints an address on loopback and plays the folder's caches there until it is stopped.
+/// @param port  0: any
+void view_command(const std::filesystem::path& folder, int port);
 enum class InitialShot { commented, reference };
 /// Writes NAME.toml, a commented starting shot or one of every key. @throws Error if it exists.
 void init_command(const std::filesystem::path& name, InitialShot kind);

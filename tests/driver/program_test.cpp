@@ -64,7 +64,7 @@ std::map<std::string, int> steps_run_by(const TinyShot& shot,
 
 TEST(Program, ShowsOneExampleInTheHelpOfEachCommand) {
   for (const char* command : {"run", "simulate", "mesh", "render", "plan", "verify", "init",
-                              "clean", "fabrics", "farm", "report"}) {
+                              "clean", "fabrics", "farm", "report", "view"}) {
     const Ended ended = drench({command, "--help"});
     EXPECT_EQ(ended.code, done) << command;
     const std::string example = "Example: drench " + std::string(command);
