@@ -235,23 +235,28 @@ TEST(Report, IsUsedByKeysInABrowserAndAsksForNothing) {
     const said = [], say = () => said.push((viewer.open ? label.textContent.trim() : 'closed') + ' ' +
                                            (picture.naturalWidth > 0));
     const press = key => document.dispatchEvent(new KeyboardEvent('keydown', {key: key, cancelable: true}));
-    const wait = () => new Promise(done => setTimeout(done, 100));
+    const wait = () => picture.decode();
     (async () => {
       document.querySelectorAll('.sheet button')[1].click(); await wait(); say();
       for (const key of ['ArrowRight', 'End', 'ArrowRight', 'Home', 'ArrowLeft']) { press(key); await wait(); say(); }
-      viewer.close(); await wait(); say();
+      const closed = new Promise(done => viewer.addEventListener('close', done));
+      viewer.close(); await closed; say();
       const focused = document.activeElement.getAttribute('aria-label');
       document.title = said.join('|') + '|' + focused;
     })();
   </script>)");
   put_text(page, text);
-  const Ended ended = run_program(
-      "/usr/bin/chromium",
-      {"--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions",
-       "--user-data-dir=" + (reported.shot.folder() / "profile").string(),
-       "--log-net-log=" + requests.string(), "--virtual-time-budget=20000", "--dump-dom",
-       "file://" + page.string()},
-      reported.shot.folder());
+  Ended ended;
+  // A browser at a loaded machine may be asked for its page before the keys are pressed.
+  for (int k = 0; k < 4 && ended.out.find("|closed ") == std::string::npos; ++k) {
+    ended = run_program(
+        "/usr/bin/chromium",
+        {"--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions",
+         "--user-data-dir=" + (reported.shot.folder() / "profile").string(),
+         "--log-net-log=" + requests.string(), "--virtual-time-budget=20000", "--dump-dom",
+         "file://" + page.string()},
+        reported.shot.folder());
+  }
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_NE(ended.out.find("<title>frame 1002 true|frame 1003 true|frame 1004 true|frame 1001 true|"
                            "frame 1001 true|frame 1004 true|closed true|frame 1004</title>"),
