@@ -7,6 +7,7 @@
 #include "pipeline/contract/shot/shot_file.h"
 #include "pipeline/driver/device.h"
 #include "pipeline/driver/frame_range.h"
+#include "pipeline/driver/layout.h"
 
 namespace drench {
 
@@ -23,6 +24,17 @@ Job job_of(const ShotArguments& arguments, std::vector<Step> steps) {
   job.targets =
       targets_of(job.shot, std::move(frames), std::move(steps), device_class(arguments.device));
   return job;
+}
+
+Job job_in(const fs::path& folder) {
+  ShotArguments arguments;
+  arguments.shot = folder / layout::shot_lock;
+  arguments.out = folder;
+  if (!fs::exists(arguments.shot)) {
+    throw Error(fmt::format("{}: holds no {}; give an output folder that `drench run` made",
+                            folder.string(), layout::shot_lock));
+  }
+  return job_of(arguments, all_steps());
 }
 
 Plan plan_of(const Job& job, const Manifest& manifest) {

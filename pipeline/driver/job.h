@@ -19,6 +19,10 @@ struct Job {
 /// @throws Error if the shot or a file that it names cannot be read.
 Job job_of(const ShotArguments& arguments, std::vector<Step> steps);
 
+/// What lies in an output folder: the shot as it was made last.
+/// @throws Error if the folder holds none
+Job job_in(const std::filesystem::path& folder);
+
 /// What would be made of it. @param manifest  of the job's folder.
 Plan plan_of(const Job& job, const Manifest& manifest);
 

@@ -90,15 +90,8 @@ std::vector<int> ReportData::rendered() const {
 }
 
 ReportData read_report_data(const fs::path& folder) {
-  if (!fs::exists(folder / layout::shot_lock)) {
-    throw Error(fmt::format("{}: holds no {}; give an output folder that `drench run` made",
-                            folder.string(), layout::shot_lock));
-  }
   ReportData data;
-  ShotArguments arguments;
-  arguments.shot = folder / layout::shot_lock;
-  arguments.out = folder;
-  data.job = job_of(arguments, all_steps());
+  data.job = job_in(folder);
   const Manifest manifest(folder / layout::manifest);
   data.plan = plan_of(data.job, manifest);
   data.files = manifest.records();

@@ -1,10 +1,9 @@
 #include "pipeline/driver/report/report_plots.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <span>
-#include <string_view>
+
+#include "pipeline/driver/rules.h"
 
 namespace drench {
 
@@ -157,30 +156,14 @@ std::vector<Plot> probe_plots(const ProbeTable& probe) {
   return plots;
 }
 
-Plot times_of(const ReportData& data) {
-  Plot plot{.title = "Time of a frame", .x_name = "frame", .unit = "s", .series = {}};
-  plot.kind = Plot::Kind::stacked_bars;
+/// A member of the rows of every stage that makes frames.
+Plot stages_of(const ReportData& data, Plot plot, const char* key) {
   for (const auto& [step, rows] : data.rows) {
-    if (step == Step::contact_sheet || step == Step::movie) continue;
+    if (!is_per_frame(step)) continue;
     PlotSeries series{std::string(step_name(step)), {}, {}};
     for (const auto& [frame, row] : rows) {
       series.x.push_back(frame);
-      series.y.push_back(value_of(row, {"", "wall_s"}));
-    }
-    plot.series.push_back(std::move(series));
-  }
-  return plot;
-}
-
-Plot memory_of(const ReportData& data) {
-  Plot plot{
-      .title = "Most memory of the process so far", .x_name = "frame", .unit = "MiB", .series = {}};
-  for (const auto& [step, rows] : data.rows) {
-    if (step == Step::contact_sheet || step == Step::movie) continue;
-    PlotSeries series{std::string(step_name(step)), {}, {}};
-    for (const auto& [frame, row] : rows) {
-      series.x.push_back(frame);
-      series.y.push_back(value_of(row, {"", "peak_mib"}));
+      series.y.push_back(value_of(row, {"", key}));
     }
     plot.series.push_back(std::move(series));
   }
@@ -191,7 +174,15 @@ Plot memory_of(const ReportData& data) {
 
 std::vector<PlotSection> report_plots(const ReportData& data) {
   std::vector<PlotSection> sections;
-  add_section(sections, "Time and memory", {times_of(data), memory_of(data)});
+  const Plot time{.title = "Time of a frame",
+                  .x_name = "frame",
+                  .unit = "s",
+                  .series = {},
+                  .kind = Plot::Kind::stacked_bars};
+  const Plot memory{
+      .title = "Most memory of the process so far", .x_name = "frame", .unit = "MiB", .series = {}};
+  add_section(sections, "Time and memory",
+              {stages_of(data, time, "wall_s"), stages_of(data, memory, "peak_mib")});
   add_section(sections, "Simulation", plots_of(data, simulation_plots()));
   add_section(sections, "Surface", plots_of(data, surface_plots()));
   add_section(sections, "Picture", plots_of(data, picture_plots()));

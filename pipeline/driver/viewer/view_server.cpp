@@ -51,17 +51,6 @@ bool is_equal(const std::string& a, const std::string& b) {
   return different == 0;
 }
 
-Job job_in(const fs::path& folder) {
-  if (!fs::exists(folder / layout::shot_lock)) {
-    throw Error(fmt::format("{}: holds no {}; give an output folder that `drench run` made",
-                            folder.string(), layout::shot_lock));
-  }
-  ShotArguments arguments;
-  arguments.shot = folder / layout::shot_lock;
-  arguments.out = folder;
-  return job_of(arguments, all_steps());
-}
-
 }  // namespace
 
 struct ViewServer::Implementation {
