@@ -51,6 +51,32 @@ TEST_P(ShellPileUnderWater, HoldsWhatIsPouredOnIt) {
   report("water on shells", fmt::format("{} pinned layers", GetParam()), watch, {.nearest = 0});
 }
 
+/// Water that falls on a sheet which lies on the floor, or on a table, and gets under its edges.
+class ShellWashed : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Table, ShellWashed, testing::Bool());
+
+TEST_P(ShellWashed, IsNotThrown) {
+  const bool table = GetParam();
+  for (int k = 0; k < (long_form() ? 24 : 4); ++k) {
+    Shot shot = water(0.02);
+    shot.domain.min = V3d(-0.2, table ? -0.1 : 0, -0.2), shot.domain.max = V3d(0.2, 1, 0.2);
+    shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
+    if (table) {
+      Obstacle& box = shot.obstacle.emplace_back();
+      box.size = V3d(0.36, 0.06, 0.36), box.position = V3d(0, -0.03, 0);
+    }
+    Cloth& sheet =
+        add_shell(shot, V3d(-0.1, 0.006, -0.1), V3d(0.2, 0, 0), V3d(0, 0, 0.2), V2i(8, 8));
+    sheet.thickness = 0.002;
+    add_box(shot, V3d(-0.04, 0.05 + 0.002 * k, -0.04), {4, 5, 4});
+    ShellWatch watch(shot);
+    watch.until(1);
+    report("washed",
+           fmt::format("{}, water from {} mm", table ? "on a table" : "on the floor", 50 + 2 * k),
+           watch, {.energy = no_rule});  // what is squeezed on the floor strains it for a step
+  }
+}
+
 // It has folded up on the floor when the water comes.
 TEST(ShellHeap, PouredOnWhileFolded) {
   if (!long_form()) GTEST_SKIP() << "minutes: DRENCH_STRESS=long";

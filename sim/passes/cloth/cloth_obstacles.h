@@ -186,6 +186,7 @@ struct HoldRevision {
   const float *mass, *inverse_mass;
   float dt;
   int round;
+  bool lets_go;  // what pulls; what does not stays held for the step
 
   DRENCH_HD bool free_too_near(int i) const {
     const Vec3<float> straight = position[i] + path[i] * dt;
@@ -227,7 +228,7 @@ struct HoldRevision {
     const ObstacleView& o = hold.obstacles.obstacle[k];
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;
-    if (normal < 0.f) return let_go(i);
+    if (normal < 0.f) return lets_go && let_go(i);
     if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + path[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);

@@ -69,6 +69,11 @@ void find_reactions(State& state, const ConstVecView& given) {
 
 /// Lets go the axes along which a wall pulls, where sheets lie on sheets: alone each of them would
 /// have gone to the wall. Holds what went through it. Whether anything changed.
+///
+/// Beside fluid walls and obstacles let go nothing within a step: pressures were found against
+/// sheets that are held there, and on one that is not they do work without end. The next step,
+/// which knows these pressures, does not hold what they lift
+/// (docs/decisions/0036-held-beside-fluid.md).
 bool revise_walls(State& state, int round) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
@@ -86,7 +91,7 @@ bool revise_walls(State& state, int round) {
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),
                             .reach = state.parameters.spacing,
-                            .release = round < 3};
+                            .release = round < 3 && state.contact.near == 0};
   return parallel_reduce(
              state.queue, "cloth: revise walls", c.vertices, 0,
              DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
@@ -112,7 +117,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
                             .mass = c.mass.data(),
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),
-                            .round = round};
+                            .round = round,
+                            .lets_go = state.contact.near == 0};
   return parallel_reduce(
              state.queue, "cloth: revise", c.vertices, 0,
              DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
