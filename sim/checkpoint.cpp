@@ -9,7 +9,7 @@ namespace drench::sim {
 
 namespace {
 
-constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '8'};
+constexpr char magic[8] = {'D', 'R', 'N', 'C', 'H', 'C', 'P', '9'};
 
 template <class Archive, class Values>
 void transfer_values(Archive& archive, Values& values) {
@@ -32,6 +32,9 @@ void transfer(Archive& archive, C& c) {
       columns, [&](const auto&, const auto&, auto member) { transfer_values(archive, s.*member); });
   archive(s.limits), archive(s.guard_hits), archive(s.guard_holds);
   archive(s.removed), archive(s.shell_dt);
+  archive(c.rest.since), transfer_values(archive, c.rest.mark), archive(c.rest.square);
+  archive(c.rest.still);
+  archive(c.rest.busy), archive(c.rest.asleep);
   archive(c.probes);
 }
 

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/files/files.h"
 #include "sim/setup/births.h"
+#include "sim/setup/sheet_rest.h"
 #include "sim/solver.h"
 
 namespace drench::sim {
@@ -19,6 +20,7 @@ struct Checkpoint {
   std::vector<uint64_t> emitted;  // layers that left each emitter, particles of a mesh
   std::vector<uint64_t> shut;     // by emitter: particles when it had no room left; 0: it sends
   HostState state;
+  SheetRestState rest;
   std::vector<double> probes;  // rows so far, ProbeSeries
   Digest layout;               // of the shot's settings and the file's layout
 };

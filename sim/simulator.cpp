@@ -84,7 +84,7 @@ struct Simulator::Implementation {
     told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 7").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 8").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(run.scene.start.id.size());
     births = run.scene.births;
@@ -376,6 +376,7 @@ struct Simulator::Implementation {
       report.water_in_cloth += water;
     }
     report.guard_hits = state.guard_hits;
+    report.sheets_asleep = run.scene.rest.any() ? run.scene.rest.asleep() : 0;
     report.cloth_contacts = run.solver->cloth_contacts();
     for (const sim::ColumnMemory& group : run.solver->memory()) report.memory += group.bytes;
     count_particles(report, state.removed);
@@ -460,6 +461,7 @@ WrittenFile Simulator::write_checkpoint(const std::filesystem::path& path) const
                              .emitted = s.emitted,
                              .shut = s.shut,
                              .state = s.run.solver->save(),
+                             .rest = s.run.scene.rest.state(),
                              .probes = s.probes.rows(),
                              .layout = s.layout};
   checkpoint.state.limits = s.run.limits;
@@ -473,14 +475,17 @@ void Simulator::read_checkpoint(const std::filesystem::path& path) {
   sim::Checkpoint checkpoint = sim::read_checkpoint(path, s.layout);
   if (checkpoint.emitted.size() != s.emitted.size() || checkpoint.shut.size() != s.shut.size() ||
       checkpoint.state.cloth_position.size() != size_t(s.run.scene.cloth.vertices()) ||
-      checkpoint.state.removed.size() != s.reported.size() || !s.probes.fits(checkpoint.probes)) {
+      checkpoint.state.removed.size() != s.reported.size() ||
+      checkpoint.rest.asleep.size() != s.run.scene.rest.state().asleep.size() ||
+      checkpoint.rest.mark.size() != s.run.scene.rest.state().mark.size() ||
+      !s.probes.fits(checkpoint.probes)) {
     throw Error(path.string() + ": the checkpoint does not fit this shot. Delete it");
   }
   s.frame = checkpoint.frame;
   s.next_id = checkpoint.next_id, s.emitted = checkpoint.emitted, s.shut = checkpoint.shut;
   s.births.resume(std::move(checkpoint.births));
   s.probes.resume(std::move(checkpoint.probes));
-  s.run.load(checkpoint.state, checkpoint.state.limits, checkpoint.time);
+  s.run.load(checkpoint.state, checkpoint.state.limits, checkpoint.time, checkpoint.rest);
   s.run.steps = int64_t(checkpoint.steps);
   s.run.solver->refresh();
   s.reported = checkpoint.state.removed, s.reported_id = s.next_id;

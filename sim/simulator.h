@@ -41,6 +41,7 @@ struct StepReport {
   double worst_residual = 0;    // mean density error that a solve left, the largest of the steps
   int viscous_iterations = 0;   // of the solves for viscosity
   int sheet_sweeps = 0;         // of the conjugate gradients of the sheets, in all
+  int sheets_asleep = 0;        // at the end
   int sheets_cut_short = 0;     // steps in which the sheets' solve did not reach its tolerance
   int viscous_unconverged = 0;  // steps in which these did not reach their tolerance
   double worst_viscous_residual = 0;  // RMS that one left over the RMS of the velocity

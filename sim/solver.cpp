@@ -117,6 +117,9 @@ class BackendSolver : public Solver {
   }
 
   HostVec positions() const override { return download(state_.fluid.position, state_.fluid.count); }
+  HostVec cloth_positions() const override {
+    return download(state_.cloth.position, state_.cloth.vertices);
+  }
   std::vector<float> density() const override {
     return to_host(state_.fluid.density, state_.fluid.count);
   }
@@ -127,6 +130,15 @@ class BackendSolver : public Solver {
     if (!(allocated_.contains(ColumnGroup::near_cloth)))
       return std::vector<int>(state_.fluid.count, -1);
     return to_host(state_.fluid.triangle, state_.fluid.count);
+  }
+
+  std::vector<char> sheets_near_fluid() const override {
+    std::vector<char> near(sheet_.size(), 0);
+    if (state_.contact.near == 0) return near;
+    const std::vector<int> sheet = to_host(state_.cloth.sheet, state_.cloth.sheet.size());
+    for (const int t : near_triangles())
+      if (t >= 0) near[size_t(sheet[size_t(t)])] = 1;
+    return near;
   }
 
   void append(const HostVec& position, const HostVec& velocity,
@@ -149,7 +161,8 @@ class BackendSolver : public Solver {
     if (state_.parameters.fluid && state_.fluid.count == 0) {  // an emitter that has not started
       if (state_.cloth.vertices > 0) step_cloth_alone(state_);
     } else {
-      for (const Pass& pass : plan_) launch(pass);
+      for (const Pass& pass : plan_)
+        if (!(pass.of_sheets && all_sheets_sleep(state_))) launch(pass);
     }
     Limits limits = measure_limits(state_);
     if (state_.parameters.incompressible && state_.fluid.count > 0) {
@@ -158,7 +171,7 @@ class BackendSolver : public Solver {
       limits.iterations = std::max(solve.spent, solve.iterations);
       limits.step = float(dt), limits.pressure = solve.peak;
     }
-    if (allocated_.contains(ColumnGroup::cloth_system)) {
+    if (allocated_.contains(ColumnGroup::cloth_system) && !all_sheets_sleep(state_)) {
       const ClothControl sheets = value_at(state_.cloth_system.control, 0);
       limits.sheet_sweeps = sheets.sweeps, limits.sheets_cut_short = !sheets.done;
     }
@@ -244,9 +257,16 @@ class BackendSolver : public Solver {
       const auto v = size_t(pin_vertex_[k]);
       inverse_mass_[v] = pull_[k] == 0 ? 0.f : 1 / mass_[v];
     }
-    from_host(state_.cloth.inverse_mass, inverse_mass_);
+    put_inverse_masses();
     if (state_.wet.any) apply_wetness(state_);
-    find_loose_sheets();
+  }
+  void sleep(const std::vector<char>& asleep) override {
+    for (size_t k = 0; k < sheet_.size(); ++k) {
+      if (asleep[k]) halt(sheet_[k]);
+    }
+    asleep_ = asleep;
+    state_.cloth.asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
+    put_inverse_masses();
   }
   void draw_seams(const std::vector<float>& rest_length) override {
     for (size_t k = 0; k < seam_slot_.size(); ++k) rest_length_[seam_slot_[k]] = rest_length[k / 2];
@@ -278,7 +298,8 @@ class BackendSolver : public Solver {
   }
 
   ClothContacts cloth_contacts() const override {
-    const bool implicit = allocated_.contains(ColumnGroup::cloth_system);
+    const bool implicit =
+        allocated_.contains(ColumnGroup::cloth_system) && !all_sheets_sleep(state_);
     return implicit ? count_cloth_contacts(state_) : ClothContacts{};
   }
 
@@ -417,7 +438,7 @@ class BackendSolver : public Solver {
 
   /// Sheets, and what seams make of sheets that follow each other, which move as a whole.
   void find_free_sheets(const ClothTopology& t) {
-    std::vector<VertexRange> piece = sheet_ranges(t);
+    const std::vector<VertexRange>& piece = sheet_ = sheet_ranges(t);
     std::vector<size_t> group(piece.size());
     std::iota(group.begin(), group.end(), size_t(0));
     const auto group_of = [&](int v) {
@@ -440,12 +461,33 @@ class BackendSolver : public Solver {
     }
   }
 
+  /// No velocity, and none of what the next step makes of the last one's.
+  void halt(const VertexRange& range) {
+    VecColumn* all[] = {&state_.cloth.velocity, &state_.shell.left, &state_.shell.lost,
+                        &state_.shell.acceleration};
+    for (VecColumn* column : all)
+      put(*column, repeated(*column, size_t(range.count), 0), size_t(range.first));
+  }
+
+  /// 0 of vertices that pins hold, and of sheets that sleep.
+  void put_inverse_masses() {
+    std::vector<float> all = inverse_mass_;
+    for (size_t k = 0; k < asleep_.size(); ++k) {
+      const auto begin = all.begin() + sheet_[k].first;
+      if (asleep_[k]) std::fill(begin, begin + sheet_[k].count, 0.f);
+    }
+    from_host(state_.cloth.inverse_mass, all);
+    find_loose_sheets();
+  }
+
   /// Those that nothing holds.
   void find_loose_sheets() {
     std::vector<VertexRange> loose;
     for (const VertexRange& range : free_sheet_) {
       const auto begin = inverse_mass_.begin() + range.first;
       bool held = std::find(begin, begin + range.count, 0.f) != begin + range.count;
+      for (size_t k = 0; k < asleep_.size(); ++k)
+        held |= asleep_[k] && range.contains(sheet_[k].first);
       for (size_t k = 0; k < pull_.size(); ++k)
         held |= pull_[k] > 0 && range.contains(pin_vertex_[k]);
       if (!held) loose.push_back(range);
@@ -537,7 +579,8 @@ class BackendSolver : public Solver {
   // of pins and seams, on the host
   std::vector<float> mass_, inverse_mass_, pull_, rest_length_;
   std::vector<int> pin_vertex_;
-  std::vector<VertexRange> free_sheet_;
+  std::vector<VertexRange> sheet_, free_sheet_;
+  std::vector<char> asleep_;       // of a sheet; empty: none ever was
   std::vector<size_t> seam_slot_;  // two a seam's spring
   std::function<void(const PassInfo&, ColumnSet)> pass_observer_;
 };

@@ -155,11 +155,14 @@ class Solver {
   virtual ~Solver() = default;
   virtual void load(const HostState& state) = 0;
   virtual HostState save() const = 0;
-  virtual HostVec positions() const = 0;  // of the particles, m local
+  virtual HostVec positions() const = 0;        // of the particles, m local
+  virtual HostVec cloth_positions() const = 0;  // of the vertices, m local
   /// Fluid density of every particle, kg/m^3, and nearest triangles (-1 none), as of refresh() or
   /// step().
   virtual std::vector<float> density() const = 0;
   virtual std::vector<int> near_triangles() const = 0;
+  /// Of every sheet whether any particle was within the support radius of it in the last step.
+  virtual std::vector<char> sheets_near_fluid() const = 0;
   /// p / rho^2 of every particle in the last step, m^5/(kg s^2).
   virtual std::vector<float> pressure_term() const = 0;
   /// Adds particles with ids at the end of the columns.
@@ -192,6 +195,9 @@ class Solver {
   virtual void drive(const FrameNow& frame) = 0;
   /// The pins of ClothTopology::pin_vertex during the next step.
   virtual void hold(const PinsNow& pins) = 0;
+  /// Which sheets are held where they are from the next step on, as if all of each were pinned; by
+  /// sheets. Where all are and no fluid is near them a step does nothing about sheets.
+  virtual void sleep(const std::vector<char>& asleep) = 0;
   /// Rest lengths of ClothTopology::seam from the next step on, m; those of the topology at first.
   virtual void draw_seams(const std::vector<float>& rest_length) = 0;
   /// Of the last step, one an obstacle. Over dt it is the mean force.

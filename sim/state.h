@@ -89,6 +89,7 @@ struct ClothState {
   VecColumn rest_centroid;           // m
   Column<int> fan_start, fan_entry;  // CSR by vertex: 3 triangle + corner
   Column<int> rim;                   // 1 where a vertex lies on a free edge
+  bool asleep = false;               // all sheets: held where they are (Solver::sleep)
   int loose = 0;                     // sheets without a pin or a seam
   Column<VertexRange> loose_sheet;   // these
   // where seams sew edges (SeamStrips), else empty
@@ -542,5 +543,10 @@ struct State {
   uint64_t guard_hits = 0;        // particles held back by continuous collision, since the start
   uint64_t guard_holds = 0;       // substeps in which vertices had to be stopped
 };
+
+/// Whether a step has nothing to do about sheets.
+inline bool all_sheets_sleep(const State& state) {
+  return state.cloth.asleep && state.contact.near == 0;
+}
 
 }  // namespace drench::sim::DRENCH_BACKEND

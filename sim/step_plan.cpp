@@ -125,6 +125,8 @@ constexpr ColumnSet near_list = near_cloth | contact | rows | cloth_fixed;
 constexpr ColumnSet response =
     cloth_system | shell_system | cloth_obstacles | loads | self_contact | sorting;
 
+constexpr bool of_sheets = true;
+
 const Pass all_passes[] = {
     {"turn_frame", turning, moving | cloth, velocity, turn_frame, cloth},
     {"predict_particles", free_of_obstacles, moving, moving, predict_particles, start},
@@ -141,13 +143,28 @@ const Pass all_passes[] = {
     {"wet_cloth", wets_sheets, moving | cells | sheets | shell_history,
      cloth | cloth_fixed | shell_history | wet_cloth, soak_sheets},
     // Explicit sheets feel it substep by substep, in cloth_verlet.
-    {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth},
-    {"linearise_shell", strong_shells, sheets | pins, shell_system | shell_history,
-     linearise_shell},
-    {"linearise_cloth", strong, sheets | pins | cloth_load | cloth_air, cloth_system,
-     linearise_cloth},
-    {"start_sheet_rows", strong_meeting, sheets | shell_system | shell_history,
-     self_contact | cloth_system | sorting, start_sheet_rows},
+    {"wind_on_cloth", strong_in_wind, sheets, cloth_air, wind_on_cloth, {}, of_sheets},
+    {"linearise_shell",
+     strong_shells,
+     sheets | pins,
+     shell_system | shell_history,
+     linearise_shell,
+     {},
+     of_sheets},
+    {"linearise_cloth",
+     strong,
+     sheets | pins | cloth_load | cloth_air,
+     cloth_system,
+     linearise_cloth,
+     {},
+     of_sheets},
+    {"start_sheet_rows",
+     strong_meeting,
+     sheets | shell_system | shell_history,
+     self_contact | cloth_system | sorting,
+     start_sheet_rows,
+     {},
+     of_sheets},
     {"find_neighbours", projected, position | cells, density | lists | projection | scratch | solve,
      find_neighbours, cloth_rows},
     {"apply_surface_tension", tense, velocity | lists | walls, velocity | tension | scratch,
@@ -187,10 +204,14 @@ const Pass all_passes[] = {
     {"paper_reaction", paper, impulse | near_cloth, contact | cloth_load | sorting, paper_reaction},
     {"move_particles", fluid_alone, moving, moving, move_particles},
     {"move_cloth", explicit_alone, sheets, cloth | cloth_substep | cloth_air, move_cloth},
-    {"settle_cloth", implicit_alone, sheets | pins,
+    {"settle_cloth",
+     implicit_alone,
+     sheets | pins,
      cloth | cloth_substep | cloth_system | cloth_obstacles | cloth_air | stopped | shell_system |
          shell_history | self_contact | sorting,
-     settle_cloth_alone},
+     settle_cloth_alone,
+     {},
+     of_sheets},
     {"move_with_sheets", strong,
      moving | near_list | sheets | pins | start | drift | cloth_system | shell_system,
      moving | cloth | cloth_substep | near_cloth | memory | path | drift | projection | contact |
@@ -223,6 +244,8 @@ void step_cloth_alone(State& state) {
   state.cloth.force.clear(state.queue);
   if (state.parameters.turns) turn_frame(state);
   if (state.wet.any) soak_sheets(state);
+  state.contact.near = 0;
+  if (all_sheets_sleep(state)) return;
   state.parameters.incompressible ? settle_cloth_alone(state) : move_cloth(state);
 }
 

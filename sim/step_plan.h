@@ -14,6 +14,7 @@ struct Pass {
   ColumnSet reads, writes;
   void (*launch)(State& state);
   ColumnSet writes_beside_cloth = {};  // in a shot with cloth, too; step_plan adds it to writes
+  bool of_sheets = false;              // left out of a step while all_sheets_sleep
 };
 
 /// Every pass there is, in order.

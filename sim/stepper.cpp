@@ -11,12 +11,14 @@ Stepper::Stepper(Scene scene_, std::unique_ptr<Solver> solver_, double start)
   limits = solver->measure();
 }
 
-void Stepper::load(const HostState& state, const Limits& limits_, double time_) {
+void Stepper::load(const HostState& state, const Limits& limits_, double time_,
+                   const SheetRestState& rest) {
   solver->load(state);
   limits = limits_, time = time_;
   scene.obstacles.place(*solver, time, time);
   scene.sinks.place(*solver, time, time);
   if (scene.pins.any()) solver->hold(scene.pins.over(scene.obstacles, time, time));
+  if (scene.rest.any()) scene.rest.start(*solver, rest, time);
 }
 
 StepLimit Stepper::stable_limit() {
@@ -52,12 +54,19 @@ double Stepper::step_towards(double end, double longest) {
 void Stepper::step_to(double end, double dt) {
   scene.obstacles.place(*solver, time, end);
   scene.sinks.place(*solver, time, end);
-  if (scene.pins.any()) solver->hold(scene.pins.over(scene.obstacles, time, end));
-  if (scene.sewing.draws(time)) solver->draw_seams(scene.sewing.lengths(end));
-  if (scene.parameters.air_density > 0) solver->blow(scene.wind.at(end));
+  const PinsNow pins = scene.pins.any() ? scene.pins.over(scene.obstacles, time, end) : PinsNow{};
+  if (scene.pins.any()) solver->hold(pins);
+  const bool draws = scene.sewing.draws(time), air = scene.parameters.air_density > 0;
+  if (draws) solver->draw_seams(scene.sewing.lengths(end));
+  const WindNow wind = air ? scene.wind.at(end) : WindNow{};
+  if (air) solver->blow(wind);
   if (scene.motion.moves()) solver->drive(scene.motion.over(time, end));
+  const bool rests = scene.rest.any();
+  if (rests)
+    scene.rest.before_step(*solver, {draws || wind.blows(), scene.obstacles.moving(), pins});
   limits = solver->step(dt, cloth_substeps(dt));
   time = end, ++steps;
+  if (rests) scene.rest.after_step(*solver, time);
 }
 
 }  // namespace drench::sim

@@ -21,8 +21,10 @@ struct Stepper {
 
   /// Begins with the scene's start. @param solver  of its parameters and cloth
   Stepper(Scene scene, std::unique_ptr<Solver> solver, double time = 0);
-  /// Takes up a state, obstacles and sinks where they stand at its time. `limits` are its limits.
-  void load(const HostState& state, const Limits& limits, double time);
+  /// Takes up a state, obstacles and sinks where they stand at its time. `limits` are its limits,
+  /// `rest` what is known of its sheets; empty: nothing.
+  void load(const HostState& state, const Limits& limits, double time,
+            const SheetRestState& rest = {});
 
   /// The longest stable step, s, of gravity and the frame's motion as they are now.
   StepLimit stable_limit();

@@ -12,6 +12,10 @@ struct WindNow {
   float wave[most_modes][3] = {};       // rad/m
   float amplitude[most_modes][3] = {};  // m/s
   float phase[most_modes] = {};         // rad
+
+  bool blows() const {
+    return modes > 0 || velocity[0] != 0 || velocity[1] != 0 || velocity[2] != 0;
+  }
 };
 
 }  // namespace drench::sim

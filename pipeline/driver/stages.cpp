@@ -51,6 +51,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
                      {"unconverged", step.unconverged},
                      {"viscous_iterations", step.viscous_iterations},
                      {"sheet_sweeps", step.sheet_sweeps},
+                     {"sheets_asleep", step.sheets_asleep},
                      {"sheets_cut_short", step.sheets_cut_short},
                      {"water_in_cloth", step.water_in_cloth},
                      {"sheet_contacts", step.cloth_contacts.sheets},
@@ -68,6 +69,7 @@ StageReport report_of(const StepReport& step, const std::string& device) {
   const auto& [sheets, obstacles] = step.cloth_contacts;
   if (sheets > 0) report.line += fmt::format(" sheet_contacts={}", sheets);
   if (obstacles > 0) report.line += fmt::format(" obstacle_contacts={}", obstacles);
+  if (step.sheets_asleep > 0) report.line += fmt::format(" asleep={}", step.sheets_asleep);
   if (step.emitted > 0) report.line += fmt::format(" emitted={}", step.emitted);
   for (const auto& [sink, count] : step.drained) {
     if (count > 0) report.line += fmt::format(" {}={}", sink, count);

@@ -54,6 +54,12 @@ cpu::FieldView host_view(const LevelSet& set) {
   return view;
 }
 
+bool moves_in_step(const ObstaclePlacement& p) {
+  return !std::equal(std::begin(p.centre[0]), std::end(p.centre[0]), std::begin(p.centre[1])) ||
+         !std::equal(std::begin(p.axis[0]), std::end(p.axis[0]), std::begin(p.axis[1])) ||
+         (p.deform > 0 && p.blend[0] != p.blend[1]);
+}
+
 bool has_keys(const Obstacle& obstacle) {
   return obstacle.position.keys.size() > 1 || obstacle.rotation_deg.keys.size() > 1;
 }
@@ -289,6 +295,11 @@ void ObstacleSet::place(Solver& solver, double start, double end) {
     for (const ObstacleImages::Image& image : images_.of(own, extent(entry, own)))
       all.push_back(image.placement);
   }
+  moving_.clear();
+  for (const ObstaclePlacement& p : all)
+    if (moves_in_step(p))
+      moving_.push_back(
+          {{p.low[0], p.low[1], p.low[2]}, {p.high[0], p.high[1], p.high[2]}, p.clearance});
   if (!all.empty()) solver.place(role_, all);
 }
 

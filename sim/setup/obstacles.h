@@ -14,6 +14,11 @@ namespace drench::sim {
 
 struct LocalFrame;
 
+/// Bounds over a step, and how near its obstacle lets anything come, m local.
+struct PlacedBox {
+  float low[3], high[3], clearance;
+};
+
 class ObstacleSet {
  public:
   ObstacleSet() = default;
@@ -35,6 +40,8 @@ class ObstacleSet {
   /// Tells the solver where the obstacles are from `start` to `end`, s since the first frame, and
   /// gives it the level sets that it does not have yet. A step must not cross a stop.
   void place(Solver& solver, double start, double end);
+  /// Of those of the last `place` that move in its time.
+  const std::vector<PlacedBox>& moving() const { return moving_; }
   /// The first time after `time` that a step has to land on, at most `end`, s: where a deforming
   /// mesh changes its level sets.
   double stop(double time, double end);
@@ -107,6 +114,7 @@ class ObstacleSet {
   double snap_ = 1;  // m
   LevelSetMaker make_level_set_;
   std::vector<Entry> obstacle_;
+  std::vector<PlacedBox> moving_;
   ObstacleImages images_;
 };
 

@@ -549,6 +549,7 @@ Scene build_scene(const Shot& shot, const LevelSetMaker& make_level_set) {
   note_probes(shot, scene);
   place_fluid(shot, fluid, scene);
   place_sheets(shot, scene);
+  scene.rest = SheetRest(shot, scene);
   note_cloth(shot, scene);
   note_pins(shot, scene);
   check_cloth_start(shot, scene);

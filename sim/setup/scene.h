@@ -16,6 +16,7 @@
 #include "sim/setup/obstacles.h"
 #include "sim/setup/scene_report.h"
 #include "sim/setup/sewing.h"
+#include "sim/setup/sheet_rest.h"
 #include "sim/setup/wind.h"
 #include "sim/solver.h"
 
@@ -162,6 +163,7 @@ struct Scene {
   Sewing sewing;
   Wind wind;
   FrameMotion motion;
+  SheetRest rest;
   HostState start;
   Births births;                                 // of the start
   size_t inside_obstacles = 0, overlapping = 0;  // particles of sources that were left out

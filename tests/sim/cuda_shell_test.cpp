@@ -434,6 +434,38 @@ TEST_P(ShellsOnCuda, GivesTheSameBitsInEveryRunAndResumed) {
   expect_same_state(whole.solver->save(), second.solver->save());
 }
 
+// One of two sheets, both, and none: what sleeps stands, what wakes moves as on the CPU.
+TEST(SheetsOnCuda, SleepAndWake) {
+  std::string reason;
+  if (!sim::cuda::device_available(reason)) GTEST_SKIP() << "no usable GPU: " << reason;
+  for (const bool wet : {false, true}) {
+    Shot shot = stacked();
+    if (wet) add_box(shot, V3d(-0.02, 0.1, -0.02), {4, 4, 4});  // far above
+    const Situation situation{.name = "", .shot = stacked, .without = part_sheets};
+    const sim::Scene scene = scene_of(situation, shot);
+    sim::Stepper gpu = stepper(scene, sim::cuda::make_solver),
+                 cpu = stepper(scene, sim::cpu::make_solver);
+    for (const std::vector<char>& asleep :
+         {std::vector<char>{0, 1}, std::vector<char>{1, 1}, std::vector<char>{1, 0}}) {
+      const sim::HostVec before = gpu.solver->cloth_positions();
+      for (sim::Stepper* run : {&gpu, &cpu}) {
+        run->solver->sleep(asleep);
+        for (int k = 0; k < 2; ++k) run->solver->step(2e-3, 1);
+      }
+      const sim::HostVec after = gpu.solver->cloth_positions(),
+                         also = cpu.solver->cloth_positions();
+      double moved[2] = {0, 0}, apart = 0;
+      for (size_t v = 0; v < after.size(); ++v) {
+        double& most = moved[v < 49 ? 0 : 1];
+        most = std::max(most, (at(after, v) - at(before, v)).length());
+        apart = std::max(apart, (at(after, v) - at(also, v)).length());
+      }
+      for (size_t sheet = 0; sheet < 2; ++sheet) EXPECT_EQ(moved[sheet] == 0, asleep[sheet] == 1);
+      EXPECT_LT(apart, 1e-5);
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Cases, ShellsOnCuda, testing::ValuesIn(situations),
                          [](const auto& situation) { return situation.param.name; });
 

@@ -67,8 +67,7 @@ void expect_same_bits_when_resumed(const Start& start, int steps, double dt) {
   Stepper first(start), second(start);
   const auto step = [&](Stepper& run) { dt > 0 ? run.step(dt) : run.step(); };
   for (int k = 0; k < steps / 2; ++k) step(first);
-  second.solver->load(first.solver->save());
-  second.time = first.time, second.limits = first.limits;
+  second.load(first.solver->save(), first.limits, first.time, first.scene.rest.state());
   for (int k = steps / 2; k < steps; ++k) step(second);
   expect_same_state(after(start, steps, dt), second.solver->save());
 }

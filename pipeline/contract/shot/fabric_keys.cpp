@@ -37,11 +37,11 @@ constexpr Constant constants[] = {
 constexpr const char* spring_keys[] = {"adjacent_stiffness", "diagonal_stiffness", "spring_damping",
                                        "retardation_time"};
 constexpr const char* shell_keys[] = {
-    "fabric",        "young_warp",   "young_weft",        "shear_modulus",
-    "poisson",       "bend_warp",    "bend_weft",         "bend_bias",
-    "stretch_limit", "damping_time", "friction",          "self_collision",
-    "write_strain",  "soaks",        "wetness",           "water_capacity",
-    "soak_time",     "dry_time",     "wet_modulus_ratio", "wet_friction"};
+    "fabric",      "young_warp",     "young_weft",   "shear_modulus", "poisson",
+    "bend_warp",   "bend_weft",      "bend_bias",    "stretch_limit", "damping_time",
+    "friction",    "self_collision", "write_strain", "sleep_speed",   "soaks",
+    "wetness",     "water_capacity", "soak_time",    "dry_time",      "wet_modulus_ratio",
+    "wet_friction"};
 
 /// The first of these keys that the shot gives, or null.
 template <size_t N>

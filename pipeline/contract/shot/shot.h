@@ -220,6 +220,7 @@ struct Cloth {
   double water_capacity = 0.2526;        // kg/m^2 when full
   double soak_time = 0.5, dry_time = 0;  // s; dry_time 0: never
   double wet_modulus_ratio = 0.7, wet_friction = 0.7;  // of a full sheet: factor, coefficient
+  double sleep_speed = -1;                             // m/s: see SheetRest; < 0: by its size
   bool write_strain = false;      // its files hold principal strains and stresses
   Slip slip = Slip::automatic;    // of fluid along it
   double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid

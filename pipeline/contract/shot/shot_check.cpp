@@ -380,6 +380,13 @@ class Checker : CheckBase {
                                        "1e-5 of the mesh's diagonal",
                                        path, cloth.weld));
     }
+    if (cloth.sleep_speed < 0 && cloth.sleep_speed != -1) {
+      fail(
+          path + ".sleep_speed",
+          fmt::format("{}.sleep_speed is {} m/s; give a speed, 0 for a sheet that never sleeps, or "
+                      "-1 to go by its size",
+                      path, cloth.sleep_speed));
+    }
     if (cloth.model == ClothModel::shell && shot_.fluid.present() && !is_incompressible(shot_)) {
       fail(path + ".model",
            fmt::format("{}.model is \"shell\", whose steps are implicit, but the fluid is weakly "

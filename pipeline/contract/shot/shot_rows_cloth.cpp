@@ -131,6 +131,14 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::wet_friction>("cloth", "wet_friction", "", {0, 10}, simulate,
                                 "as friction, when full")
           .only(ClothModel::automatic, ClothModel::shell),
+      row<&Cloth::sleep_speed>(
+          "cloth", "sleep_speed", "m/s", {-1, 10}, simulate,
+          "a shell that has moved slower than this in the mean for two seconds, and gets no "
+          "faster, "
+          "sleeps: it stays where it is and costs nothing until fluid, an obstacle, a pin or a "
+          "sheet that moves comes near. 0: it never sleeps; -1: 1 mm/s, or a 500th of its diagonal "
+          "a second if that is less")
+          .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::write_strain>(
           "cloth", "write_strain", "", none, simulate,
           "whether its files hold strain_max and strain_min, length over rest length less 1 along "

@@ -321,4 +321,13 @@ void finish_cloth(State& state) {
   if (shells) keep_shell_step(state);
 }
 
+void keep_cloth(State& state) {
+  ClothState& c = state.cloth;
+  const ConstVecView x = c.position.view();
+  const VecView next = c.next.view();
+  parallel_for(
+      state.queue, "cloth: stays", c.padded, DRENCH_LAMBDA(int i) { next.set(i, x[i]); });
+  c.next_velocity.clear(state.queue), c.predicted.clear(state.queue);
+}
+
 }  // namespace drench::sim::DRENCH_BACKEND

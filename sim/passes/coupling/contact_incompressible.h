@@ -137,4 +137,7 @@ void take_cloth_off_walls(State& state);
 /// asks: the loads over dt^2, beside what collisions owed.
 void finish_cloth(State& state);
 
+/// The same of sheets that all sleep: they stay.
+void keep_cloth(State& state);
+
 }  // namespace drench::sim::DRENCH_BACKEND

@@ -78,7 +78,7 @@ template <class Move>
 void project_with(State& state, const Move& move) {
   FluidState& f = state.fluid;
   solve_pressure(state);
-  if (state.cloth.vertices > 0) settle_cloth(state);
+  if (state.cloth.vertices > 0 && !all_sheets_sleep(state)) settle_cloth(state);
   const VecView x = f.position.view(), v = f.velocity.view();
   const Float4* displacement = state.pressure.scratch_a.data();
   const float inverse_dt = float(1 / state.dt);
@@ -105,7 +105,7 @@ void move_with_sheets(State& state) {
   const VecView x = f.position.view();
   const ConstVecView v = f.velocity.view(), start = f.start.view();
   const VecView drift = f.drift.view(), end = f.end.view();
-  finish_cloth(state);
+  all_sheets_sleep(state) ? keep_cloth(state) : finish_cloth(state);
   if (state.contact.near > 0) take_cloth_off_walls(state);
   parallel_for(
       state.queue, "sheets: paths", f.count, DRENCH_LAMBDA(int i) {
