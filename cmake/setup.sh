@@ -41,6 +41,9 @@ drench_use_blender() {
 # ./bench render_skips counts instructions.
 drench_use_valgrind() { drench_packages+=("valgrind:/usr/bin/valgrind"); }
 
+# ./test --fuzz.
+drench_use_clang() { drench_packages+=("clang:/usr/bin/clang++"); }
+
 # The cluster and the mounts that tests of the farm make, and the browser that opens reports; without
 # them these tests are left out.
 drench_try_optional() {

@@ -10,3 +10,8 @@ if(DRENCH_SANITIZE)
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined -fno-omit-frame-pointer>)
   target_link_options(drench_flags INTERFACE -fsanitize=address,undefined)
 endif()
+if(DRENCH_FUZZ)
+  target_compile_options(drench_flags INTERFACE -fsanitize=fuzzer-no-link,address,undefined
+    -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+  target_link_options(drench_flags INTERFACE -fsanitize=address,undefined)
+endif()

@@ -20,6 +20,7 @@
 #include <stdexcept>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/shot/printable.h"
 #include "render/color/color.h"
 #include "render/texture/picture_file.h"
 
@@ -356,10 +357,41 @@ class ExrReader {
   uint64_t transparent_ = 0;
 };
 
+/// OpenEXR takes the memory that an attribute asks for before it finds that the file ends.
+void check_attribute_sizes(const PictureFile& file) {
+  const std::vector<std::byte>& bytes = file.bytes();
+  size_t at = 8;  // after the magic number and the version
+  const auto text = [&] {
+    std::string found;
+    while (at < bytes.size() && bytes[at] != std::byte(0)) found += char(bytes[at++]);
+    ++at;
+    return found;
+  };
+  // Headers of parts follow each other; what is not a name ends them, or the reader says why not.
+  while (at < bytes.size() && bytes[at] != std::byte(0)) {
+    const std::string name = text();
+    text();
+    int32_t size = 0;
+    if (at + sizeof size > bytes.size()) return;
+    std::memcpy(&size, &bytes[at], sizeof size);
+    at += sizeof size;
+    if (size < 0 || size_t(size) > bytes.size() - at)
+      file.fail(
+          fmt::format("it is damaged or cut off: its attribute {} asks for {} bytes where {} are "
+                      "left; write it "
+                      "again or give another",
+                      printable(name, Lines::one), size, bytes.size() - at));
+    at += size_t(size);
+    const bool parts = (std::to_integer<int>(bytes[5]) & 0x10) != 0;
+    if (parts && at < bytes.size() && bytes[at] == std::byte(0)) ++at;
+  }
+}
+
 }  // namespace
 
 Raster read_exr_picture(const PictureFile& file) {
   try {
+    check_attribute_sizes(file);
     return ExrReader(file).read();
   } catch (const Error&) {
     throw;

@@ -11,6 +11,8 @@
 #include <OpenEXR/ImfTiledOutputFile.h>
 
 #include <deque>
+#include <fstream>
+#include <iterator>
 #include <limits>
 
 #include "render/light/environment.h"
@@ -320,6 +322,23 @@ TEST_F(ExrPicture, PixelThatIsNotFiniteIsNamed) {
       file.writePixels(8);
     }
     EXPECT_TRUE(tells(error_of([&] { read_texture(path); }), {"pixel 3, 2", "not finite"}));
+  }
+}
+
+// OpenEXR would take 2 GiB for it.
+TEST_F(ExrPicture, AttributeLargerThanTheFileIsRefused) {
+  const auto paths = {write_part({{"R", "G", "B"}}),
+                      write_parts({{{"R"}, {{0, 0}, {3, 3}}, {{0, 0}, {3, 3}}, Imf::FLOAT, "a"},
+                                   {{"G"}, {{0, 0}, {3, 3}}, {{0, 0}, {3, 3}}, Imf::FLOAT, "b"}})};
+  for (const auto& path : paths) {
+    std::ifstream in(path, std::ios::binary);
+    std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    const std::string type("lineOrder\0lineOrder\0", 20);
+    const size_t last = bytes.rfind(type);  // of the last part
+    ASSERT_NE(last, std::string::npos);
+    bytes.replace(last + type.size(), 4, "\xff\xff\xff\x7f");
+    std::ofstream(path, std::ios::binary) << bytes;
+    EXPECT_TRUE(tells(error_of([&] { read_texture(path); }), {"lineOrder", "2147483647 bytes"}));
   }
 }
 
