@@ -320,7 +320,7 @@ const Situation situations[] = {
     {"Curved", curved, make_limp},
     {"Joined", joined, calm, waved},
     {"UnderWater", under_water, take_water, nullptr, 3, 8e-4},
-    {"OnARodUnderWater", on_a_rod_under_water, take_water, nullptr, 3, 8e-4},
+    {"OnARodUnderWater", on_a_rod_under_water, take_water, nullptr, 2, 8e-4},
     {"UnderHoney", under_honey, thin_honey, nullptr, 2, 8e-4},
     {"JoinedUnderWater", joined_under_water, take_water, nullptr, 3, 8e-4},
     // Levels that one thread takes, and others.
