@@ -34,7 +34,7 @@ void transfer(Archive& archive, C& c) {
   archive(s.removed), archive(s.shell_dt);
   archive(c.rest.since), transfer_values(archive, c.rest.mark), archive(c.rest.square);
   archive(c.rest.still);
-  archive(c.rest.busy), archive(c.rest.asleep);
+  archive(c.rest.busy), archive(c.rest.asleep), archive(c.rest.pull);
   archive(c.probes);
 }
 

@@ -84,7 +84,7 @@ struct Simulator::Implementation {
     told_full.assign(layer.size(), false);
     reported.assign(shot.sink.size() + 1, 0);
     Hasher hasher;
-    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 8").finish();
+    layout = hasher.digest(stage_settings_digest(shot, Stage::simulate)).text("layout 9").finish();
     frame = shot.timeline.first;
     next_id = reported_id = int(run.scene.start.id.size());
     births = run.scene.births;

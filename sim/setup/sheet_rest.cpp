@@ -60,9 +60,8 @@ void SheetRest::start(Solver& solver, const SheetRestState& state, double time) 
   const HostVec place = solver.cloth_positions();
   state_ = state;
   if (state_.asleep.empty())
-    state_ = {time,        place,      std::vector<double>(n, 0), std::vector<int>(n, 0),
-              Flags(n, 0), Flags(n, 0)};
-  pull_.clear();
+    state_ = {time,        place, std::vector<double>(n, 0), std::vector<int>(n, 0), Flags(n, 0),
+              Flags(n, 0), {}};
   look(place);
   solver.sleep(state_.asleep);
 }
@@ -80,10 +79,10 @@ void SheetRest::before_step(Solver& solver, const Motion& motion) {
   const PinsNow& now = motion.pins;
   for (size_t k = 0; k < pin_sheet_.size(); ++k) {
     const bool moves = now.velocity.x[k] != 0 || now.velocity.y[k] != 0 || now.velocity.z[k] != 0,
-               changes = !pull_.empty() && now.pull[k] != pull_[k];
+               changes = !state_.pull.empty() && now.pull[k] != state_.pull[k];
     if (moves || changes) touched[size_t(pin_sheet_[k])] = 1;
   }
-  pull_ = now.pull;
+  state_.pull = now.pull;
   wake(solver, touched);
 }
 

@@ -19,14 +19,15 @@ struct SheetRestState {
   std::vector<int> still;      // windows that follow each other, in which it came that little
   std::vector<char> busy;      // whether anything touched it in the window that runs now
   std::vector<char> asleep;
+  std::vector<float> pull;  // PinsNow's of the step before; empty: there was none
 };
 
 /// A sheet sleeps once it has come less far than its sleeping speed allows in four windows of half
 /// a second, in the last no farther than in the one before: what grows from little, as buckling
 /// does, is no rest. With it sleeps all that is near it, or nothing does. Nothing sleeps without
 /// gravity: what drifts there has no end. Near are sheets whose bounding boxes come within a
-/// thickness, or that a seam joins. Fluid, an obstacle or a pin that moves, a pin that lets go and
-/// another sheet that wakes it.
+/// thickness, or that a seam joins. What wakes it is fluid,
+/// an obstacle or a pin that moves, a pin that lets go, or another sheet that is awake.
 class SheetRest {
  public:
   SheetRest() = default;
@@ -59,7 +60,7 @@ class SheetRest {
     double speed;     // m/s; 0: it never sleeps
     float thickness;  // m
   };
-  /// By sheets: asleep or about to be.
+  /// By sheets.
   using Flags = std::vector<char>;
 
   /// How far a sheet came in the window before and in the one that ends: means over its vertices,
@@ -82,8 +83,7 @@ class SheetRest {
   std::vector<Sheet> sheet_;
   std::vector<char> joined_;  // of two sheets, by rows
   std::vector<int> pin_sheet_;
-  std::vector<float> pull_;  // N/m, of the step before
-  std::vector<Box> box_;     // of each sheet, as it was seen last
+  std::vector<Box> box_;  // of each sheet, as it was seen last
   SheetRestState state_;
 };
 

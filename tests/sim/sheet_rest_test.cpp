@@ -33,6 +33,14 @@ Shot pile() {
   return shot;
 }
 
+/// Along the floor to the pile's middle, between two frames.
+void roll_a_ball(Shot& shot, double from, double begins, double ends) {
+  Obstacle& ball = shot.obstacle.emplace_back();
+  ball.type = ObstacleType::sphere, ball.radius = 0.05;
+  ball.position.keys = {
+      {1.0, V3d(from, -0.95, 0)}, {begins, V3d(from, -0.95, 0)}, {ends, V3d(0, -0.95, 0)}};
+}
+
 int asleep(const Stepper& run) { return run.scene.rest.asleep(); }
 
 void until_all_sleep(Stepper& run, double latest) {
@@ -106,12 +114,8 @@ TEST(SheetRest, OneThatFallsWakesThePileAndAnotherAwayFromItSleepsOn) {
 
 TEST(SheetRest, AnObstacleThatComesNearWakesIt) {
   Shot shot = pile();
-  Obstacle ball;
-  ball.type = ObstacleType::sphere, ball.radius = 0.05;
-  ball.position.keys = {
-      {1.0, V3d(0.5, -0.95, 0)}, {73.0, V3d(0.5, -0.95, 0)}, {97.0, V3d(0, -0.95, 0)}};
   shot.timeline.first = 1, shot.timeline.last = 120, shot.timeline.fps = 24;
-  shot.obstacle.push_back(ball);
+  roll_a_ball(shot, 0.5, 73, 97);
   Stepper run(shot);
   run.advance(3);
   ASSERT_EQ(asleep(run), 2);
@@ -191,12 +195,8 @@ TEST(SheetRest, WhatGrowsFromLittleIsNotTakenForRest) {
 TEST(SheetRest, ARunThatIsResumedAsleepOrBeforeHasTheSameBits) {
   test::TemporaryFolder folder;
   Shot shot = pile();
-  Obstacle ball;
-  ball.type = ObstacleType::sphere, ball.radius = 0.05;
-  ball.position.keys = {
-      {1.0, V3d(0.4, -0.95, 0)}, {61.0, V3d(0.4, -0.95, 0)}, {67.0, V3d(0, -0.95, 0)}};
   shot.timeline.first = 1, shot.timeline.last = 70, shot.timeline.fps = 12;
-  shot.obstacle.push_back(ball);
+  roll_a_ball(shot, 0.4, 61, 67);
   Simulator whole(shot, {.device = Device::cpu});
   const auto places = [](const Simulator& run) {
     std::vector<V3f> all;
@@ -220,6 +220,26 @@ TEST(SheetRest, ARunThatIsResumedAsleepOrBeforeHasTheSameBits) {
       ASSERT_EQ(places(resumed), frame[size_t(f - 2)]) << from << " " << f;
     }
   }
+}
+
+// At a frame from which a run is taken up.
+TEST(SheetRest, APinThatLetsGoAsTheRunIsResumedWakesIt) {
+  Shot shot = pile();
+  shot.cloth.pop_back();
+  Cloth& sheet = shot.cloth[0];
+  sheet.corner.y = 0;
+  ClothPin& pin = sheet.pin.emplace_back();
+  for (uint32_t v = 0; v < 81; ++v) pin.vertices.push_back(v);
+  const double then = 3;
+  pin.release = then;
+  Stepper run(shot);
+  while (run.time < then) run.step_towards(then, run.next_dt());
+  ASSERT_EQ(asleep(run), 1);
+  Stepper resumed(shot);
+  resumed.load(run.solver->save(), run.limits, run.time, run.scene.rest.state());
+  for (Stepper* one : {&run, &resumed}) one->step(1e-3);
+  EXPECT_EQ(asleep(run), 0);
+  expect_same_state(run.solver->save(), resumed.solver->save());
 }
 
 }  // namespace
