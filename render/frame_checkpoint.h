@@ -1,6 +1,7 @@
 #pragma once
 // The samples of a frame in work, on disk, so that a stopped frame goes on where it was.
 
+#include <algorithm>
 #include <vector>
 
 #include "render/film/layers.h"
@@ -33,6 +34,12 @@ struct Sums {
   }
   /// Samples that a pixel shall have after a round of this pass.
   int wanted(size_t p, int round) const { return rounds.upto(round, plan.wanted(p)); }
+  /// The largest of them.
+  int most_wanted(int round) const {
+    int most = 0;
+    for (size_t p = 0; p < pixel.size(); ++p) most = std::max(most, wanted(p, round));
+    return most;
+  }
   bool is_through(int round) const {
     for (size_t p = 0; p < pixel.size(); ++p)
       if (pixel[p].samples() < wanted(p, round)) return false;

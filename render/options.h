@@ -2,6 +2,7 @@
 // How an image is estimated, for tests and measurements: every choice gives the same mean.
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 
 #include "pipeline/contract/hash.h"
@@ -50,6 +51,7 @@ struct FrameCheckpoint {
 };
 
 class SceneCache;
+struct Film;
 
 struct RenderOptions {
   Estimator estimator = Estimator::mis;
@@ -63,6 +65,9 @@ struct RenderOptions {
   FrameCheckpoint checkpoint{};
   Denoised denoised = Denoised::alone;
   std::shared_ptr<SceneCache> cache{};  // of earlier frames of the shot; null: none
+  /// Gets the beauty and its alpha as they refine: after 1, 2, 4... samples of every pixel. Null:
+  /// none are made. The frame is the same bits with it and without.
+  std::function<void(const Film&)> refined{};
 };
 
 }  // namespace drench::render

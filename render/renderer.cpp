@@ -129,9 +129,16 @@ void add_sample(const CameraSample& sample, size_t pixel, Sums& sums) {
   sums.layers.clear(*sample.record);
 }
 
-/// Brings the pixels of a tile to the numbers of samples that are planned until the end of a round.
-/// @return those added
-uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& rays) {
+/// Samples that a pixel shall have: as planned until the end of a round, but no more than `most`.
+struct Goal {
+  int round, most;
+  int operator()(const Sums& sums, size_t pixel) const {
+    return std::min(sums.wanted(pixel, round), most);
+  }
+};
+
+/// Brings the pixels of a tile to the goal. @return samples added
+uint64_t render_tile(const Job& job, int tile, Goal goal, Sums& sums, uint64_t& rays) {
   const FlushDenormals flush;
   std::vector<PathRecord> record(paths_in_flight, sums.layers.blank());
   const bool records = sums.layers.records();
@@ -142,7 +149,7 @@ uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& 
     for (int x = x0; x < std::min(x0 + tile_size, job.width); ++x) {
       const size_t pixel = size_t(y) * job.width + x;
       FilmPoints film(job, x + job.window.x, y + job.window.y);
-      const int wanted = sums.wanted(pixel, round);
+      const int wanted = goal(sums, pixel);
       for (int s = sums.pixel[pixel].samples(); s < wanted; s = sums.pixel[pixel].samples()) {
         samples.clear();
         for (size_t k = 0; k < paths_in_flight && s + int(k) < wanted; ++k)
@@ -158,9 +165,9 @@ uint64_t render_tile(const Job& job, int tile, int round, Sums& sums, uint64_t& 
 
 using Clock = std::chrono::steady_clock;
 
-/// One round of a pass over the tiles, which breaks off between two of them at `until`. Samples are
-/// whole then, and the same call goes on. @return whether the round is through
-bool render_tiles(const Job& job, int round, Sums& sums, Clock::time_point until, uint64_t& rays,
+/// Brings all tiles to the goal, but breaks off between two of them at `until`. Samples are whole
+/// then, and the same call goes on. @return whether the goal is reached
+bool render_tiles(const Job& job, Goal goal, Sums& sums, Clock::time_point until, uint64_t& rays,
                   Progress& progress) {
   std::atomic<uint64_t> traced{0};
   std::atomic<bool> through{true};
@@ -173,7 +180,7 @@ bool render_tiles(const Job& job, int round, Sums& sums, Clock::time_point until
         }
         uint64_t here = 0;
         for (int tile = range.begin(); tile < range.end(); ++tile)
-          progress.done(render_tile(job, tile, round, sums, here));
+          progress.done(render_tile(job, tile, goal, sums, here));
         traced += here;
       },
       tbb::simple_partitioner{});
@@ -181,34 +188,87 @@ bool render_tiles(const Job& job, int round, Sums& sums, Clock::time_point until
   return through;
 }
 
-/// All passes, with checkpoints in between and when `progress` throws.
-void render_passes(Job& job, const FrameCheckpoint& checkpoint, FramePhotons& photons, Sums& sums,
-                   uint64_t& rays, Progress& progress) {
-  const bool keeps = !checkpoint.file.empty();
-  const auto every = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(std::min(checkpoint.every_s, 1e6)));
-  bool more = read_checkpoint(checkpoint, sums) || sums.begin_pass(0);
-  progress.had(sums.pixel);
-  try {
-    while (more) {
-      progress.expect(sums.plan.expected());
-      for (int round = sums.rounds.first(); round < sums.rounds.end(); ++round) {
-        const bool last = round + 1 == sums.rounds.end();  // whose photons are told of
-        if (!last && sums.is_through(round)) continue;
-        photons.trace_round(round, sums.rounds, rays);
-        job.path.walks = photons.caustics().walks;
-        const auto until = [&] { return keeps ? Clock::now() + every : Clock::time_point::max(); };
-        while (!render_tiles(job, round, sums, until(), rays, progress))
-          write_checkpoint(checkpoint, sums);
-      }
-      sums.settle();
-      more = sums.begin_pass(photon_error(sums.beauty(), sums.split));
-    }
-  } catch (...) {
-    if (keeps) write_checkpoint(checkpoint, sums);
-    throw;
+/// Colours and alpha of the samples so far.
+Film beauty_film(const Job& job, const Sums& sums) {
+  const std::vector<PixelSum>& pixels = sums.beauty();
+  Film film{.width = job.width,
+            .height = job.height,
+            .rgba = std::vector<float>(4 * pixels.size()),
+            .window = job.window};
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
+    const V3f seen = sums.plate.seen(p);
+    const float alpha = pixels[p].mean(3) - (seen.x + seen.y + seen.z) / 3;
+    film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
   }
+  return film;
 }
+
+/// Renders the rounds of every pass, shows them as they refine, and keeps checkpoints.
+class Passes {
+ public:
+  Passes(Job& job, const RenderOptions& options, FramePhotons& photons, Sums& sums, uint64_t& rays,
+         Progress& progress)
+      : job_(job),
+        options_(options),
+        photons_(photons),
+        sums_(sums),
+        rays_(rays),
+        progress_(progress),
+        every_(std::chrono::duration_cast<Clock::duration>(
+            std::chrono::duration<double>(std::min(options.checkpoint.every_s, 1e6)))) {}
+
+  void render() {
+    bool more = read_checkpoint(options_.checkpoint, sums_) || sums_.begin_pass(0);
+    progress_.had(sums_.pixel);
+    while (most_ < sums_.pixel.front().samples()) most_ *= 2;
+    try {
+      while (more) {
+        progress_.expect(sums_.plan.expected());
+        for (int round = sums_.rounds.first(); round < sums_.rounds.end(); ++round) {
+          const bool last = round + 1 == sums_.rounds.end();  // whose photons are told of
+          if (!last && sums_.is_through(round)) continue;
+          photons_.trace_round(round, sums_.rounds, rays_);
+          job_.path.walks = photons_.caustics().walks;
+          render_round(round);
+        }
+        sums_.settle();
+        more = sums_.begin_pass(photon_error(sums_.beauty(), sums_.split));
+      }
+    } catch (...) {
+      if (keeps()) write_checkpoint(options_.checkpoint, sums_);
+      throw;
+    }
+  }
+
+ private:
+  bool keeps() const { return !options_.checkpoint.file.empty(); }
+
+  void render_round(int round) {
+    const int most = sums_.most_wanted(round);
+    for (; options_.refined && most_ < most; most_ *= 2) {
+      render_tiles_to({round, most_});
+      sums_.settle();
+      options_.refined(beauty_film(job_, sums_));
+    }
+    render_tiles_to({round, most});
+  }
+
+  void render_tiles_to(Goal goal) {
+    const auto until = [&] { return keeps() ? Clock::now() + every_ : Clock::time_point::max(); };
+    while (!render_tiles(job_, goal, sums_, until(), rays_, progress_))
+      write_checkpoint(options_.checkpoint, sums_);
+  }
+
+  Job& job_;
+  const RenderOptions& options_;
+  FramePhotons& photons_;
+  Sums& sums_;
+  uint64_t& rays_;
+  Progress& progress_;
+  const Clock::duration every_;
+  int most_ = 1;  // samples of a pixel when the frame is shown next
+};
 
 double picture_error(const std::vector<PixelSum>& pixels) {
   double sum = 0;
@@ -250,18 +310,8 @@ void denoise_plate(const Job& job, Sums& sums) {
 }
 
 Film developed(const Job& job, const Sums& sums) {
-  const std::vector<PixelSum>& pixels = sums.beauty();
-  Film film{.width = job.width,
-            .height = job.height,
-            .rgba = std::vector<float>(4 * sums.pixel.size()),
-            .window = job.window};
-  for (size_t p = 0; p < pixels.size(); ++p) {
-    for (int c = 0; c < 3; ++c) film.rgba[4 * p + size_t(c)] = pixels[p].mean(c);
-    const V3f seen = sums.plate.seen(p);
-    const float alpha = pixels[p].mean(3) - (seen.x + seen.y + seen.z) / 3;
-    film.rgba[4 * p + 3] = std::clamp(alpha, 0.f, 1.f);
-  }
-  film.layer = sums.layers.finish(pixels, sums.plate);
+  Film film = beauty_film(job, sums);
+  film.layer = sums.layers.finish(sums.beauty(), sums.plate);
   film.header = sums.layers.header();
   return film;
 }
@@ -312,7 +362,7 @@ Film render_frame(const Shot& shot, int frame, const FrameGeometry& geometry,
             .split = std::vector<PixelSum>(photons.any() ? pixels : 0)};
   Progress report(progress);
   uint64_t rays = 0;
-  render_passes(job, options.checkpoint, photons, sums, rays, report);
+  Passes(job, options, photons, sums, rays, report).render();
   if (shot.render.denoise) denoise_plate(job, sums);
   Film film = developed(job, sums);
   if (shot.render.denoise) denoise_film(sums, options.denoised, shot.render.denoiser, film);

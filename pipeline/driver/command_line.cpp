@@ -37,6 +37,7 @@ struct Arguments {
   int port = 0;             // any
   bool verbose = false, json = false, reference = false, strict = false;
   bool status = false, cancel = false;  // of a farm
+  bool watch = false;                   // of a report
   std::string job_template;
 };
 
@@ -71,6 +72,11 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
   add_common(command, arguments);
 }
 
+CLI::Option* add_port(CLI::App& command, Arguments& arguments) {
+  return command.add_option("--port", arguments.port, "default any that is free")
+      ->check(CLI::Range(1, 65535));
+}
+
 using Steps = std::vector<Step>;
 
 /// What CLI11 asks of a list of steps: the names, with an underscore for a space.
@@ -98,6 +104,9 @@ CLI::App* add_make(CLI::App& app, Arguments& arguments, const std::string& name,
                     "others may work in the output folder, if all say so: on a farm");
   command->add_flag("--openjd", arguments.shot.openjd,
                     "progress as a farm's workers read it (Open Job Description), on stdout");
+  if (std::find(steps.begin(), steps.end(), Step::render) != steps.end())
+    command->add_flag("--progressive", arguments.shot.progressive,
+                      "show frames in render/SHOT.FRAME.refining.png as they refine");
   command->footer(fmt::format("Example: drench {} {}", name, example));
   command->callback([&arguments, steps] { make_command(arguments.shot, steps); });
   return command;
@@ -183,14 +192,19 @@ void add_commands(CLI::App& app, Arguments& arguments) {
   CLI::App* report = app.add_subcommand("report", "a page of frames, plots, warnings and commands");
   report->add_option("DIR", arguments.folder, "output folder")->required();
   report->add_option("--with", arguments.compared, "another output folder, to compare frames with");
+  CLI::Option* watch =
+      report->add_flag("--watch", arguments.watch, "follow a run, in a browser on this machine");
+  add_port(*report, arguments)->needs(watch);
   add_common(*report, arguments);
   report->footer("Example: drench report out/pour/preview");
-  report->callback([&arguments] { report_command(arguments.folder, arguments.compared); });
+  report->callback([&arguments] {
+    if (arguments.watch) return watch_command(arguments.folder, arguments.compared, arguments.port);
+    report_command(arguments.folder, arguments.compared);
+  });
 
   CLI::App* view = app.add_subcommand("view", "plays caches in a browser, on this machine alone");
   view->add_option("DIR", arguments.folder, "output folder")->required();
-  view->add_option("--port", arguments.port, "default any that is free")
-      ->check(CLI::Range(1, 65535));
+  add_port(*view, arguments);
   add_common(*view, arguments);
   view->footer("Example: drench view out/pour/preview");
   view->callback([&arguments] { view_command(arguments.folder, arguments.port); });

@@ -175,7 +175,7 @@ void warn_of_small_disk(const Job& job, const Plan& plan, const Manifest& manife
 Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest) {
   Progress progress(arguments.quiet ? ProgressStyle::quiet : progress_style(), arguments.openjd);
   const std::unique_ptr<Stages> stages =
-      shot_stages(job.shot, {arguments.device, arguments.memory_gib});
+      shot_stages(job.shot, {arguments.device, arguments.memory_gib, arguments.progressive});
   Retries retries(job.folder, manifest);
   for (int attempt = 1;; ++attempt) {
     const Plan plan = plan_of(job, manifest);
@@ -283,7 +283,7 @@ void clean_command(const ShotArguments& arguments) {
                               system_reason(code.value())));
     }
   }
-  remove_frame_samples(job.folder);
+  remove_frames_in_work(job.folder);
   if (arguments.format == OutputFormat::json) print(json_line({{"removed", plan.beyond}}));
   log_info("driver", fmt::format("removed {} files", plan.beyond.size()));
 }

@@ -25,10 +25,11 @@ struct ShotArguments {
   std::string quality = "final";
   OutputFormat format = OutputFormat::text;
   bool quiet = false;
-  bool verify = false;  // hash every file first instead of trusting sizes and times
-  int retry = 0;        // times that a frame is tried again which failed
-  bool shared = false;  // other drivers may work in the output folder
-  bool openjd = false;  // progress in a farm's lines on standard output
+  bool verify = false;       // hash every file first instead of trusting sizes and times
+  int retry = 0;             // times that a frame is tried again which failed
+  bool shared = false;       // other drivers may work in the output folder
+  bool openjd = false;       // progress in a farm's lines on standard output
+  bool progressive = false;  // pictures of frames as they refine
 };
 
 /// run, simulate, mesh, render: brings the output folder up to date as far as `steps` go.
@@ -47,6 +48,10 @@ void fabrics_command(OutputFormat format);
 /// Writes OUT/report.html, a page of what was made and what it took. @param compared  another
 /// output folder whose frames are shown beside; empty: none.
 void report_command(const std::filesystem::path& folder, const std::filesystem::path& compared);
+/// The same page on loopback, which follows a run, until the program is asked to stop.
+/// @param port  0: any that is free
+void watch_command(const std::filesystem::path& folder, const std::filesystem::path& compared,
+                   int port);
 /// Prints an address on loopback and plays the folder's caches there until it is stopped.
 /// @param port  0: any
 void view_command(const std::filesystem::path& folder, int port);

@@ -23,7 +23,12 @@ std::string noisy(const std::string& shot, int frame) {
 std::string frame_samples(const std::string& shot, int frame) {
   return fmt::format("render/{}.{:04d}.samples", shot, frame);
 }
-bool is_frame_samples(std::string_view file) { return file.ends_with(".samples"); }
+std::string refining(const std::string& shot, int frame) {
+  return fmt::format("render/{}.{:04d}.refining.png", shot, frame);
+}
+bool is_in_work(std::string_view file) {
+  return file.ends_with(".samples") || file.ends_with(".refining.png");
+}
 std::string movie(const std::string& shot) { return shot + ".mp4"; }
 
 }  // namespace drench::layout

@@ -39,7 +39,8 @@ std::string foam(int frame);                                    // mesh/foam.100
 std::string image(const std::string& shot, int frame);          // render/pour.1001.exr
 std::string noisy(const std::string& shot, int frame);          // noisy/pour.1001.exr
 std::string frame_samples(const std::string& shot, int frame);  // render/pour.1001.samples
-bool is_frame_samples(std::string_view file);
-std::string movie(const std::string& shot);  // pour.mp4
+std::string refining(const std::string& shot, int frame);       // render/pour.1001.refining.png
+bool is_in_work(std::string_view file);                         // a file of one of these
+std::string movie(const std::string& shot);                     // pour.mp4
 
 }  // namespace drench::layout

@@ -154,19 +154,19 @@ std::vector<std::string> unlisted_files(const fs::path& folder, const Manifest& 
     const std::string file = entry->path().lexically_relative(folder).generic_string();
     if (std::find(layout::own.begin(), layout::own.end(), file) != layout::own.end()) continue;
     if (*fs::path(file).begin() == layout::farm) continue;
-    if (!records.contains(file) && !layout::is_frame_samples(file)) files.push_back(file);
+    if (!records.contains(file) && !layout::is_in_work(file)) files.push_back(file);
   }
   if (code) fail_to_read(folder, code.value());
   std::sort(files.begin(), files.end());
   return files;
 }
 
-void remove_frame_samples(const fs::path& folder) {
+void remove_frames_in_work(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code code;
   for (fs::directory_iterator entry(folder / "render", code), end; !code && entry != end;
        entry.increment(code))
-    if (layout::is_frame_samples(entry->path().string())) files.push_back(entry->path());
+    if (layout::is_in_work(entry->path().string())) files.push_back(entry->path());
   for (const fs::path& file : files) {
     fs::remove(file, code);
     if (code) {

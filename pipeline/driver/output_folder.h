@@ -74,7 +74,7 @@ Record record_of_file(const std::filesystem::path& folder, const WrittenFile& wr
 std::vector<std::string> unlisted_files(const std::filesystem::path& folder,
                                         const Manifest& manifest);
 
-/// Removes the samples of stopped frames. Call with the lock held.
-void remove_frame_samples(const std::filesystem::path& folder);
+/// Removes samples and pictures of frames in work. Call with the lock held.
+void remove_frames_in_work(const std::filesystem::path& folder);
 
 }  // namespace drench

@@ -48,10 +48,10 @@ struct Rule {
   std::vector<Condition> when;
   std::vector<Input> inputs;
   FilesOf outputs;
-  StageKey Targets::*settings;        // part of the key
-  std::optional<Offsets> obstacles;   // frames whose files of obstacles are part of the key
-  std::string_view inputs_missing;    // says that of a frame
-  std::string_view used_as_they_are;  // says that of frames made with other settings
+  StageKey Targets::*settings;          // part of the key
+  std::optional<Offsets> obstacles;     // frames whose files of obstacles are part of the key
+  std::string_view inputs_missing;      // says that of a frame
+  std::string_view used_as_they_are{};  // says that of frames made with other settings
 };
 
 /// In order of step: a rule reads what those before it make.

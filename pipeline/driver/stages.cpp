@@ -228,8 +228,10 @@ class ShotStages final : public Stages {
     options.checkpoint.inputs = digest_of(attributes);
     const bool later = shot_.render.denoise && shot_.render.denoise_frames > 0;
     if (later) options.denoised = render::Denoised::later;
+    if (options_.progressive) options.refined = picture_of(folder, frame);
     const render::Film film =
         render::render_frame(shot_, frame, geometry, options, &stats, progress);
+    if (options.refined) options.refined(film);
     Attributes all = attributes;
     all.emplace_back("seed", std::to_string(shot_.render.seed));
     all.emplace_back("samples", std::to_string(shot_.render.samples));
@@ -299,6 +301,14 @@ class ShotStages final : public Stages {
   }
 
  private:
+  /// Writes the picture of a frame in work.
+  std::function<void(const render::Film&)> picture_of(const fs::path& folder, int frame) const {
+    return [view = render::ViewTransform(shot_.view),
+            file = folder / layout::refining(shot_.name, frame)](const render::Film& film) {
+      render::write_png(file, film.width, film.height, view(film));
+    };
+  }
+
   std::vector<NumberedImage> images(const fs::path& folder, const std::vector<int>& frames) const {
     std::vector<NumberedImage> result;
     for (const int frame : frames) {

@@ -75,7 +75,8 @@ class Stages {
 
 struct StageOptions {
   Device device = Device::automatic;
-  double memory_gib = 0;  // 0: the shot's own limit of surfacing grids stands
+  double memory_gib = 0;     // 0: the shot's own limit of surfacing grids stands
+  bool progressive = false;  // frames are shown in a PNG as they refine
 };
 
 /// The simulator, the surfacing and the renderer of a shot.

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -327,9 +328,11 @@ TEST(Program, ReportsFramesBeyondAShortenedRangeAndCleansThem) {
   const Ended ended = shot.run("run");
   EXPECT_TRUE(has(ended.err, "drench clean")) << ended.err;
   EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1010)));
-  put_text(shot.out() / layout::frame_samples("tiny", 1010), "of a stopped frame");
+  const std::vector<fs::path> in_work{shot.out() / layout::frame_samples("tiny", 1010),
+                                      shot.out() / layout::refining("tiny", 1010)};
+  for (const fs::path& file : in_work) put_text(file, "of a stopped frame");
   EXPECT_EQ(shot.run("clean").code, done);
-  EXPECT_FALSE(fs::exists(shot.out() / layout::frame_samples("tiny", 1010)));
+  for (const fs::path& file : in_work) EXPECT_FALSE(fs::exists(file)) << file;
   EXPECT_FALSE(fs::exists(shot.out() / layout::image("tiny", 1009)));
   EXPECT_FALSE(fs::exists(shot.out() / layout::particles(1012)));
   EXPECT_TRUE(fs::exists(shot.out() / layout::image("tiny", 1008)));
@@ -381,6 +384,35 @@ TEST(Program, StopsOnRequestWithinTenSecondsAndContinues) {
     EXPECT_EQ(shot.run("run").code, done);
     EXPECT_EQ(shot.digests(), undisturbed_digests(30));
   }
+}
+
+// The picture of a frame in work changes while the frame is rendered, and is whole whenever read.
+TEST(Program, ShowsFramesAsTheyRefine) {
+  const TinyShot shot, plain;
+  const std::vector<std::string> one{"--frames", "1003", "--set", "render.samples=64"};
+  ASSERT_EQ(plain.run("run", one).code, done);
+  ASSERT_EQ(shot.run("simulate", one).code, done);
+  ASSERT_EQ(shot.run("mesh", one).code, done);
+  std::vector<std::string> words = shot.words("render", one);
+  words.push_back("--progressive");
+  Child child(DRENCH_PROGRAM, words, shot.folder());
+  std::set<std::string> pictures;
+  const fs::path file = shot.out() / layout::refining("tiny", 1003);
+  const auto look = [&] {
+    if (const std::string bytes = text_of(file); !bytes.empty()) pictures.insert(bytes);
+  };
+  while (child.running()) look();
+  look();
+  EXPECT_EQ(child.wait().code, done);
+  EXPECT_GE(pictures.size(), 3u);
+  for (const std::string& bytes : pictures) {
+    EXPECT_TRUE(bytes.starts_with("\x89PNG")) << bytes.size();
+    EXPECT_TRUE(bytes.ends_with("IEND\xae\x42\x60\x82")) << bytes.size();
+  }
+  EXPECT_EQ(hash_file(shot.out() / layout::image("tiny", 1003)),
+            hash_file(plain.out() / layout::image("tiny", 1003)));
+  const Ended checked = run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder());
+  EXPECT_EQ(checked.code, done) << checked.err;
 }
 
 // Stopped within a frame, it keeps the frame's samples; continuing gives the same bits.

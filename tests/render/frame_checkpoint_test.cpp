@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -90,6 +91,47 @@ TEST(FrameCheckpoint, OfAPlateGoesOnToTheSameBits) {
   frame.stop_at(0.4);
   expect_equal(frame.go_on(first), whole);
   EXPECT_GE(first, 0.4);
+}
+
+/// What `refined` gets: how many pictures, and how far each is from the frame.
+std::vector<double> refinements(Frame& frame, const Film& whole) {
+  std::vector<double> errors;
+  frame.options.refined = [&](const Film& film) {
+    double sum = 0;
+    for (size_t k = 0; k < whole.rgba.size(); ++k)
+      sum += std::pow(double(film.rgba[k]) - double(whole.rgba[k]), 2);
+    errors.push_back(std::sqrt(sum / double(whole.rgba.size())));
+  };
+  double first = 0;
+  expect_equal(frame.go_on(first), whole);
+  return errors;
+}
+
+/// Pictures come of 1, 2, 4... samples, each nearer the frame by about the square root of two, and
+/// the frame is the same bits with them.
+TEST(FrameRefines, TowardsTheSameBits) {
+  for (const bool plate : {false, true}) {
+    Frame frame;
+    frame.shot.render.denoise = false;
+    frame.shot.render.samples = 64;
+    frame.shot.render.error = 0;
+    if (plate) frame.shot.ground.matte = Matte::shadow_catcher;
+    const std::vector<double> errors = refinements(frame, frame.whole());
+    ASSERT_EQ(errors.size(), 6u);  // 1 to 32 samples
+    for (size_t k = 1; k < errors.size(); ++k) EXPECT_LT(errors[k], errors[k - 1]) << k;
+    EXPECT_LT(errors[5], 0.3 * errors[0]);
+  }
+}
+
+TEST(FrameRefines, FromWhereItWasStopped) {
+  Frame frame;
+  const Film whole = frame.whole();
+  frame.stop_at(0.4);
+  const size_t rest = refinements(frame, whole).size();
+  std::filesystem::remove(frame.file());
+  const size_t all = refinements(frame, whole).size();
+  EXPECT_GT(rest, 0u);
+  EXPECT_LT(rest, all);
 }
 
 TEST(FrameCheckpoint, IsWrittenNowAndThen) {

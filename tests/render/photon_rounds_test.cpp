@@ -124,6 +124,15 @@ TEST(PhotonRounds, GiveTheSameBitsForAnyThreads) {
   EXPECT_GT(frame.stats.camera_samples, 48u * 32 * 32) << "more than one round";
 }
 
+TEST(PhotonRounds, GiveTheSameBitsWhenShownAsTheyRefine) {
+  RoundsByTarget frame;
+  const Film whole = frame.picture();
+  int shown = 0;
+  frame.options.refined = [&](const Film&) { ++shown; };
+  EXPECT_EQ(frame.picture().rgba, whole.rgba);
+  EXPECT_GE(shown, 6);
+}
+
 TEST(PhotonRounds, GiveTheSameBitsAfterStops) {
   struct Stopped {};
   RoundsByTarget frame;

@@ -15,7 +15,8 @@ h1 { margin: 0; font-size: 26px; font-weight: 600; }
 h2 { margin: 14px 0 10px; font-size: 18px; font-weight: 600; border-bottom: 1px solid #343945; padding-bottom: 4px; }
 .facts span { display: inline-block; margin: 8px 18px 0 0; color: #9aa3b2; }
 .facts b { color: #d8dbe2; font-weight: 600; }
-nav a { color: #6ab7ff; margin-right: 14px; }
+.facts .live { color: #7fd88f; } .facts .ended { color: #ffb454; }
+progress { width: 120px; accent-color: #6ab7ff; }
 .warnings { border-left: 3px solid #ffb454; padding: 4px 12px; background: #24262d; }
 .sheet { display: grid; grid-template-columns: repeat(auto-fill, minmax(210px, 1fr)); gap: 6px; }
 .sheet button { position: relative; padding: 0; border: 2px solid transparent; background: #000; cursor: zoom-in; }
@@ -50,12 +51,16 @@ footer { color: #70798a; padding: 10px 24px 40px; max-width: 1560px; margin: 0 a
 /// Opens a frame at full size: arrows, Home and End step, space plays, B shows the other run, Z the
 /// frame's own pixels, Escape closes.
 inline constexpr std::string_view report_script = R"js(
-const data = JSON.parse(document.getElementById('data').textContent);
 const viewer = document.querySelector('dialog');
 const picture = viewer.querySelector('img');
 const [label, hint] = viewer.querySelectorAll('.bar span');
-let at = 0, other = false, timer = 0;
-const shown = data.images;
+let data, shown, at = 0, other = false, timer = 0;
+function load() {
+  data = JSON.parse(document.getElementById('data').textContent);
+  shown = data.images;
+}
+load();
+const buttons = () => [...document.querySelectorAll('.sheet button')];
 function show(k) {
   at = (k + shown.length) % shown.length;
   const image = shown[at];
@@ -66,12 +71,11 @@ function show(k) {
 }
 function stop() { clearInterval(timer); timer = 0; }
 function play() { if (timer) stop(); else timer = setInterval(() => show(at + 1), 1000 / data.fps); }
-document.querySelectorAll('.sheet button').forEach((button, k) =>
-  button.addEventListener('click', () => { show(k); viewer.showModal(); }));
-viewer.addEventListener('close', () => {
-  stop();
-  document.querySelectorAll('.sheet button')[at].focus();
+document.addEventListener('click', event => {
+  const k = buttons().indexOf(event.target.closest('.sheet button'));
+  if (k >= 0) { show(k); viewer.showModal(); }
 });
+viewer.addEventListener('close', () => { stop(); buttons()[at].focus(); });
 viewer.addEventListener('click', event => { if (event.target !== picture) viewer.close(); });
 picture.addEventListener('click', () => viewer.classList.toggle('whole'));
 document.addEventListener('keydown', event => {
@@ -84,6 +88,29 @@ document.addEventListener('keydown', event => {
   const key = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (key) { event.preventDefault(); key(); }
 });
+)js";
+
+/// Takes what has changed from the server, unless a frame is being looked at.
+inline constexpr std::string_view watch_script = R"js(
+async function refresh() {
+  const state = await (await fetch('state')).text();
+  if (state === data.state || viewer.open) return;
+  const page = new DOMParser().parseFromString(await (await fetch('./')).text(), 'text/html');
+  for (const part of ['header', 'main', '#texts'])
+    document.querySelector(part).replaceWith(page.querySelector(part));
+  load();
+}
+async function watch() {
+  try {
+    await refresh();
+    setTimeout(watch, 1000);
+  } catch {
+    const live = document.querySelector('.live');
+    live.className = 'ended';
+    live.textContent = 'drench answers no more';
+  }
+}
+watch();
 )js";
 
 }  // namespace drench

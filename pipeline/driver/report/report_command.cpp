@@ -9,9 +9,9 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/layout.h"
+#include "pipeline/driver/report/frame_jpeg.h"
 #include "pipeline/driver/report/jpeg.h"
 #include "pipeline/driver/report/report_page.h"
-#include "render/display/view_transform.h"
 
 namespace drench {
 
@@ -19,33 +19,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int small_width = 320, small_quality = 82, large_quality = 92;
 constexpr double most_bytes = 96e6;           // of all frames at full size, about
 constexpr double bytes_a_pixel = 0.4;         // of a JPEG, about
 constexpr uint64_t largest_movie = 48 << 20;  // bytes
-
-/// A frame of a folder, scaled down in linear light.
-class FrameReader {
- public:
-  explicit FrameReader(const ReportData& data)
-      : folder_(data.job.folder), shot_(data.job.targets.shot), view_(data.job.shot.view) {}
-
-  bool has(int frame) const { return fs::exists(file(frame)); }
-  render::Film read(int frame) const { return render::read_exr(file(frame)); }
-  std::string url(const render::Film& film, double scale, int quality) const {
-    const int width = std::max(1, int(std::lround(film.width * scale))),
-              height = std::max(1, int(std::lround(film.height * scale)));
-    const Picture picture{width, height, view_(scale < 1 ? shrink(film, width, height) : film)};
-    return data_url("image/jpeg", jpeg_bytes(picture, quality));
-  }
-
- private:
-  fs::path file(int frame) const { return folder_ / layout::image(shot_, frame); }
-
-  const fs::path folder_;
-  const std::string shot_;
-  const render::ViewTransform view_;
-};
 
 PageImages images_of(const ReportData& data, const fs::path& compared) {
   PageImages page;
@@ -57,17 +33,20 @@ PageImages images_of(const ReportData& data, const fs::path& compared) {
       double(render.width) * render.height * double(frames.size()) * (other ? 2 : 1);
   page.scale = std::min(1.0, std::sqrt(most_bytes / std::max(1.0, pixels * bytes_a_pixel)));
   page.images.resize(frames.size());
-  const FrameReader reader(data);
+  const FrameReader reader(data.job);
   const std::optional<FrameReader> other_reader =
-      other ? std::optional<FrameReader>(std::in_place, *other) : std::nullopt;
+      other ? std::optional<FrameReader>(std::in_place, other->job) : std::nullopt;
+  const auto url = [](const FrameReader& from, const render::Film& film, double scale) {
+    return data_url("image/jpeg", from.jpeg(film, scale));
+  };
   tbb::parallel_for(size_t(0), frames.size(), [&](size_t k) {
     const render::Film film = reader.read(frames[k]);
     PageImage& image = page.images[k];
     image.frame = frames[k];
-    image.small = reader.url(film, std::min(1.0, double(small_width) / film.width), small_quality);
-    image.large = reader.url(film, page.scale, large_quality);
+    image.small = url(reader, film, small_scale(film));
+    image.large = url(reader, film, page.scale);
     if (other_reader && other_reader->has(frames[k]))
-      image.other = other_reader->url(other_reader->read(frames[k]), page.scale, large_quality);
+      image.other = url(*other_reader, other_reader->read(frames[k]), page.scale);
   });
   if (other) page.compared = compared.string();
   if (!data.movie.empty() && fs::file_size(data.movie) <= largest_movie) {

@@ -80,12 +80,15 @@ ProbeTable parse_probe(const std::string& name, const std::string& text) {
   return table;
 }
 
+bool ReportData::is_rendered(int frame) const {
+  const std::string file = layout::image(job.targets.shot, frame);
+  return files.contains(file) && fs::exists(job.folder / file);
+}
+
 std::vector<int> ReportData::rendered() const {
   std::vector<int> frames;
   for (const int frame : job.targets.frames)
-    if (files.contains(layout::image(job.targets.shot, frame)) &&
-        fs::exists(job.folder / layout::image(job.targets.shot, frame)))
-      frames.push_back(frame);
+    if (is_rendered(frame)) frames.push_back(frame);
   return frames;
 }
 

@@ -28,6 +28,7 @@ struct ReportData {
   std::map<std::string, Record> files;
   std::filesystem::path movie;  // empty if there is none
 
+  bool is_rendered(int frame) const;
   /// Frames whose images are there, in order.
   std::vector<int> rendered() const;
 };

@@ -54,7 +54,7 @@ double number_at(const json& line, const char* key) {
   return found != line.end() && found->is_number() ? found->get<double>() : 0;
 }
 
-std::string head(const ReportData& data) {
+std::string head(const ReportData& data, bool live) {
   const Shot& shot = data.job.shot;
   const std::vector<int>& frames = data.job.targets.frames;
   std::string text = fmt::format("<header><h1>{}</h1><div class=\"facts\">", html_text(shot.name));
@@ -67,6 +67,7 @@ std::string head(const ReportData& data) {
   fact("rate", fmt::format("{:g} a second", shot.timeline.fps));
   fact("warnings", std::to_string(data.warnings.size()));
   if (!data.runs.empty()) fact("made by", member_text(data.runs.back(), "version"));
+  if (live) text += "<span class=\"live\">live</span>";
   return text + "</div></header>\n";
 }
 
@@ -88,8 +89,8 @@ std::string sheet(const ReportData& data, const PageImages& images) {
     if (image != images.images.end() && image->frame == frame) {
       text += fmt::format(
           "<button aria-label=\"frame {0}\"><img src=\"{1}\" alt=\"frame "
-          "{0}\"><span>{0}</span></button>\n",
-          frame, image->small);
+          "{0}\"><span>{0}{2}</span></button>\n",
+          frame, html_text(image->small), image->in_work ? ", in work" : "");
       ++image;
     } else {
       text += fmt::format("<div class=\"missing\">{}</div>\n", frame);
@@ -105,26 +106,52 @@ std::string sheet(const ReportData& data, const PageImages& images) {
   return text;
 }
 
-std::string stages(const ReportData& data) {
-  std::vector<std::vector<std::string>> rows;
+/// What is there of a stage, and what it took.
+struct StageRow {
+  int done = 0, frames = 0;
+  double sum = 0, most = 0;  // s
+  int measured = 0, slowest = 0;
+};
+
+std::map<Step, StageRow> stage_rows(const ReportData& data) {
+  std::map<Step, StageRow> rows;
+  for (const Task& task : data.plan.tasks) {
+    StageRow& row = rows[task.step];
+    ++row.frames;
+    row.done += task.action == Action::skip;
+  }
   for (const auto& [step, lines] : data.rows) {
-    double sum = 0, most = 0;
-    int slowest = 0;
+    StageRow& row = rows[step];
+    row.measured = int(lines.size());
     for (const auto& [frame, line] : lines) {
       const double seconds = number_at(line, "wall_s");
-      sum += seconds;
-      if (seconds < most) continue;
-      most = seconds;
-      slowest = frame;
+      row.sum += seconds;
+      if (seconds < row.most) continue;
+      row.most = seconds;
+      row.slowest = frame;
     }
-    const bool per_frame = is_per_frame(step);
-    rows.push_back({html_text(step_name(step)), per_frame ? std::to_string(lines.size()) : "",
-                    fmt::format("{:.2f}", sum),
-                    per_frame ? fmt::format("{:.3f}", sum / double(lines.size())) : "",
-                    per_frame ? fmt::format("{:.3f}", most) : "",
-                    per_frame ? std::to_string(slowest) : ""});
   }
-  return table({"stage", "#frames", "#in all, s", "#mean, s", "#most, s", "#in frame"}, rows);
+  return rows;
+}
+
+std::string stages(const ReportData& data) {
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [step, row] : stage_rows(data)) {
+    const bool has_frames = is_per_frame(step) && row.measured > 0;
+    const double mean = row.measured > 0 ? row.sum / row.measured : 0,
+                 left = mean * (row.frames - row.done);
+    rows.push_back({html_text(step_name(step)),
+                    fmt::format("<progress value=\"{}\" max=\"{}\"></progress>", row.done,
+                                std::max(1, row.frames)),
+                    fmt::format("{} of {}", row.done, row.frames), left > 0 ? clock_text(left) : "",
+                    row.measured > 0 ? fmt::format("{:.2f}", row.sum) : "",
+                    has_frames ? fmt::format("{:.3f}", mean) : "",
+                    has_frames ? fmt::format("{:.3f}", row.most) : "",
+                    has_frames ? std::to_string(row.slowest) : ""});
+  }
+  return table({"stage", "", "#up to date", "#left, about", "#in all, s", "#mean, s", "#most, s",
+                "#in frame"},
+               rows);
 }
 
 /// Frames whose steps one limit ruled, by limit.
@@ -223,13 +250,14 @@ std::string data_element(const ReportData& data, const PageImages& images) {
     for (const auto& [frame, line] : lines) rows[std::string(step_name(step))].push_back(line);
   const json all{{"shot", data.job.shot.name},    {"fps", data.job.shot.timeline.fps},
                  {"a", data.job.folder.string()}, {"b", images.compared},
-                 {"images", std::move(list)},     {"rows", std::move(rows)}};
+                 {"images", std::move(list)},     {"rows", std::move(rows)},
+                 {"state", images.state}};
   std::string text = all.dump(-1, ' ', true, json::error_handler_t::replace);
   // "</script>" in a name must not end the element.
   for (size_t k = text.find('<'); k != text.npos; k = text.find('<', k))
     text.replace(k, 1, "\\u003c");
-  std::string elements =
-      fmt::format("<script type=\"application/json\" id=\"data\">{}</script>\n", text);
+  std::string elements = fmt::format(
+      "<div id=\"texts\" hidden><script type=\"application/json\" id=\"data\">{}</script>\n", text);
   for (const PageImage& image : images.images) {
     elements += fmt::format("<script type=\"text/plain\" id=\"a{}\">{}</script>\n", image.frame,
                             image.large);
@@ -237,7 +265,7 @@ std::string data_element(const ReportData& data, const PageImages& images) {
       elements += fmt::format("<script type=\"text/plain\" id=\"b{}\">{}</script>\n", image.frame,
                               image.other);
   }
-  return elements;
+  return elements + "</div>\n";
 }
 
 std::string plots(const ReportData& data) {
@@ -257,15 +285,18 @@ std::string plots(const ReportData& data) {
 }  // namespace
 
 std::string report_page(const ReportData& data, const PageImages& images) {
+  const bool live = !images.state.empty();
   std::string text = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      // Whatever a name in the shot might say, the page loads nothing and sends nothing.
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
-      "media-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
+      // Whatever a name in the shot might say, the page asks nobody else and sends nothing.
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src {}; "
+      "media-src {}; {}style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
       "<style>{}</style></head><body>\n",
-      html_text(data.job.shot.name), report_style);
-  text += head(data);
+      html_text(data.job.shot.name),
+      live ? "'self'" : "data:", live ? "'self'" : "data:", live ? "connect-src 'self'; " : "",
+      report_style);
+  text += head(data, live) + "<main>\n";
   text += section("warnings", "Warnings of the last run", warnings(data));
   text += section("frames", "Frames", sheet(data, images));
   if (!images.movie.empty())
@@ -277,13 +308,15 @@ std::string report_page(const ReportData& data, const PageImages& images) {
   text += section("plan", "What is up to date, and what was left out", plan(data));
   text += section("files", "Files", files(data));
   text += section("runs", "Runs, the last first", runs(data));
-  text += fmt::format("<footer>{} by drench {}</footer>\n", html_text(data.job.folder.string()),
-                      build_id::version);
+  text += fmt::format("</main>\n<footer>{} by drench {}</footer>\n",
+                      html_text(data.job.folder.string()), build_id::version);
   text +=
       "<dialog aria-label=\"frame\"><div class=\"stage\"><img alt=\"\"></div>"
       "<div class=\"bar\"><span></span><span>arrows, space, Z, B, Escape</span></div></dialog>\n";
   text += data_element(data, images);
-  return text + fmt::format("<script>{}</script></body></html>\n", report_script);
+  text += fmt::format("<script>{}</script>", report_script);
+  if (live) text += fmt::format("<script>{}</script>", watch_script);
+  return text + "</body></html>\n";
 }
 
 }  // namespace drench

@@ -64,12 +64,6 @@ std::vector<uint32_t> order_of(const ParticleFrame& frame) {
 json vector_of(const V3d& v) { return {v.x, v.y, v.z}; }
 json vector_of(const V3f& v) { return {v.x, v.y, v.z}; }
 
-bool all_there(const Manifest& manifest, const std::vector<std::string>& files) {
-  return !files.empty() && std::all_of(files.begin(), files.end(), [&](const std::string& file) {
-    return manifest.find(file).has_value();
-  });
-}
-
 json camera_of(const Shot& shot, int frame) {
   const render::ShutterCamera camera(shot.camera, frame, frame, shot.render.width,
                                      shot.render.height);

@@ -1,16 +1,14 @@
 // The viewer: what it sends of a frame, to whom, and what a browser makes of it.
 #include <gtest/gtest.h>
-#include <httplib.h>
 #include <signal.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "pipeline/driver/viewer/view_data.h"
+#include "tests/driver/served_page.h"
 #include "tests/driver/tiny_shot.h"
 
 namespace drench {
@@ -110,37 +108,15 @@ TEST(ViewMesh, HasNormalsAndStretch) {
   EXPECT_EQ(value_at<uint32_t>(bytes, 16 + 72 + 8), 2u);
 }
 
+/// A shot that was run.
+struct RunShot {
+  RunShot() { EXPECT_EQ(shot.run("run").code, 0); }
+  TinyShot shot{3};
+};
+
 /// A shot that was run, and its viewer.
-class Viewed {
- public:
-  Viewed() : shot(3) {
-    EXPECT_EQ(shot.run("run").code, 0);
-    const std::string url_file = shot.folder() / "url";
-    program = std::make_unique<Child>(
-        "/bin/sh",
-        std::vector<std::string>{"-c", "exec \"$0\" view \"$1\" > \"$2\"", DRENCH_PROGRAM,
-                                 shot.out().string(), url_file},
-        shot.folder());
-    for (int k = 0; k < 300 && text_of(url_file).find('\n') == std::string::npos; ++k)
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    url = text_of(url_file);
-    if (!url.empty()) url.pop_back();
-    const size_t port = url.rfind(':') + 1, slash = url.find('/', port);
-    if (slash == std::string::npos) throw std::runtime_error("no viewer: " + program->err_so_far());
-    client = std::make_unique<httplib::Client>("127.0.0.1", std::stoi(url.substr(port)));
-    root = url.substr(slash);
-  }
-
-  int status(const std::string& path, const httplib::Headers& headers = {}) const {
-    const httplib::Result answer = client->Get(path, headers);
-    return answer ? answer->status : 0;
-  }
-  std::string body(const std::string& path) const { return client->Get(path)->body; }
-
-  TinyShot shot;
-  std::unique_ptr<Child> program;
-  std::unique_ptr<httplib::Client> client;
-  std::string url, root;
+struct Viewed : RunShot, ServedPage {
+  Viewed() : ServedPage({"view", shot.out().string()}, shot.folder()) {}
 };
 
 TEST(Viewer, SendsTheFramesOfTheFolder) {
