@@ -18,6 +18,7 @@
 #include "pipeline/contract/files/files.h"
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot/printable.h"
+#include "pipeline/contract/shot/shot_text.h"
 #include "pipeline/driver/commands.h"
 #include "pipeline/driver/farm/farm.h"
 #include "pipeline/driver/process.h"
@@ -55,16 +56,23 @@ void add_shot_options(CLI::App& command, Arguments& arguments) {
   command.add_option("--out", shot.out, "output folder; default out/<shot>/<quality>");
   command.add_option("--frames", shot.frames,
                      "1001-1048, 1001-1048x2 (every second), or a list of these; default all");
-  command.add_option("--device", shot.device, "auto, cpu or cuda")
-      ->transform(CLI::CheckedTransformer(devices, CLI::ignore_case))
+  command
+      .add_option_function<std::string>(
+          "--device", [&shot](const std::string& name) { shot.device = devices.at(name); },
+          "auto, cpu or cuda")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->option_text("NAME");
   command.add_option("--threads", shot.threads, "cores to use; default all")
       ->check(CLI::Range(1, 4096));
   command.add_option("--memory", shot.memory_gib, "GiB; a run that needs more stops")
-      ->check(CLI::Range(0.01, 1e6))
-      ->check([](const std::string& text) {  // nan lies in every range
-        return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "is no number of GiB";
-      });
+      ->check([](const std::string& text) {
+        char* end = nullptr;
+        const double gib = std::strtod(text.c_str(), &end);
+        return *end == '\0' && gib >= 0.01 && gib <= 1e6  // not if it is nan
+                   ? ""
+                   : "is no number of GiB from 0.01 on, as 8 or 0.5";
+      })
+      ->option_text("GIB");
   command.add_option("--set", shot.set, "section.key=value; may be given again")
       ->allow_extra_args(false);
   command.add_option("--quality", shot.quality, "a [quality.NAME] of the shot; default final");
@@ -79,7 +87,7 @@ CLI::Option* add_port(CLI::App& command, Arguments& arguments) {
 
 using Steps = std::vector<Step>;
 
-/// What CLI11 asks of a list of steps: the names, with an underscore for a space.
+/// Names of steps as they are typed: with an underscore for a space.
 std::map<std::string, Step> steps_by_name() {
   std::map<std::string, Step> steps;
   for (const Step step : all_steps()) {
@@ -115,11 +123,17 @@ CLI::App* add_make(CLI::App& app, Arguments& arguments, const std::string& name,
 void add_run(CLI::App& app, Arguments& arguments) {
   CLI::App* command = add_make(app, arguments, "run", "all stages, overlapped where they can be",
                                "shots/pour.toml --quality preview", all_steps());
+  static const std::map<std::string, Step> steps = steps_by_name();
+  std::vector<std::string> names;
+  for (const auto& [name, step] : steps) names.push_back(name);
   command
-      ->add_option("--steps", arguments.steps,
-                   "only these, with commas: simulate, mesh, foam, render, denoise, contact_sheet, "
-                   "movie")
-      ->transform(CLI::CheckedTransformer(steps_by_name(), CLI::ignore_case))
+      ->add_option_function<std::vector<std::string>>(
+          "--steps",
+          [&arguments](const std::vector<std::string>& given) {
+            for (const std::string& name : given) arguments.steps.push_back(steps.at(name));
+          },
+          "only these, with commas: simulate, mesh, foam, render, denoise, contact_sheet, movie")
+      ->check(CLI::IsMember(names))
       ->delimiter(',')
       ->option_text("NAMES");
   command->callback([&arguments] {
@@ -229,12 +243,40 @@ void say(const char* kind, const char* text) {
   std::fprintf(stderr, "drench: %s%s\n", kind, printable(text, Lines::many).c_str());
 }
 
-/// What CLI11 says of help, version and bad words. @return the exit code
-int say_of_parsing(const CLI::App& app, const CLI::ParseError& error) {
+/// What is meant by a command or an option that there is not; empty: nothing is near.
+std::string guess_of_word(CLI::App& app, const std::vector<std::string>& words) {
+  if (words.size() < 2 || words[1].starts_with('-')) return {};
+  std::vector<std::string> names;
+  std::string unknown = words[1];
+  const std::vector<CLI::App*> commands = app.get_subcommands({});
+  const auto same = std::find_if(commands.begin(), commands.end(),
+                                 [&](const CLI::App* one) { return one->get_name() == unknown; });
+  CLI::App* const command = same == commands.end() ? nullptr : *same;
+  if (command == nullptr) {
+    for (const CLI::App* one : commands) names.push_back(one->get_name());
+  } else {
+    for (const CLI::Option* option : command->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    const auto found = std::find_if(words.begin() + 2, words.end(), [&](const std::string& word) {
+      return word.starts_with("--") &&
+             command->get_option_no_throw(word.substr(0, word.find('='))) == nullptr;
+    });
+    if (found == words.end()) return {};
+    unknown = found->substr(0, found->find('='));
+  }
+  const std::string_view near = shot_table::nearest_word(unknown, {names.begin(), names.end()});
+  const std::string what = fmt::format("{} is no {}", unknown, command ? "option" : "command");
+  return near.empty() ? what + "\n" : fmt::format("{}; did you mean {}?\n", what, near);
+}
+
+/// What is said of help, version and bad words. @return the exit code
+int say_of_parsing(CLI::App& app, const CLI::ParseError& error,
+                   const std::vector<std::string>& words) {
   std::ostringstream out, err;
   const bool asked = app.exit(error, out, err) == 0;  // --help and --version are no errors
   std::fputs(out.str().c_str(), stdout);
-  std::fputs(printable(err.str(), Lines::many).c_str(), stderr);
+  const std::string guess = asked ? "" : guess_of_word(app, words);
+  std::fputs(printable(guess + err.str(), Lines::many).c_str(), stderr);
   return asked ? done : user_error;
 }
 
@@ -261,7 +303,7 @@ int parse_and_run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return say_of_parsing(app, error);
+    return say_of_parsing(app, error, arguments.shot.command);
   } catch (const std::exception& error) {
     if (arguments.shot.openjd) tell_farm(error.what());
     throw;

@@ -19,8 +19,8 @@
 #include "pipeline/contract/log.h"
 #include "pipeline/contract/shot/printable.h"
 #include "pipeline/contract/shot/shot_file.h"
-#include "pipeline/contract/shot/view_check.h"
 #include "pipeline/driver/disk.h"
+#include "pipeline/driver/early_checks.h"
 #include "pipeline/driver/execute.h"
 #include "pipeline/driver/inputs.h"
 #include "pipeline/driver/job.h"
@@ -28,6 +28,7 @@
 #include "pipeline/driver/plan_text.h"
 #include "pipeline/driver/process.h"
 #include "pipeline/driver/scene_text.h"
+#include "pipeline/driver/shell_word.h"
 #include "pipeline/driver/standard_output.h"
 #include "pipeline/driver/stats_file.h"
 #include "render/bsdf/material.h"
@@ -71,12 +72,6 @@ void write_shot_lock(const Job& job, Manifest& manifest) {
 struct Counts {
   int ran = 0, skipped = 0;
 };
-
-bool renders(const Plan& plan) {
-  return std::any_of(plan.tasks.begin(), plan.tasks.end(), [](const Task& task) {
-    return task.step == Step::render && task.action != Action::skip;
-  });
-}
 
 Counts count_of(const Plan& plan) {
   Counts counts;
@@ -156,6 +151,7 @@ void record_run(const Job& job, const ShotArguments& arguments) {
   StatsFile(job.folder / layout::stats)
       .add("run", json{{"started", fmt::format("{:%FT%TZ}", utc)},
                        {"command", arguments.command},
+                       {"shot", fs::absolute(arguments.shot).string()},
                        {"host", host_name()},
                        {"cpu", processor_name()},
                        {"threads", threads},
@@ -182,11 +178,12 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
     if (retries.drop_damaged_inputs(job.targets, plan)) continue;
     refuse_problems(job, plan);
     if (attempt == 1) report_beyond(plan, arguments);
-    if (attempt == 1 && renders(plan)) warn_of_empty_pictures(job.shot);
+    if (attempt == 1) check_early(job, plan, arguments.memory_gib);
     write_shot_lock(job, manifest);
     if (plan.nothing_to_do()) return plan;
     if (attempt == 1) {
       warn_of_small_disk(job, plan, manifest);
+      warn_of_another_shot(job);
       record_run(job, arguments);
     }
     try {
@@ -199,6 +196,19 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
       retries.count(found);
     }
   }
+}
+
+/// Opens the manifest for a run, without the lines of it that are damaged.
+void open(Manifest& manifest, const fs::path& folder, bool alone) {
+  if (!alone)
+    manifest.open_for_append();  // cuts off what another was killed in, not what it writes
+  if (const int damaged = manifest.damaged_lines(); damaged > 0) {
+    log_warning("driver", fmt::format("{}: {} damaged lines dropped; what they named is checked or "
+                                      "made again",
+                                      (folder / layout::manifest).string(), damaged));
+    if (alone) manifest.rewrite();
+  }
+  if (alone) manifest.open_for_append();
 }
 
 }  // namespace
@@ -214,13 +224,7 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
   std::optional<SimulationLock> simulation_lock;
   if (arguments.shared && job.targets.includes(Step::simulate)) simulation_lock.emplace(job.folder);
   Manifest manifest(job.folder / layout::manifest);
-  manifest.open_for_append();
-  if (manifest.damaged_lines() > 0) {
-    log_warning("driver",
-                fmt::format("{}: {} damaged records dropped; what they named is checked "
-                            "or made again",
-                            (job.folder / layout::manifest).string(), manifest.damaged_lines()));
-  }
+  open(manifest, job.folder, !arguments.shared);
   try {
     if (arguments.verify) drop_all_damaged(job.folder, manifest);
     const Plan plan = make_all(job, arguments, manifest);
@@ -240,7 +244,7 @@ void plan_command(const ShotArguments& arguments) {
   const Manifest manifest(job.folder / layout::manifest);
   Plan plan = plan_of(job, manifest);
   for (const std::string& warning : plan.warnings) log_warning("driver", warning);
-  if (renders(plan)) warn_of_empty_pictures(job.shot);
+  check_early(job, plan, arguments.memory_gib);
   const DiskEstimate disk = disk_estimate(plan, job.targets, manifest.records());
   const double free = free_disk(job.folder);
   std::string text = plan_text(plan);
@@ -299,8 +303,8 @@ void init_command(const fs::path& name, InitialShot kind) {
   const std::string shot = file.stem().string();
   write_file_whole(file,
                    kind == InitialShot::reference ? reference_shot(shot) : starting_shot(shot));
-  log_info("driver",
-           fmt::format("wrote {}; `drench run {}` makes its frames", file.string(), file.string()));
+  log_info("driver", fmt::format("wrote {}; `drench run {}` makes its frames", file.string(),
+                                 shell_word(file.string())));
 }
 
 }  // namespace drench

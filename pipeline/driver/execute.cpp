@@ -478,7 +478,7 @@ void Executor::run() {
 
 std::string Executor::memory_message() const {
   return fmt::format(
-      "{}: the run uses {:.1f} GiB of memory, more than --memory {:.1f}; it was stopped{}. Give "
+      "{}: the run uses {:.3g} GiB of memory, more than --memory {:g}; it was stopped{}. Give "
       "more, a larger spacing or smaller frames",
       folder_.string(), over_memory_ / double(1 << 30), options_.memory_gib,
       kept_work_ ? " with a checkpoint" : "");

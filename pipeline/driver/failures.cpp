@@ -89,8 +89,10 @@ std::string Failures::text() const {
   std::string text = first_;
   if (failed_.size() > 1) text += fmt::format("\n{} frames failed, this one first", failed_.size());
   if (!left_out_.empty()) {
-    text += fmt::format("\n{} of what follows was left out; the same command goes on with it",
-                        left_out_.size());
+    text += fmt::format(
+        "\n{} of what follows was left out; once that is mended the same command "
+        "goes on with it",
+        left_out_.size());
   }
   return text;
 }

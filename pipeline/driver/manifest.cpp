@@ -170,6 +170,16 @@ void Manifest::catch_up() {
   ++damaged_lines_;
 }
 
+void Manifest::rewrite() {
+  const std::scoped_lock lock(mutex_);
+  std::string text;
+  for (const auto& [file, record] : records_) text += manifest_line(record) + '\n';
+  write_file_whole(file_, text);
+  good_size_ = text.size();
+  damaged_lines_ = 0;
+  torn_ = false;
+}
+
 void Manifest::open_for_append() {
   descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (descriptor_ < 0) fail_to_write(errno);

@@ -44,6 +44,9 @@ class Manifest {
   Manifest(const Manifest&) = delete;
   Manifest& operator=(const Manifest&) = delete;
 
+  /// Writes the file anew, without damaged lines. Call before open_for_append, with the folder's
+  /// lock held against all others. @throws Error if it cannot be written; it is as it was then.
+  void rewrite();
   /// Cuts a torn tail off and allows add and drop. Call with the folder's lock held.
   /// @throws Error if the file cannot be written.
   void open_for_append();
@@ -59,6 +62,8 @@ class Manifest {
   std::map<std::string, Record> records() const;
   /// Lines that failed their checksum, the torn tail among them.
   int damaged_lines() const { return damaged_lines_ + (torn_ ? 1 : 0); }
+  /// Whether it ended within a line, as it does for a moment while another writes.
+  bool is_torn() const { return torn_; }
 
  private:
   void take_line(std::string_view line);

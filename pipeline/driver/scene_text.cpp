@@ -47,6 +47,9 @@ std::string scene_text(const sim::SceneReport& report) {
       "particles, {:.0f} MiB, some {:.0f} steps a frame\n",
       report.particles, report.cloth_triangles, report.obstacle_triangles, report.particles_at_end,
       report.memory / double(1 << 20), report.steps_a_frame);
+  if (report.preroll > 0)
+    text += fmt::format("  before the first frame a pre-roll of {:g} s, some {:.0f} steps\n",
+                        report.preroll, report.preroll_steps);
   for (const sim::SourceReport& source : report.source) text += source_text(source, report.spacing);
   for (const sim::SheetReport& sheet : report.sheet) {
     text += fmt::format("  cloth.{}  {} triangles, {}\n", sheet.name, sheet.triangles,
@@ -88,6 +91,8 @@ json scene_json(const sim::SceneReport& report) {
           {"obstacle_triangles", report.obstacle_triangles},
           {"memory_bytes", report.memory},
           {"steps_a_frame", report.steps_a_frame},
+          {"preroll_s", report.preroll},
+          {"preroll_steps", report.preroll_steps},
           {"source", sources},
           {"cloth", sheets},
           {"inlet", inlets}};

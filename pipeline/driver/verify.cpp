@@ -41,7 +41,7 @@ bool is_bad(const fs::path& folder, const Record& record, Findings& findings) {
 Findings look_at(const fs::path& folder) {
   Findings findings;
   const Manifest manifest(folder / layout::manifest);
-  findings.damaged_records = manifest.damaged_lines();
+  findings.damaged_records = manifest.damaged_lines() - (manifest.is_torn() ? 1 : 0);
   std::vector<std::string> suspects;
   for (const auto& [file, record] : manifest.records()) {
     ++findings.files;
@@ -71,7 +71,11 @@ std::string text_of(const Findings& findings) {
   for (const std::string& file : findings.unlisted)
     text += fmt::format("not listed          {}\n", printable(file, Lines::one));
   return text +
-         fmt::format("{} files, {} missing or damaged\n", findings.files, findings.bad.size());
+         fmt::format(
+             "{} files, {} missing or damaged{}\n", findings.files, findings.bad.size(),
+             findings.damaged_records == 0
+                 ? ""
+                 : fmt::format(", {} damaged lines of the manifest", findings.damaged_records));
 }
 
 }  // namespace
@@ -96,6 +100,19 @@ void verify_command(const fs::path& folder, OutputFormat format) {
         "{}: {} of {} files are missing or damaged, the first is {}; `drench run SHOT --verify` "
         "makes those again that its shot has and goes on without damaged checkpoints",
         folder.string(), findings.bad.size(), findings.files, findings.bad.front()));
+  }
+  const std::string manifest = (folder / layout::manifest).string();
+  if (findings.damaged_records > 0) {
+    throw Error(
+        fmt::format("{}: {} of its lines are damaged, and what they named was not checked; "
+                    "`drench run SHOT` drops them and checks or makes again what they named",
+                    manifest, findings.damaged_records));
+  }
+  if (findings.files == 0 && !findings.unlisted.empty()) {
+    throw Error(
+        fmt::format("{}: lists none of the {} files here, so that nothing was checked; "
+                    "`drench run SHOT` makes them again",
+                    manifest, findings.unlisted.size()));
   }
   if (!findings.why_unreadable.empty()) {
     throw Error(fmt::format("{}: {} of {} files could not be checked. {}", folder.string(),

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pipeline/contract/error.h"
+#include "pipeline/contract/log.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_cache.h"
 
@@ -127,6 +128,14 @@ Digest Scene::contents_of(const TriangleMesh& mesh, const std::string& name,
 void Scene::add_object(const TriangleMesh& mesh, const std::string& name, const std::string& what,
                        uint32_t material, Matte matte, const RotationalMotion* motion) {
   check_mesh(mesh, what);
+  if (const ShadingMaterial& m = materials_[material];
+      mesh.uv.empty() && !mesh.triangle.empty() && (m.texture || m.normal_map))
+    log_warning(
+        "render",
+        fmt::format("\"{}\" has no texture coordinates (uv), so that one point of the pictures "
+                    "of material \"{}\" covers all of it. Unwrap its mesh, or leave "
+                    "texture and normal_map out",
+                    name, material_names_[material]));
   const int segments = motion ? segments_of(mesh, *motion) : 0;
   const bool moves = segments > 0 || moves_visibly(mesh);
   const Digest contents = moves ? Digest{} : contents_of(mesh, name, material);

@@ -58,9 +58,9 @@ double bytes_a_particle(const Parameters& p, const Scene& scene) {
 /// Springs, rows and the implicit step of a sheet, of a triangle.
 constexpr double bytes_a_triangle = 700;
 
-double steps_a_frame(const Shot& shot, Scene& scene) {
+/// Of the scheme that adapts its step.
+double adaptive_steps_a_frame(const Shot& shot, Scene& scene) {
   const double frame = 1 / shot.timeline.fps;
-  if (shot.time_step > 0) return std::ceil(frame / shot.time_step);
   Limits limits;
   // A tenth of the sound speed is sqrt(g H + v^2 / 2): the fall through all of H ends at sqrt(2) of
   // it.
@@ -69,6 +69,23 @@ double steps_a_frame(const Shot& shot, Scene& scene) {
   const double dt = stable_step(scene.parameters, limits).dt;
   const double moves = scene.obstacles.limit(0, std::min(dt, frame));
   return std::ceil(frame / std::min(frame, scene.pins.limit(0, moves)));
+}
+
+/// Says so if the shot asks for many more steps than its physics does.
+void estimate_steps(const Shot& shot, Scene& scene) {
+  constexpr double many_times = 20;
+  SceneReport& report = scene.report;
+  const double adaptive = adaptive_steps_a_frame(shot, scene);
+  report.steps_a_frame =
+      shot.time_step > 0 ? std::ceil(1 / (shot.timeline.fps * shot.time_step)) : adaptive;
+  report.preroll = shot.preroll;
+  report.preroll_steps = report.steps_a_frame * shot.preroll * shot.timeline.fps;
+  if (report.steps_a_frame > many_times * adaptive)
+    report.notes.push_back(
+        fmt::format("shot.time_step is {:g} s, {:.0f} steps a frame; without it there are some "
+                    "{:.0f}. Leave it "
+                    "out, or look at its unit",
+                    shot.time_step, report.steps_a_frame, adaptive));
 }
 
 /// @throws Error if there is never anything: no fluid, no cloth.
@@ -139,7 +156,7 @@ std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high,
   const std::string sizes =
       fmt::format("the mesh is {} wide in a domain of {}", text(longest), text(width));
   for (const auto& [unit, scale] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
-    if (longest * scale > 3 * width) continue;
+    if (longest * scale > 1.5 * width) continue;
     return fmt::format("{}: are these {}? {} {}", sizes, unit, remedy, scale);
   }
   return sizes + ": is its scale right?";
@@ -258,7 +275,7 @@ void complete_report(const Shot& shot, Scene& scene) {
   report.memory = report.particles_at_end * bytes_a_particle(scene.parameters, scene) +
                   double(report.cloth_triangles) * bytes_a_triangle +
                   2 * double(scene.obstacles.level_set_bytes() + scene.sinks.level_set_bytes());
-  report.steps_a_frame = steps_a_frame(shot, scene);
+  estimate_steps(shot, scene);
 }
 
 std::vector<std::string> warnings_of(const SceneReport& report) {

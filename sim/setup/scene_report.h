@@ -70,6 +70,8 @@ struct SceneReport {
   size_t obstacle_triangles = 0;  // of meshes, obstacles and sinks
   double memory = 0;              // bytes, estimate, of the simulation at its end
   double steps_a_frame = 0;       // estimate; impacts and stiff pressure ask for more
+  double preroll = 0;             // s, and in steps
+  double preroll_steps = 0;
   std::vector<std::string> notes;  // of other parts of the scene: whole warnings
 };
 

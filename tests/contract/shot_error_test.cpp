@@ -362,7 +362,7 @@ TEST_F(ShotError, NamesBadProbes) {
       {"[[probe]]\ntype = \"force\"\non = \"ball\"\n", {"scene.toml:6", "on", "type height"}},
       {"[[probe]]\ntype = \"pressure\"\nwindow = -1\n", {"scene.toml:6", "window", "0 and 1"}},
       {"[[probe]]\ntype = \"force\"\ntarget = \"left\"\n",
-       {"scene.toml:6", "\"left\"", "x_low", "sheets of this shot: none"}},
+       {"scene.toml:6", "\"left\"", "x_low", "this shot has none"}},
       {"[[obstacle]]\ntype = \"sphere\"\nname = \"a\"\n[[cloth]]\nname = \"a\"\n[[probe]]\n"
        "type = \"force\"\ntarget = \"a\"\n",
        {"\"a\"", "obstacle 1 and of a sheet", "rename"}},

@@ -89,5 +89,19 @@ TEST(Cameras, InASolidUnderTheGroundOrTurnedAwayAreSaid) {
                     "under the ground"));
 }
 
+// With a sheet, which may be anywhere, too.
+TEST(Cameras, ThatLookPastEverythingOrSeeADotAreSaid) {
+  const std::string sheet = std::string(sky) + "[[cloth]]\ncorner = [0, 0.5, 0]\n",
+                    past = camera("[0.5, 0.5, 4]", "[9, 0.5, 2]"),
+                    ball =
+                        "[[obstacle]]\ntype = \"sphere\"\nradius = 0.5\nposition = [9, 0.5, 2]\n";
+  EXPECT_TRUE(tells(warned(sheet + past), "looks past all there is"));
+  EXPECT_EQ(warned(sheet + ball + past), "") << "it sees the ball";
+  EXPECT_EQ(warned(sheet + camera("[0.5, 0.5, 4]", "[1.5, 0.5, 2]")), "") << "at the edge";
+  EXPECT_TRUE(
+      tells(warned(sheet + camera("[900, 900, 1400]", "[0.5, 0.5, 0.5]")), "the domain is a dot"));
+  EXPECT_EQ(warned(sheet + camera("[90, 90, 140]", "[0.5, 0.5, 0.5]")), "");
+}
+
 }  // namespace
 }  // namespace drench

@@ -344,7 +344,8 @@ TEST(Execute, GoesOnBesideAFrameThatFails) {
     if (step == Step::mesh && frame == 3) throw Error("no such mesh");
   };
   EXPECT_EQ(error_of([&] { make_toy(settings, first, folder.path()); }),
-            "no such mesh\n2 of what follows was left out; the same command goes on with it");
+            "no such mesh\n2 of what follows was left out; once that is mended the same command "
+            "goes on with it");
   EXPECT_EQ(first.count(Step::simulate), 24);
   EXPECT_EQ(first.count(Step::render), 24);
   EXPECT_EQ(first.count(Step::contact_sheet), 0);

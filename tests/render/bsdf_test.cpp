@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "pipeline/contract/log.h"
 #include "render/bsdf/bsdf_cloth.h"
 #include "render/bsdf/bsdf_dielectric.h"
 #include "render/bsdf/bsdf_fabric.h"
@@ -257,6 +258,7 @@ TEST(Fabric, HasNoTriangularShadowsWhereLightEnds) {
 }
 
 TEST(Texture, LiesOnTheClothByItsCoordinates) {
+  forget_warnings();
   // A 2 x 2 picture: red, green above; blue, white below. u runs along x, v along z (sheet_mesh).
   const TemporaryFolder folder;
   const auto path = folder / "weave.png";
@@ -266,7 +268,7 @@ TEST(Texture, LiesOnTheClothByItsCoordinates) {
   Material cotton = diffuse("cotton", 0.8f);
   cotton.texture = path;
   shot.material = {cotton};
-  const TriangleMesh sheet = sheet_mesh(2, [](float, float) { return 0.f; });
+  TriangleMesh sheet = sheet_mesh(2, [](float, float) { return 0.f; });
   const auto seen = [&](double x, double z) {
     aim_narrow(shot, {x, 3, z}, {x, 0, z});
     const Film film = render_frame(shot, 1001, {{}, {{"cloth", sheet}}});
@@ -284,6 +286,13 @@ TEST(Texture, LiesOnTheClothByItsCoordinates) {
   for (const double x : {-0.75, 0.25})
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen(x, -0.75)[c], blue[c], 0.01);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen(-0.25, -0.75)[c], white[c], 0.01);
+  EXPECT_TRUE(logged_warnings().empty());
+  sheet.uv.clear();
+  seen(0, 0);
+  ASSERT_EQ(logged_warnings().size(), 1u);
+  EXPECT_NE(logged_warnings()[0].text.find("\"cloth\" has no texture coordinates"),
+            std::string::npos);
+  forget_warnings();
 }
 
 TEST(Checker, AlternatesInSquaresOfItsSize) {

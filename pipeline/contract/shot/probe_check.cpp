@@ -154,9 +154,11 @@ class ProbeChecker {
       if (cloth.name == name) return cloth;
       names.push_back(cloth.name);
     }
-    fail(key, fmt::format("{}.{} is \"{}\", which is not {}; the sheets of this shot: {}", path_,
-                          key, name, wanted,
-                          names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+    if (std::string_view(key) == "target")
+      for (const Obstacle& obstacle : shot_.obstacle) names.push_back(obstacle.name);
+    fail(key,
+         fmt::format("{}.{} is \"{}\", which is not {}; this shot has {}", path_, key, name, wanted,
+                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
   }
 
   const Shot& shot_;

@@ -21,6 +21,7 @@ constexpr double pi = 3.14159265358979323846;
 constexpr double most_particles = 2e8;  // about 20 GB of state
 constexpr double most_frames = 1e6;
 constexpr double shortest_step = 1e-9;  // s; a day of them is a few ms
+constexpr double least_cells = 2;       // spacings across the domain
 constexpr double most_cells = 1e6;      // grid cells along one axis
 constexpr double most_vertices = 4e6;   // of one sheet
 
@@ -95,6 +96,13 @@ class Checker : CheckBase {
                  "fluid.spacing is {} m but the domain is {} m long in {}: {:.3g} spacings, "
                  "at most {:.0f} are allowed. Use a larger spacing or a smaller domain",
                  shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i], cells, most_cells));
+      }
+      if (shot_.fluid.present() && cells < least_cells) {
+        fail("fluid.spacing",
+             fmt::format("fluid.spacing is {} m but the domain is {} m long in {}: no fluid moves "
+                         "there. Use a spacing of at most {:.2g} m, or a larger domain",
+                         shot_.fluid.spacing, domain.max[i] - domain.min[i], "xyz"[i],
+                         (domain.max[i] - domain.min[i]) / least_cells));
       }
       if (domain.axis[size_t(i)] == Axis::periodic) check_periodic(i);
     }
@@ -328,20 +336,10 @@ class Checker : CheckBase {
     const Fluid& fluid = shot_.fluid;
     const Timeline& time = shot_.timeline;
     const double end = shot_.preroll + (double(time.last) - time.first) / time.fps;
-    const double unit = fluid.spacing * fluid.spacing * fluid.spacing;
-    const auto ball = [](double radius) { return 4 * pi / 3 * radius * radius * radius; };
-    double count = 0;
-    for (const FluidBox& box : fluid.box) {
-      const V3d size = box.max - box.min;
-      count += size.x * size.y * size.z / unit;
-    }
-    for (const FluidSphere& sphere : fluid.sphere) count += ball(sphere.radius) / unit;
+    double count = particles_at_start(shot_);
     for (const FluidEmitter& e : fluid.emitter) {
       const double flows = std::max(0.0, std::min(e.stop, end) - e.start);
-      count += inlet_area(e) * e.speed * flows / unit;
-    }
-    for (const FluidDrops& drops : fluid.drops) {
-      count += drops.particles > 0 ? drops.particles : drops.count * ball(drops.radius) / unit;
+      count += inlet_area(e) * e.speed * flows / std::pow(fluid.spacing, 3);
     }
     return count;
   }
@@ -485,6 +483,21 @@ std::string ShotSources::at(const std::string& key) const {
     path.resize(cut == std::string::npos ? 0 : cut);
   }
   return file;
+}
+
+double particles_at_start(const Shot& shot) {
+  const Fluid& fluid = shot.fluid;
+  const double unit = fluid.spacing * fluid.spacing * fluid.spacing;
+  const auto ball = [](double radius) { return 4 * pi / 3 * radius * radius * radius; };
+  double count = 0;
+  for (const FluidBox& box : fluid.box) {
+    const V3d size = box.max - box.min;
+    count += size.x * size.y * size.z / unit;
+  }
+  for (const FluidSphere& sphere : fluid.sphere) count += ball(sphere.radius) / unit;
+  for (const FluidDrops& drops : fluid.drops)
+    count += drops.particles > 0 ? drops.particles : drops.count * ball(drops.radius) / unit;
+  return count;
 }
 
 void check_shot(const Shot& shot, const ShotSources& sources) { Checker(shot, sources).check(); }

@@ -18,6 +18,9 @@ struct ShotSources {
   std::string at(const std::string& key) const;
 };
 
+/// Particles of boxes, spheres and drops, by their volumes.
+double particles_at_start(const Shot& shot);
+
 /// @throws Error with location, keys, values, reason and remedy for the first part that cannot be
 /// right.
 void check_shot(const Shot& shot, const ShotSources& sources);

@@ -68,6 +68,10 @@ class Reader {
 
  private:
   [[noreturn]] void unknown_section(const std::string& name, const std::string& where) const {
+    if (name == "quality")
+      fail(where,
+           "a quality is not set from outside: --quality NAME chooses one of the file, and "
+           "--set changes what is chosen, as in --set render.samples=64");
     std::vector<std::string_view> words{"quality"};
     for (const Section& section : shot_table::sections()) {
       if (section.parent.empty()) words.push_back(section.name);

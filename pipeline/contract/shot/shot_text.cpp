@@ -210,6 +210,8 @@ std::string_view nearest_word(std::string_view word, const std::vector<std::stri
     return row.back();
   };
   const auto is_part_of = [&](std::string_view other) {
+    constexpr size_t least_beginning = 3;
+    if (word.size() >= least_beginning && other.starts_with(word)) return true;
     return !word.empty() &&
            fmt::format("_{}_", other).find(fmt::format("_{}_", word)) != std::string::npos;
   };

@@ -18,6 +18,7 @@
 #include "pipeline/driver/farm/slurm.h"
 #include "pipeline/driver/file_lock.h"
 #include "pipeline/driver/layout.h"
+#include "pipeline/driver/shell_word.h"
 #include "pipeline/driver/standard_output.h"
 
 namespace drench {
@@ -164,7 +165,6 @@ std::vector<std::string> Submission::options(Step step) const {
 }
 
 std::string Submission::script(const FarmStage& stage, const Numbers& tasks) const {
-  using slurm::quoted;
   std::string frames, logs;
   for (const int k : tasks) {
     frames += fmt::format(" {}", task_frames(stage.tasks[size_t(k)]));
@@ -173,9 +173,9 @@ std::string Submission::script(const FarmStage& stage, const Numbers& tasks) con
   std::string command = fmt::format(
       "{} run {} --out {} --steps {} --frames \"$frames\" --shared --openjd --device {} "
       "--threads \"${{SLURM_CPUS_PER_TASK:-1}}\"",
-      quoted(fs::read_symlink("/proc/self/exe").string()), quoted(fs::absolute(shot_).string()),
-      quoted(fs::absolute(job_.folder).string()), step_word(stage.step),
-      arguments_.shot.device == Device::cuda ? "cuda" : "cpu");
+      shell_word(fs::read_symlink("/proc/self/exe").string()),
+      shell_word(fs::absolute(shot_).string()), shell_word(fs::absolute(job_.folder).string()),
+      step_word(stage.step), arguments_.shot.device == Device::cuda ? "cuda" : "cpu");
   if (arguments_.shot.memory_gib > 0)
     command += fmt::format(" --memory {}", arguments_.shot.memory_gib);
   return fmt::format(task_script, fmt::arg("step", step_word(stage.step)),

@@ -123,10 +123,4 @@ std::string plain_name(std::string text) {
   return text;
 }
 
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
 }  // namespace drench::slurm

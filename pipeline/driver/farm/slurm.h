@@ -48,7 +48,4 @@ std::map<std::string, State> queue();
 /// A word that Slurm's lists and scontrol take as it stands: odd characters become '_'.
 std::string plain_name(std::string text);
 
-/// For a shell: one word, whatever it holds.
-std::string quoted(const std::string& word);
-
 }  // namespace drench::slurm

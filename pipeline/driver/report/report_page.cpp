@@ -11,6 +11,7 @@
 #include "pipeline/driver/report/page_assets.h"
 #include "pipeline/driver/report/report_plots.h"
 #include "pipeline/driver/rules.h"
+#include "pipeline/driver/shell_word.h"
 
 namespace drench {
 
@@ -206,19 +207,9 @@ std::string command_text(const json& run) {
   std::string text;
   const auto words = run.find("command");
   if (words == run.end() || !words->is_array()) return text;
-  constexpr std::string_view plain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./=,:+@%";
   for (const json& word : *words) {
     if (!word.is_string()) continue;
-    const std::string part = word.get<std::string>();
-    if (!text.empty()) text += ' ';
-    if (!part.empty() && part.find_first_not_of(plain) == std::string::npos) {
-      text += part;
-      continue;
-    }
-    text += '\'';
-    for (const char c : part) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    text += '\'';
+    text += (text.empty() ? "" : " ") + shell_word(word.get<std::string>());
   }
   return text;
 }
