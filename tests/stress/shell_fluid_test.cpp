@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "sim/simulator.h"
 #include "tests/contract/sphere_mesh.h"
 #include "tests/stress/shell_scenes.h"
 #include "tests/stress/shell_watch.h"
@@ -73,7 +74,39 @@ TEST_P(ShellWashed, IsNotThrown) {
     watch.until(1);
     report("washed",
            fmt::format("{}, water from {} mm", table ? "on a table" : "on the floor", 50 + 2 * k),
-           watch, {.energy = no_rule});  // what is squeezed on the floor strains it for a step
+           watch, {.energy = not_gated});  // what is squeezed on the floor strains it for a step
+  }
+}
+
+/// Water that is poured on a sheet on the floor, or on a box, from one of twelve moments on.
+Shot poured(bool box, int moment) {
+  Shot shot = water(0.02);
+  shot.timeline.first = 1, shot.timeline.last = 20, shot.timeline.fps = 12;
+  shot.domain.min = V3d(-0.2, box ? -1.1 : -1, -0.2), shot.domain.max = V3d(0.2, 1, 0.2);
+  shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
+  if (box) {
+    Obstacle& table = shot.obstacle.emplace_back();
+    table.size = V3d(0.36, 0.06, 0.36), table.position = V3d(0, -1.03, 0);
+  }
+  Cloth& sheet = add_shell(shot, V3d(-0.1, -0.98, -0.1), V3d(0.2, 0, 0), V3d(0, 0, 0.2), V2i(8, 8));
+  sheet.thickness = 0.002, sheet.damping = 5;
+  FluidEmitter& jet = shot.fluid.emitter.emplace_back();
+  jet.center = V3d(0, -0.9, 0), jet.radius = 0.04, jet.direction = V3d(0, -1, 0), jet.speed = 0.5;
+  jet.start = 0.2 + 0.01 * moment, jet.stop = 0.5;
+  return shot;
+}
+
+class ShellPouredOn : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Box, ShellPouredOn, testing::Bool());
+
+// It falls by 0.12 m: 1.5 m/s.
+TEST_P(ShellPouredOn, IsNotThrown) {
+  for (int moment = 0; moment < 12; ++moment) {
+    Simulator run(poured(GetParam(), moment), {.device = Device::cpu});
+    double fastest = 0;
+    for (int frame = 1; frame < 20; ++frame)
+      fastest = std::max(fastest, run.advance_frame().max_speed);
+    EXPECT_LT(fastest, 4) << moment;
   }
 }
 
@@ -121,10 +154,10 @@ TEST(ShellPouch, DroppedFromTwoMetresHoldsItsWater) {
   report("shell's pouch", "dropped from 2 m", watch, {.speed = 3, .energy = no_rule});
 }
 
-// Two squares that are sewn along all edges; water has been put between them, and they fall.
-TEST(ShellPillow, HoldsItsWater) {
+/// Two squares that are sewn along all edges; water has been put between them, and they fall.
+Shot pillow(double floor) {
   Shot shot = water(0.01);
-  shot.domain.min = V3d(-0.5, -0.1, -0.5), shot.domain.max = V3d(0.5);
+  shot.domain.min = V3d(-0.5, floor, -0.5), shot.domain.max = V3d(0.5);
   shot.domain.axis = {Axis::walls, Axis::walls, Axis::walls};
   for (const int k : {0, 1}) {
     Cloth& side =
@@ -136,10 +169,17 @@ TEST(ShellPillow, HoldsItsWater) {
     seam.edge = seam.to_edge = edge, seam.to = shot.cloth[1].name, seam.time = 0.05;
   }
   add_box(shot, V3d(-0.06, 0.0075, -0.06), {12, 1, 12});
-  ShellWatch watch(shot);
-  watch.until(long_form() ? 2 : 0.4);
-  report("pillow", "sewn around water, falls", watch,
-         {.speed = 3, .energy = no_rule, .nearest = 0});
+  return shot;
+}
+
+// How it lands is chance: from twelve heights with 56 to 123 % of the speed.
+TEST(ShellPillow, HoldsItsWater) {
+  for (int k = 0; k < (long_form() ? 12 : 3); ++k) {
+    ShellWatch watch(pillow(-0.1 - 0.001 * k));
+    watch.until(long_form() ? 2 : 0.4);
+    report("pillow", fmt::format("sewn around water, falls on a floor {} mm lower", k), watch,
+           {.speed = 2, .energy = no_rule, .nearest = 0});
+  }
 }
 
 }  // namespace

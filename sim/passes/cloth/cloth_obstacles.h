@@ -3,12 +3,14 @@
 // nearer is held in the solve of the sheets (cloth_implicit.h): it may go along the surface, and
 // along its normal goes where the surface does. Who is held is found twice: before the pressures by
 // the forces on the vertex alone, and again from the whole solve, where what pulls off is let go
-// and what still comes too near is held. Between two vertices, e apart, a surface of radius R comes
-// e^2 / 8R nearer: triangle_obstacles.h is for shells, nothing for springs. The force that holds a
-// vertex is in the solve, and so is Coulomb's friction, in the same rounds: a vertex that it can
-// hold sticks, one that it cannot feels it as a force. To shells what sticks is a stiffness across
-// the normal (docs/decisions/0031-friction-holds-shells-by-a-stiffness.md). Last comes the guard
-// that particles have: no path passes through a surface, whatever the solve says.
+// and what still comes too near is held. Beside fluid the whole solve of shells comes before the
+// pressures, under the last ones; after them nothing is let go (Settling). Between two vertices, e
+// apart, a surface of radius R comes e^2 / 8R nearer: triangle_obstacles.h is for shells, nothing
+// for springs. The force that holds a vertex is in the solve, and so is Coulomb's friction, in the
+// same rounds: a vertex that it can hold sticks, one that it cannot feels it as a force. To shells
+// what sticks is a stiffness across the normal
+// (docs/decisions/0031-friction-holds-shells-by-a-stiffness.md). Last comes the guard that
+// particles have: no path passes through a surface, whatever the solve says.
 
 #include "sim/passes/cloth/cloth_implicit.h"
 #include "sim/passes/coupling/polygon_grid.h"
@@ -186,7 +188,8 @@ struct HoldRevision {
   const float *mass, *inverse_mass;
   float dt;
   int round;
-  bool lets_go;  // what pulls; what does not stays held for the step
+  bool lets_go;  // what pulls
+  bool finds_friction;
 
   DRENCH_HD bool free_too_near(int i) const {
     const Vec3<float> straight = position[i] + path[i] * dt;
@@ -229,6 +232,7 @@ struct HoldRevision {
     const Vec3<float> n = hold.normal[i], all = reaction[i];
     const float normal = dot(n, all), most = o.friction * normal;
     if (normal < 0.f) return lets_go && let_go(i);
+    if (!finds_friction) return false;
     if (o.friction == 0.f) return round == 0;
     const Vec3<float> straight = position[i] + path[i] * dt;
     const Vec3<float> solid = hold.surface_velocity(o, straight + hold.home(position[i]), n);
@@ -288,10 +292,13 @@ struct ContactTolerances {
   float first, between;
 };
 
+/// Whether an obstacle, another piece of a sheet or a wall holds anything.
+bool anything_is_met(const State& state);
+
 /// Solves for the sheets, with friction and with other vertices and pairs of sheets held
-/// (self_contact.h) until these are the right ones, or nearly.
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
-                     const ContactTolerances& tolerance);
+/// (self_contact.h) until these are the right ones, or nearly. Whether any of that changed.
+bool settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     const ContactTolerances& tolerance, const Settling& settling);
 
 /// What obstacles make of the step's end in ClothState::next: the surface's velocity, the guard,
 /// and their own impulse.

@@ -69,12 +69,7 @@ void find_reactions(State& state, const ConstVecView& given) {
 
 /// Lets go the axes along which a wall pulls, where sheets lie on sheets: alone each of them would
 /// have gone to the wall. Holds what went through it. Whether anything changed.
-///
-/// Beside fluid walls and obstacles let go nothing within a step: pressures were found against
-/// sheets that are held there, and on one that is not they do work without end. The next step,
-/// which knows these pressures, does not hold what they lift
-/// (docs/decisions/0036-held-beside-fluid.md).
-bool revise_walls(State& state, int round) {
+bool revise_walls(State& state, int round, const Settling& settling) {
   const ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
   const WallRevision revise{.walls = cloth_walls_of(state.parameters),
@@ -91,7 +86,7 @@ bool revise_walls(State& state, int round) {
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),
                             .reach = state.parameters.spacing,
-                            .release = round < 3 && state.contact.near == 0};
+                            .release = round < 3 && settling.lets_go};
   return parallel_reduce(
              state.queue, "cloth: revise walls", c.vertices, 0,
              DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
@@ -100,7 +95,7 @@ bool revise_walls(State& state, int round) {
 /// Lets go what pulls off by the solve that was made, holds what comes too near, and finds who
 /// sticks and who slides; whether anything changed. Springs that were let go are not held again in
 /// the step: the guard stops them.
-bool revise_holds(State& state, const ConstVecView& given, int round) {
+bool revise_holds(State& state, const ConstVecView& given, int round, const Settling& settling) {
   ClothState& c = state.cloth;
   ClothSystem& s = state.cloth_system;
   const HoldRevision revise{.hold = cloth_hold_of(state),
@@ -118,7 +113,8 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
                             .inverse_mass = c.inverse_mass.data(),
                             .dt = float(state.dt),
                             .round = round,
-                            .lets_go = state.contact.near == 0};
+                            .lets_go = settling.lets_go,
+                            .finds_friction = settling.finds_friction};
   return parallel_reduce(
              state.queue, "cloth: revise", c.vertices, 0,
              DRENCH_LAMBDA(int i) { return int(revise(i)); }, Larger{}) > 0;
@@ -126,14 +122,14 @@ bool revise_holds(State& state, const ConstVecView& given, int round) {
 
 /// Whether who is held, who slides and which pairs of sheets meet change by the solve that was
 /// made.
-bool revise_contacts(State& state, const ConstVecView& given, int round) {
+bool revise_contacts(State& state, const ConstVecView& given, int round, const Settling& settling) {
   const bool obstacles = state.parameters.obstacles > 0, sheets = state.self_contact.rows > 0,
              walls = sheets || state.shell.any;
   if (!obstacles && !walls) return false;
   find_reactions(state, given);
-  bool changed = obstacles && revise_holds(state, given, round);
-  const bool at_walls = walls && revise_walls(state, round);
-  if (sheets) changed |= revise_sheet_rows(state, round);
+  bool changed = obstacles && revise_holds(state, given, round, settling);
+  const bool at_walls = walls && revise_walls(state, round, settling);
+  if (sheets) changed |= revise_sheet_rows(state, round, settling);
   if (changed || at_walls) drop_cloth_factor(state);
   ClothLevels& levels = state.cloth_levels;
   if ((changed || at_walls) && levels.on) levels.on = !anything_touches(state);
@@ -142,7 +138,8 @@ bool revise_contacts(State& state, const ConstVecView& given, int round) {
   return changed || at_walls;
 }
 
-/// Whether an obstacle, another piece of a sheet or a wall holds anything.
+}  // namespace
+
 bool anything_is_met(const State& state) {
   if (anything_touches(state)) return true;
   const ConstVecView free = state.cloth_system.free.view();
@@ -154,6 +151,8 @@ bool anything_is_met(const State& state) {
              },
              Larger{}) > 0;
 }
+
+namespace {
 
 /// Whether triangles are to be linearised anew about where the solve that was made ends, of
 /// Newton's method on the energy, which a step is cut short for that would raise it.
@@ -167,22 +166,33 @@ bool relinearise(State& state, const ConstVecView& right, bool more) {
   return true;
 }
 
+/// What is given, and the friction of what obstacles hold, into ClothSystem::answer.
+void start_right_side(State& state, const ConstVecView& given) {
+  ClothSystem& s = state.cloth_system;
+  const VecView right = s.answer.view();
+  const bool obstacles = state.parameters.obstacles > 0;
+  const ConstVecView rub = s.rub.view();
+  const int *grip = s.grip.data(), vertices = state.cloth.vertices;
+  parallel_for(
+      state.queue, "cloth: given", state.cloth.padded, DRENCH_LAMBDA(int i) {
+        const bool rubs = obstacles && i < vertices && grip[i] >= 0;
+        right.set(i, rubs ? given[i] + rub[i] : given[i]);
+      });
+}
+
 }  // namespace
 
-void settle_contacts(State& state, const ConstVecView& given, int most_iterations,
-                     const ContactTolerances& tolerance) {
+bool settle_contacts(State& state, const ConstVecView& given, int most_iterations,
+                     const ContactTolerances& tolerance, const Settling& settling) {
   // What nothing meets is nearly linear, and what fluid presses stays what the pressure solve saw.
   const bool obstacles = state.parameters.obstacles > 0, shells = state.shell.any,
              newton = shells && state.contact.near == 0;
   constexpr int most_searches = 8, most_linearisations = 24;
   constexpr float loose = 30.f;  // until contacts and triangles are the right ones
   const int most_rounds = newton ? 20 : 6;
-  const VecView right = state.cloth_system.answer.view(), change = state.cloth_system.change.view(),
-                from = state.shell.from.view();
-  const ConstVecView rub = state.cloth_system.rub.view();
-  parallel_for(
-      state.queue, "cloth: given", state.cloth.padded,
-      DRENCH_LAMBDA(int i) { right.set(i, obstacles ? given[i] + rub[i] : given[i]); });
+  const ConstVecView right = state.cloth_system.answer.view();
+  const VecView change = state.cloth_system.change.view(), from = state.shell.from.view();
+  start_right_side(state, given);
   const auto all_sweeps = [&] { return value_at(state.cloth_system.control, 0).sweeps; };
   int& linearised = state.shell.linearised = 1;
   bool met = newton && anything_is_met(state), exact = !met;
@@ -200,10 +210,10 @@ void settle_contacts(State& state, const ConstVecView& given, int most_iteration
         searches < most_searches && linearised < most_linearisations && sweeps < most_iterations;
     if (met && sweeps > 0 && relinearise(state, right, more)) {
       ++searches, exact = false;
-    } else if (round < most_rounds && revise_contacts(state, given, round)) {
+    } else if (round < most_rounds && revise_contacts(state, given, round, settling)) {
       ++round, searches = 0, met = newton, exact = !newton;
     } else if (exact) {
-      return;
+      return round > 0;
     } else {
       exact = true;
     }

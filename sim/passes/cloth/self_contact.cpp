@@ -227,6 +227,7 @@ struct RowRevision {
   ConstVecView change;
   float inverse_dt, dt;
   int round;
+  bool lets_go, finds_friction;
 
   /// Whether anything is to change.
   DRENCH_HD bool operator()(SheetRow& r) const {
@@ -247,12 +248,13 @@ struct RowRevision {
       return true;
     }
     if (force < 0.f) {
-      if (r.released > 1) return false;  // it would come too near once more
+      if (!lets_go || r.released > 1) return false;  // it would come too near once more
       r.stiffness = r.grip = 0.f, r.rub = {0.f, 0.f, 0.f};
       ++r.released;
       return true;
     }
-    return r.friction > 0.f && rubs(r, off_normal(s, r.normal), r.friction * force);
+    return finds_friction && r.friction > 0.f &&
+           rubs(r, off_normal(s, r.normal), r.friction * force);
   }
   /// @param s  m, across the normal. @param most  kg m
   DRENCH_HD bool rubs(SheetRow& r, Vec3<float> s, float most) const {
@@ -350,11 +352,16 @@ void start_sheet_rows(State& state) {
   put_rows_in_blocks(state);
 }
 
-bool revise_sheet_rows(State& state, int round) {
+bool revise_sheet_rows(State& state, int round, const Settling& settling) {
   SelfContact& s = state.self_contact;
   if (s.rows == 0) return false;
   const float dt = float(state.dt);
-  const RowRevision revise{state.cloth_system.change.view(), 1.f / dt, dt, round};
+  const RowRevision revise{.change = state.cloth_system.change.view(),
+                           .inverse_dt = 1.f / dt,
+                           .dt = dt,
+                           .round = round,
+                           .lets_go = settling.lets_go,
+                           .finds_friction = settling.finds_friction};
   SheetRow* row = s.row.data();
   const bool changed = parallel_reduce(
                            state.queue, "self: revise", s.rows, 0,

@@ -88,9 +88,18 @@ inline SheetRows sheet_rows_of(const State& state) {
 /// system from the start. After linearise_cloth.
 void start_sheet_rows(State& state);
 
+/// What rounds of the sheets' solve may change beside what they take in. With fluid near, sheets
+/// are settled under the last step's pressures, to find what is let go, before the new ones are
+/// found, and under these with all of it held: pressures that were found against what holds a sheet
+/// do work without end on one that is let go (docs/decisions/0037-settled-before-pressures.md).
+struct Settling {
+  bool lets_go = true;         // what pulls
+  bool finds_friction = true;  // which the pressure solve does not know of
+};
+
 /// Lets go the rows that pull by the solve that was made, takes in what came too near, and finds
 /// who sticks and who slides; the right sides follow. Whether anything changed.
-bool revise_sheet_rows(State& state, int round);
+bool revise_sheet_rows(State& state, int round, const Settling& settling);
 
 /// Rows that bear, and vertices that obstacles hold.
 ClothContacts count_cloth_contacts(const State& state);

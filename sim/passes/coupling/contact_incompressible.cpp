@@ -190,21 +190,43 @@ void add_cloth_to_diagonal(State& state) {
       });
 }
 
-}  // namespace
-
-void start_cloth(State& state) {
-  ClothSystem& s = state.cloth_system;
-  load_by_pressures(state);
-  sum_loads(state, Base::none);
-  hold_at_walls(state);
-  if (state.parameters.obstacles > 0) hold_at_obstacles(state);
-  add_cloth_to_diagonal(state);
-  sum_loads(state, Base::none);
-  if (!factor_cloth(state)) build_cloth_levels(state);
+/// From what the sweeps' tolerance counts: loads and the sheets' own forces.
+void set_reference(State& state) {
+  const ClothSystem& s = state.cloth_system;
   const ScaledClothMatrix matrix = scaled_cloth_matrix(state);
   add_to_reference(state, matrix, s.right.view(), 0.f, state.shell.any ? quiet_speed : 0.);
   add_to_reference(state, matrix, s.base.view(), 1.f, 0.);
   add_pins_to_reference(state);
+}
+
+void factor_or_build_levels(State& state) {
+  if (!factor_cloth(state)) build_cloth_levels(state);
+}
+
+/// Lets go what pulls and holds what comes too near under the pressures of the last step. Whether
+/// the factor or the levels are to be made anew.
+bool settle_before_pressures(State& state) {
+  factor_or_build_levels(state);
+  set_reference(state);
+  sum_loads(state, Base::own);
+  return settle_contacts(state, state.cloth_system.right.view(), last_sweeps,
+                         {.first = last_tolerance, .between = last_tolerance},
+                         {.lets_go = true, .finds_friction = false});
+}
+
+}  // namespace
+
+void start_cloth(State& state) {
+  load_by_pressures(state);
+  sum_loads(state, Base::none);
+  hold_at_walls(state);
+  if (state.parameters.obstacles > 0) hold_at_obstacles(state);
+  const bool settles = state.shell.any && anything_is_met(state),
+             anew = !settles || settle_before_pressures(state);
+  add_cloth_to_diagonal(state);
+  sum_loads(state, Base::none);
+  if (anew) factor_or_build_levels(state);
+  set_reference(state);
 }
 
 void respond_cloth(State& state, int sweeps, float tolerance) {
@@ -248,7 +270,7 @@ void settle_cloth(State& state) {
   }
   // No shift of the whole closes the momentum of a sheet that is held: to a tenth.
   settle_contacts(state, given, last_sweeps,
-                  {.first = last_tolerance, .between = 0.1f * last_tolerance});
+                  {.first = last_tolerance, .between = 0.1f * last_tolerance}, {.lets_go = !near});
   balance_loose_cloth(state, s.change.view(), given);
 }
 
