@@ -15,7 +15,9 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <map>
 #include <new>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -357,41 +359,94 @@ class ExrReader {
   uint64_t transparent_ = 0;
 };
 
-/// OpenEXR takes the memory that an attribute asks for before it finds that the file ends.
-void check_attribute_sizes(const PictureFile& file) {
-  const std::vector<std::byte>& bytes = file.bytes();
-  size_t at = 8;  // after the magic number and the version
-  const auto text = [&] {
-    std::string found;
-    while (at < bytes.size() && bytes[at] != std::byte(0)) found += char(bytes[at++]);
-    ++at;
-    return found;
-  };
-  // Headers of parts follow each other; what is not a name ends them, or the reader says why not.
-  while (at < bytes.size() && bytes[at] != std::byte(0)) {
-    const std::string name = text();
-    text();
-    int32_t size = 0;
-    if (at + sizeof size > bytes.size()) return;
-    std::memcpy(&size, &bytes[at], sizeof size);
-    at += sizeof size;
-    if (size < 0 || size_t(size) > bytes.size() - at)
-      file.fail(
-          fmt::format("it is damaged or cut off: its attribute {} asks for {} bytes where {} are "
-                      "left; write it "
-                      "again or give another",
-                      printable(name, Lines::one), size, bytes.size() - at));
-    at += size_t(size);
-    const bool parts = (std::to_integer<int>(bytes[5]) & 0x10) != 0;
-    if (parts && at < bytes.size() && bytes[at] == std::byte(0)) ++at;
-  }
+/// Bytes of an attribute of a type whose size OpenEXR knows by itself, and does not read.
+std::optional<size_t> size_of_type(const std::string& type) {
+  static const std::map<std::string, size_t> sizes{
+      {"box2i", 16},      {"box2f", 16},    {"chromaticities", 32},
+      {"compression", 1}, {"double", 8},    {"deepImageState", 1},
+      {"envmap", 1},      {"float", 4},     {"int", 4},
+      {"keycode", 28},    {"lineOrder", 1}, {"m33f", 36},
+      {"m33d", 72},       {"m44f", 64},     {"m44d", 128},
+      {"rational", 8},    {"timecode", 8},  {"tiledesc", 9},
+      {"v2i", 8},         {"v2f", 8},       {"v2d", 16},
+      {"v3i", 12},        {"v3f", 12},      {"v3d", 24}};
+  const auto found = sizes.find(type);
+  if (found == sizes.end()) return {};
+  return found->second;
 }
+
+/// Walks the headers of an EXR before OpenEXR does, which takes the memory that an attribute asks
+/// for before it finds that the file ends.
+class HeaderWalk {
+ public:
+  explicit HeaderWalk(const PictureFile& file) : file_(file), bytes_(file.bytes()) {}
+
+  void check() {
+    // Headers of parts follow each other; what is not a name ends them, or the reader says why not.
+    while (at_ < bytes_.size() && bytes_[at_] != std::byte(0)) {
+      const std::string name = text(), type = text();
+      if (at_ + sizeof(int32_t) > bytes_.size()) return;
+      const int32_t size = number();
+      if (size < 0 || size_t(size) > bytes_.size() - at_)
+        fail(name, fmt::format("asks for {} bytes where {} are left", size, bytes_.size() - at_));
+      const std::optional<size_t> real = real_size(type, size_t(size));
+      if (real && *real != size_t(size))
+        fail(name, fmt::format("of type {} says that it has {} bytes, and has {}",
+                               printable(type, Lines::one), size, *real));
+      at_ += size_t(size);
+      const bool parts = (std::to_integer<int>(bytes_[5]) & 0x10) != 0;
+      if (parts && at_ < bytes_.size() && bytes_[at_] == std::byte(0)) ++at_;
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& name, const std::string& why) const {
+    file_.fail(
+        fmt::format("it is damaged or cut off: its attribute {} {}; write it again or give "
+                    "another",
+                    printable(name, Lines::one), why));
+  }
+  std::string text() {
+    std::string found;
+    while (at_ < bytes_.size() && bytes_[at_] != std::byte(0)) found += char(bytes_[at_++]);
+    ++at_;
+    return found;
+  }
+  int32_t number() {
+    int32_t value = 0;
+    std::memcpy(&value, &bytes_[at_], sizeof value);
+    at_ += sizeof value;
+    return value;
+  }
+
+  /// What OpenEXR will read of an attribute, whatever it says; none: what it says.
+  std::optional<size_t> real_size(const std::string& type, size_t size) {
+    if (type != "chlist" && type != "preview") return size_of_type(type);
+    const size_t begin = at_, end = at_ + size;
+    size_t real = 0;
+    if (type == "preview") {
+      if (size < 8) return 8;
+      const auto width = uint32_t(number()), height = uint32_t(number());
+      real = size_t(8) + 4 * size_t(width) * height;
+    } else {
+      constexpr size_t channel = 16;  // bytes behind a name
+      while (at_ < end && bytes_[at_] != std::byte(0)) text(), at_ += channel;
+      real = at_ + 1 - begin;
+    }
+    at_ = begin;
+    return real;
+  }
+
+  const PictureFile& file_;
+  const std::vector<std::byte>& bytes_;
+  size_t at_ = 8;  // after the magic number and the version
+};
 
 }  // namespace
 
 Raster read_exr_picture(const PictureFile& file) {
   try {
-    check_attribute_sizes(file);
+    HeaderWalk(file).check();
     return ExrReader(file).read();
   } catch (const Error&) {
     throw;

@@ -342,6 +342,34 @@ TEST_F(ExrPicture, AttributeLargerThanTheFileIsRefused) {
   }
 }
 
+// OpenEXR reads of these types what they take and not what they say: what follows would be read as
+// attributes that nobody checked, here one that asks for 2 GB.
+TEST_F(ExrPicture, AttributeThatLiesAboutItsSizeIsRefused) {
+  using namespace std::string_literals;
+  const auto attribute = [](const std::string& name, const std::string& type, uint32_t size,
+                            const std::string& bytes) {
+    std::string text = name + '\0' + type + '\0';
+    for (int k = 0; k < 4; ++k) text += char(size >> 8 * k & 0xff);
+    return text + bytes;
+  };
+  const std::string greedy = attribute("b", "string", 0x7fffffff, ""),
+                    channel = "R\0"s + std::string(16, '\2') + '\0';
+  for (const auto& [type, real] : {std::pair{"box2i"s, std::string(16, '\1')},
+                                   {"float"s, std::string(4, '\1')},
+                                   {"compression"s, std::string(1, '\0')},
+                                   {"chlist"s, channel},
+                                   {"preview"s, "\1\0\0\0\1\0\0\0rgba"s}}) {
+    const std::string hidden = real + greedy;
+    const auto path = folder_ / "liar.exr";
+    std::ofstream(path, std::ios::binary)
+        << "\x76\x2f\x31\x01\2\0\0\0"s + attribute("a", type, uint32_t(hidden.size()), hidden) +
+               std::string(8, '\0');
+    EXPECT_TRUE(
+        tells(error_of([&] { read_texture(path); }), {"liar.exr", "attribute a of type " + type}))
+        << type;
+  }
+}
+
 TEST_F(ExrPicture, NormalsAreNotConverted) {
   const auto path = write_part({{"R", "G", "B"}});
   const Texture normals = read_normal_map(path);
