@@ -156,7 +156,7 @@ std::string guess_of_unit(const Domain& domain, const V3d& low, const V3d& high,
   const std::string sizes =
       fmt::format("the mesh is {} wide in a domain of {}", text(longest), text(width));
   for (const auto& [unit, scale] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
-    if (longest * scale > 1.5 * width) continue;
+    if (longest * scale > 2 * width) continue;
     return fmt::format("{}: are these {}? {} {}", sizes, unit, remedy, scale);
   }
   return sizes + ": is its scale right?";

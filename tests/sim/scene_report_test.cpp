@@ -175,7 +175,7 @@ TEST(SceneReport, GuessesCentimetresAndNotAWideGround) {
   expect_words(sim::guess_of_unit(domain, V3d(-8, 0, -8), V3d(8, 24, 8)),
                {"24 m wide in a domain of 0.65 m", "centimetres", "scale = 0.01"});
   expect_words(sim::guess_of_unit(domain, V3d(-60), V3d(60)), {"0.12 km", "centimetres"});
-  expect_words(sim::guess_of_unit(domain, V3d(-100), V3d(100)), {"millimetres", "scale = 0.001"});
+  expect_words(sim::guess_of_unit(domain, V3d(-70), V3d(70)), {"millimetres", "scale = 0.001"});
   EXPECT_EQ(sim::guess_of_unit(domain, V3d(-10, -0.2, -10), V3d(10, 0, 10)), "");
   EXPECT_EQ(sim::guess_of_unit(domain, V3d(-1), V3d(1)), "");
 }
