@@ -199,7 +199,7 @@ Plan make_all(const Job& job, const ShotArguments& arguments, Manifest& manifest
 }
 
 /// Opens the manifest for a run, without the lines of it that are damaged.
-void open(Manifest& manifest, const fs::path& folder, bool alone) {
+void open_without_damage(Manifest& manifest, const fs::path& folder, bool alone) {
   if (!alone)
     manifest.open_for_append();  // cuts off what another was killed in, not what it writes
   if (const int damaged = manifest.damaged_lines(); damaged > 0) {
@@ -224,7 +224,7 @@ void make_command(const ShotArguments& arguments, const std::vector<Step>& steps
   std::optional<SimulationLock> simulation_lock;
   if (arguments.shared && job.targets.includes(Step::simulate)) simulation_lock.emplace(job.folder);
   Manifest manifest(job.folder / layout::manifest);
-  open(manifest, job.folder, !arguments.shared);
+  open_without_damage(manifest, job.folder, !arguments.shared);
   try {
     if (arguments.verify) drop_all_damaged(job.folder, manifest);
     const Plan plan = make_all(job, arguments, manifest);

@@ -4,34 +4,14 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/log.h"
-#include "pipeline/contract/shot/shot_file.h"
+#include "tests/contract/warned.h"
 
 namespace drench {
 namespace {
 
-/// Texts of all warnings of a pool and a sheet with more of a shot behind it.
-std::string warned(const std::string& more) {
-  forget_warnings();
-  testing::internal::CaptureStderr();
-  const Shot shot = parse_shot(R"(
-[fluid]
-spacing = 0.05
-[[fluid.box]]
-min = [0, 0, 0]
-max = [1, 0.3, 1]
-)" + more,
-                               "pool.toml");
-  warn_of_units(shot);
-  testing::internal::GetCapturedStderr();
-  std::string all;
-  for (const LoggedWarning& warning : logged_warnings()) all += warning.text + "\n";
-  forget_warnings();
-  return all;
-}
-bool tells(const std::string& text, const std::string& word) {
-  return text.find(word) != std::string::npos;
-}
+using test::tells;
+
+std::string warned(const std::string& more) { return test::warned_of_pool(warn_of_units, more); }
 
 TEST(Units, OfAPlainShotAreFine) { EXPECT_EQ(warned("[[cloth]]\n"), ""); }
 

@@ -4,41 +4,20 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/log.h"
-#include "pipeline/contract/shot/shot_file.h"
+#include "tests/contract/warned.h"
 
 namespace drench {
 namespace {
 
-/// Texts of all warnings of a pool in a tank of 1 m with more of a shot behind it.
+using test::tells;
+
 std::string warned(const std::string& more) {
-  forget_warnings();
-  testing::internal::CaptureStderr();
-  const Shot shot = parse_shot(R"(
-[domain]
-min = [0, 0, 0]
-max = [1, 1, 1]
-[fluid]
-spacing = 0.05
-[[fluid.box]]
-min = [0, 0, 0]
-max = [1, 0.3, 1]
-)" + more,
-                               "pool.toml");
-  warn_of_empty_pictures(shot);
-  testing::internal::GetCapturedStderr();
-  std::string all;
-  for (const LoggedWarning& warning : logged_warnings()) all += warning.text + "\n";
-  forget_warnings();
-  return all;
+  return test::warned_of_pool(warn_of_empty_pictures, more);
 }
 
 constexpr const char* sky = "[[light]]\ntype = \"environment\"\n";
 std::string camera(const char* position, const char* target) {
   return std::string("[camera]\nposition = ") + position + "\ntarget = " + target + "\n";
-}
-bool tells(const std::string& text, const char* word) {
-  return text.find(word) != std::string::npos;
 }
 
 TEST(Views, OfAPoolUnderASkyAreFine) { EXPECT_EQ(warned(sky), ""); }

@@ -49,12 +49,15 @@ TEST(Watch, FollowsARun) {
   const std::string state = watched.body(watched.root + "state");
   EXPECT_EQ(watched.data()["state"], state);
   EXPECT_EQ(watched.data()["images"].size(), 2u);
+  EXPECT_NE(watched.body(watched.root).find("<progress value=\"2\" max=\"4\">"), std::string::npos);
   EXPECT_TRUE(is_jpeg(watched.body(watched.address("a1002"))));
   EXPECT_EQ(watched.body(watched.root + "state"), state) << "nothing has happened";
   const std::string first = watched.address("a1001");
   ASSERT_EQ(watched.shot.run("run").code, 0);
   EXPECT_NE(watched.body(watched.root + "state"), state);
   EXPECT_EQ(watched.data()["images"].size(), 4u);
+  EXPECT_NE(watched.body(watched.root).find("<progress value=\"4\" max=\"4\">"), std::string::npos);
+  EXPECT_EQ(watched.body(watched.root).find("<progress value=\"2\""), std::string::npos);
   EXPECT_EQ(watched.address("a1001"), first) << "a frame that stays is not sent again";
   watched.program->send(SIGTERM);
   EXPECT_EQ(watched.program->wait().code, 0);
