@@ -43,6 +43,13 @@ target_compile_definitions(httplib::httplib INTERFACE
   CPPHTTPLIB_OPENSSL_SUPPORT CPPHTTPLIB_ZLIB_SUPPORT CPPHTTPLIB_BROTLI_SUPPORT)
 target_link_libraries(httplib::httplib INTERFACE Threads::Threads)
 
+# The config of Debian's package names static libraries that the package has not.
+find_path(OPENSUBDIV_INCLUDE opensubdiv/far/primvarRefiner.h REQUIRED)
+find_library(OPENSUBDIV_LIBRARY osdCPU REQUIRED)
+add_library(OpenSubdiv::osdCPU UNKNOWN IMPORTED)
+set_target_properties(OpenSubdiv::osdCPU PROPERTIES
+  IMPORTED_LOCATION ${OPENSUBDIV_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${OPENSUBDIV_INCLUDE})
+
 # Debian ships no OpenVDBConfig and its FindOpenVDB asks for Boost libraries that are not needed:
 # the library and its headers are enough.
 find_path(OPENVDB_INCLUDE openvdb/openvdb.h REQUIRED)

@@ -14,6 +14,7 @@ drench_packages=(
   "libboost-iostreams-dev:/usr/include/boost/iostreams/stream.hpp"
   "libembree-dev:/usr/include/embree3/rtcore.h /usr/include/embree4/rtcore.h"
   "libopenexr-dev:/usr/include/OpenEXR/ImfRgbaFile.h"
+  "libosd-dev:/usr/include/opensubdiv/far/primvarRefiner.h"
   "libimath-dev:/usr/include/Imath/ImathVec.h"
   "libtbb-dev:/usr/include/tbb/task_arena.h"
   "libpng-dev:/usr/include/png.h"

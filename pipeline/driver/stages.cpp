@@ -11,6 +11,7 @@
 #include "pipeline/contract/files/particles_file.h"
 #include "pipeline/contract/geometry/level_set.h"
 #include "pipeline/contract/geometry/obstacle.h"
+#include "pipeline/contract/geometry/subdivision.h"
 #include "pipeline/driver/contact_sheet.h"
 #include "pipeline/driver/layout.h"
 #include "pipeline/driver/movie.h"
@@ -133,6 +134,14 @@ class ShotSimulation final : public Simulation {
   bool fluid_;
 };
 
+/// As it is meshed and drawn. Contact keeps it half its thickness from what it meets.
+TriangleMesh sheet_of(const Cloth& cloth, const fs::path& folder, int frame) {
+  const TriangleMesh mesh = read_mesh(folder / layout::cloth(cloth.name, frame));
+  const int levels =
+      cloth.subdivision < 0 ? automatic_levels(mesh.triangle.size()) : cloth.subdivision;
+  return subdivided(mesh, levels, float(cloth.thickness / 2));
+}
+
 class ShotStages final : public Stages {
  public:
   ShotStages(const Shot& shot, const StageOptions& options)
@@ -155,8 +164,7 @@ class ShotStages final : public Stages {
   StageReport mesh(const fs::path& folder, int frame) override {
     const ParticleFrame particles = read_particles(folder / layout::particles(frame));
     std::vector<TriangleMesh> sheets, obstacles;
-    for (const Cloth& cloth : shot_.cloth)
-      sheets.push_back(read_mesh(folder / layout::cloth(cloth.name, frame)));
+    for (const Cloth& cloth : shot_.cloth) sheets.push_back(sheet_of(cloth, folder, frame));
     for (const Obstacle& obstacle : shot_.obstacle)
       obstacles.push_back(obstacle_surface(shot_, obstacle, frame));
     Surroundings around{sheets, obstacles, {}};
@@ -214,9 +222,8 @@ class ShotStages final : public Stages {
     if (shot_.fluid.present()) geometry.fluid = read_mesh(folder / layout::fluid_mesh(frame));
     if (shot_.foam.present && shot_.fluid.present())
       geometry.foam = read_foam(folder / layout::foam(frame));
-    for (const Cloth& cloth : shot_.cloth) {
-      geometry.cloth.push_back({cloth.name, read_mesh(folder / layout::cloth(cloth.name, frame))});
-    }
+    for (const Cloth& cloth : shot_.cloth)
+      geometry.cloth.push_back({cloth.name, sheet_of(cloth, folder, frame)});
     for (const Obstacle& obstacle : shot_.obstacle) {
       if (obstacle.visible)
         geometry.obstacle.push_back({obstacle.name, obstacle_surface(shot_, obstacle, frame)});

@@ -138,7 +138,7 @@ StageKey foam_key(const Shot& shot) {
 
 StageKey mesh_key(const Shot& shot) {
   StageKeyBuilder builder("mesh", build_id::mesh,
-                          sections_of(shot, {"surface", "obstacle", "ground"}));
+                          sections_of(shot, {"surface", "cloth", "obstacle", "ground"}));
   builder.settings(stage_settings_digest(shot, Stage::mesh));
   add_obstacle_meshes(shot, builder);
   return builder.finish();
@@ -155,7 +155,7 @@ std::string denoiser_release(const Shot& shot) {
 StageKey render_key(const Shot& shot, const std::string& denoiser) {
   StageKeyBuilder builder(
       "render", build_id::render,
-      sections_of(shot, {"obstacle", "camera", "light", "material", "ground", "render"}));
+      sections_of(shot, {"cloth", "obstacle", "camera", "light", "material", "ground", "render"}));
   builder.settings(stage_settings_digest(shot, Stage::render))
       .number("fps", shot.timeline.fps)
       .number("first", shot.timeline.first);

@@ -339,6 +339,21 @@ TEST(Program, ReportsFramesBeyondAShortenedRangeAndCleansThem) {
   EXPECT_EQ(run_program(DRENCH_PROGRAM, {"verify", shot.out().string()}, shot.folder()).code, done);
 }
 
+// The caches of the simulation stay; what is meshed against the sheet and the picture of it do not.
+TEST(Program, SubdividesSheetsAfterTheSimulation) {
+  const TinyShot shot(3);
+  ASSERT_EQ(shot.run("run").code, done);
+  const auto smooth = shot.digests();
+  const Ended flat = shot.run("run", {"--set", "cloth.0.subdivision=0"});
+  ASSERT_EQ(flat.code, done) << flat.err;
+  const auto now = shot.digests();
+  for (const auto& [file, digest] : smooth) {
+    if (file.rfind("sim/", 0) == 0) EXPECT_EQ(now.at(file), digest) << file;
+    if (file.rfind("render/", 0) == 0) EXPECT_NE(now.at(file), digest) << file;
+  }
+  EXPECT_EQ(flat.err.find("sim frame="), std::string::npos) << flat.err;
+}
+
 TEST(Program, WritesAStartingShotAndNeverOverOne) {
   const TemporaryFolder folder;
   const std::string name = (folder.path() / "rain").string();

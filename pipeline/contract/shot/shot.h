@@ -226,6 +226,7 @@ struct Cloth {
   double contact_angle_deg = 90;  // of the fluid's surface at it, within the fluid
   std::string material = "cotton";
   Matte matte = Matte::none;
+  int subdivision = -1;  // levels where it is meshed and drawn (subdivision.h); -1: by its size
 };
 
 enum class ObstacleType { plane, box, sphere, mesh };

@@ -153,6 +153,11 @@ std::vector<Parameter> cloth_rows() {
                                      contact_angle_text),
       row<&Cloth::material>("cloth", "material", "", none, render, "name of a [[material]]"),
       row<&Cloth::matte>("cloth", "matte", "", none, render, matte_text),
+      row<&Cloth::subdivision>(
+          "cloth", "subdivision", "", {-1, 4}, mesh | render,
+          "levels of Loop's subdivision in pictures and where fluid is meshed against it, each of "
+          "which divides triangles into 4; nothing moves by half its thickness. 0: as simulated, "
+          "as its files are. -1: 2, or as many as leave it no more than 262,144 triangles"),
 
       row<&ClothPin::vertices>("cloth.pin", "vertices", "", {0, 4294967294.0}, simulate,
                                "indices of vertices that are held"),
