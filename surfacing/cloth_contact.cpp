@@ -127,13 +127,16 @@ size_t move_until_free(LatticeMesh& mesh, const ClothSolids& cloth, F moved) {
 
 bool crosses_cloth(const LatticeMesh& mesh, const Triangle& t, const ClothSolids& cloth) {
   const Corners own{mesh.position[t.x], mesh.position[t.y], mesh.position[t.z]};
+  const TriangleSphere around(own);
   bool crosses = false;
   V3i last(0);
   for (int k = 0; k < 3 && !crosses; ++k) {
     const V3i block = block_of_vertex(mesh, t[k]);
     if (block == std::exchange(last, block) && k > 0) continue;
-    cloth.for_each_near(
-        block, [&](uint32_t s) { crosses = crosses || cross_each_other(own, cloth.corners(s)); });
+    cloth.for_each_near(block, [&](uint32_t s) {
+      if (!crosses && cloth.sphere(s).within(around.center, around.radius))
+        crosses = cross_each_other(own, cloth.corners(s));
+    });
   }
   return crosses;
 }

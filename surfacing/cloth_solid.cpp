@@ -31,8 +31,8 @@ ClothSolids::ClothSolids(std::span<const TriangleMesh> meshes, const BinnedParti
 
 void ClothSolids::cut(V3i block, BlockValues& value, float iso_value) const {
   constexpr float slope = 0.25f;  // of the field in a voxel, about that at a surface
-  std::array<float, block_size> square;
-  square.fill(reach * reach);
+  std::array<float, block_size> distance;
+  distance.fill(reach);
   const V3f origin(block * block_edge);
   for_each_near(block, [&](uint32_t triangle) {
     const auto& t = corners(triangle);
@@ -46,13 +46,14 @@ void ClothSolids::cut(V3i block, BlockValues& value, float iso_value) const {
       for (int y = low.y; y <= high.y; ++y)
         for (int x = low.x; x <= high.x; ++x) {
           const V3f p = origin + V3f(V3i(x, y, z));
-          float& least = square[(static_cast<size_t>(z) * block_edge + y) * block_edge + x];
-          least = std::min(least, (closest_on_triangle(p, t[0], t[1], t[2]) - p).length2());
+          float& least = distance[(static_cast<size_t>(z) * block_edge + y) * block_edge + x];
+          if (!sphere(triangle).within(p, least)) continue;
+          least = std::min(least, (closest_on_triangle(p, t[0], t[1], t[2]) - p).length());
         }
   });
   for (size_t k = 0; k < block_size; ++k) {
-    if (square[k] >= reach * reach) continue;
-    value[k] = std::min(value[k], iso_value + slope * (std::sqrt(square[k]) - gap));
+    if (distance[k] >= reach) continue;
+    value[k] = std::min(value[k], iso_value + slope * (distance[k] - gap));
   }
 }
 

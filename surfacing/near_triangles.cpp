@@ -13,6 +13,10 @@
 
 namespace drench::surfacing {
 
+TriangleSphere::TriangleSphere(const std::array<V3f, 3>& t) : center((t[0] + t[1] + t[2]) / 3) {
+  for (const V3f& p : t) radius = std::max(radius, (p - center).length());
+}
+
 TriangleBox box_of(const std::array<V3f, 3>& t, float grown) {
   TriangleBox box{t[0], t[0]};
   for (const V3f& p : t)
@@ -63,6 +67,7 @@ NearTriangles::NearTriangles(std::span<const TriangleMesh> meshes, const BinnedP
         for (int axis = 0; axis < 3; ++axis)
           corner[c][axis] =
               static_cast<float>(particles.lattice.to_voxels(mesh.position[t[c]][axis], axis));
+      sphere_.emplace_back(corner);
     }
   }
   if (!corner_.empty()) list_near(particles);
@@ -121,8 +126,9 @@ void NearTriangles::list_near(const BinnedParticles& particles) {
 
 Foot NearTriangles::foot(V3i block, const V3f& p) const {
   Foot foot;
-  float least = reach_ * reach_, facing = 0;
+  float least = reach_ * reach_, distance = reach_, facing = 0;
   for_each_near(block, [&](uint32_t triangle) {
+    if (!sphere_[triangle].within(p, distance)) return;
     const auto& t = corner_[triangle];
     const V3f at = closest_on_triangle(p, t[0], t[1], t[2]);
     const float square = (at - p).length2();
@@ -131,7 +137,7 @@ Foot NearTriangles::foot(V3i block, const V3f& p) const {
     const V3f normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
     const float faces = std::abs(normal.dot(p - at));
     if (foot.found() && square > least * (1 - 1e-5f) && faces <= facing) return;
-    least = std::min(least, square), facing = faces;
+    least = std::min(least, square), distance = std::sqrt(least), facing = faces;
     foot.point = at, foot.normal = normal, foot.triangle = triangle;
   });
   if (!foot.found()) return foot;

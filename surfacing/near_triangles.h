@@ -19,6 +19,19 @@ struct Foot {
   bool found() const { return triangle != ~0u; }
 };
 
+/// Sphere around a triangle: most triangles are passed by for it alone.
+struct TriangleSphere {
+  V3f center{0};
+  float radius = 0;
+
+  explicit TriangleSphere(const std::array<V3f, 3>& t);
+  /// Whether some of it may come as near to p as this.
+  bool within(const V3f& p, float distance) const {
+    const float sum = (radius + distance) * (1 + 1e-5f);  // more than rounding
+    return (p - center).length2() <= sum * sum;
+  }
+};
+
 class NearTriangles {
  public:
   NearTriangles() = default;
@@ -41,13 +54,15 @@ class NearTriangles {
     for (uint32_t k = first_[list]; k < first_[list + 1]; ++k) f(member_[k]);
   }
   const std::array<V3f, 3>& corners(uint32_t triangle) const { return corner_[triangle]; }
+  const TriangleSphere& sphere(uint32_t triangle) const { return sphere_[triangle]; }
 
  private:
   void list_near(const BinnedParticles& particles);
 
   float reach_ = 0;
   std::vector<std::array<V3f, 3>> corner_;  // voxels from the lattice's origin
-  BlockMap map_;                            // block -> its list
+  std::vector<TriangleSphere> sphere_;
+  BlockMap map_;  // block -> its list
   std::vector<uint32_t> first_, member_;
 };
 
