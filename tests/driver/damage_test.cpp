@@ -1,11 +1,15 @@
 // Damage that neither size nor time shows, files that cannot be read though they are what was
 // recorded, and files that another user may not read.
+//
+// DRENCH_MUTATIONS=N (default 12) sets how often a file is damaged by chance.
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <regex>
 
 #include "pipeline/driver/layout.h"
@@ -105,6 +109,83 @@ TEST(Damage, RecordedAsItIsIsDroppedAndMadeAgain) {
     EXPECT_EQ(ended.code, 0) << file << ended.err;
     EXPECT_EQ(made.shot().digests(), made.before()) << file;
   });
+}
+
+int wanted_mutations() {
+  const char* text = std::getenv("DRENCH_MUTATIONS");
+  return text ? std::atoi(text) : 12;
+}
+
+/// One of: a bit turned over, a run of bytes by chance, of zeros, or of another place, the end cut
+/// off, bytes after it.
+std::string mutated(std::string bytes, std::mt19937& random) {
+  const auto below = [&](size_t n) { return size_t(random()) % std::max(n, size_t{1}); };
+  const size_t at = below(bytes.size()),
+               length = 1 + below(std::min<size_t>(64, bytes.size() - at));
+  switch (random() % 6) {
+    case 0:
+      bytes[at] = char(bytes[at] ^ 1 << random() % 8);
+      break;
+    case 1:
+      for (size_t k = at; k < at + length; ++k) bytes[k] = char(random());
+      break;
+    case 2:
+      bytes.replace(at, length, length, '\0');
+      break;
+    case 3:
+      bytes.replace(at, length, bytes.substr(below(bytes.size()), length));
+      break;
+    case 4:
+      bytes.resize(at);
+      break;
+    default:
+      bytes += bytes.substr(at);
+  }
+  return bytes;
+}
+
+/// As it was last written, to whom only looks at its time.
+void damage(const fs::path& file, std::mt19937& random) {
+  const auto time = fs::last_write_time(file);
+  std::string bytes = text_of(file), other = bytes;
+  while (other == bytes) other = mutated(bytes, random);
+  put_text(file, other);
+  fs::last_write_time(file, time);
+}
+
+/// Files of the first that are not the same in the second.
+std::vector<std::string> changed(const std::map<std::string, std::string>& before,
+                                 const std::map<std::string, std::string>& now) {
+  std::vector<std::string> files;
+  for (const auto& [file, digest] : before)
+    if (!now.count(file) || now.at(file) != digest) files.push_back(file);
+  return files;
+}
+
+// Whichever file of a folder is damaged, the manifest too, and however much is left of what is made
+// of it: the next run ends well and nothing is made of the damage. A file that no step had to read
+// may stay as it is, and verify says so.
+TEST(Damage, ByChanceIsNeverUsed) {
+  const Made made;
+  std::vector<std::string> files{layout::manifest.data()};
+  for (const auto& [file, digest] : made.before()) files.push_back(file);
+  std::mt19937 random(11);
+  for (int k = 0; k < wanted_mutations(); ++k) {
+    const std::string file = files[random() % files.size()];
+    const std::string what = std::to_string(k) + ": damage of " + file;
+    const std::string sound = text_of(made.path(file));
+    damage(made.path(file), random);
+    forget_beyond(made, random() % 4);
+    const Ended ended = made.shot().run("run");
+    ASSERT_EQ(ended.code, 0) << what << ended.err;
+    const std::vector<std::string> left = changed(made.before(), made.shot().digests());
+    if (left.empty()) continue;
+    ASSERT_EQ(left, std::vector{file}) << what;
+    const Ended verified = verify(made.shot().out());
+    ASSERT_NE(verified.code, 0) << what;
+    ASSERT_NE(verified.out.find(file), std::string::npos) << what << verified.out;
+    put_text(made.path(file), sound);
+  }
 }
 
 TEST(Damage, OfARecordedCheckpointIsDroppedToo) {
