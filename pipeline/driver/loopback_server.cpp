@@ -92,13 +92,14 @@ void serve_page(int port, const std::function<PageAnswer(const PageRequest&)>& a
   const int bound = bind(server, port);
   const std::string token = make_token();
   // Headers of every answer: nobody else may frame the page or learn the token from it.
-  server.set_default_headers({{"Referrer-Policy", "no-referrer"},
-                              {"X-Content-Type-Options", "nosniff"},
-                              {"X-Frame-Options", "DENY"},
-                              {"Cross-Origin-Resource-Policy", "same-origin"},
-                              {"Content-Security-Policy",
-                               "default-src 'none'; connect-src 'self'; img-src 'self'; media-src "
-                               "'self'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"}});
+  server.set_default_headers(
+      {{"Referrer-Policy", "no-referrer"},
+       {"X-Content-Type-Options", "nosniff"},
+       {"X-Frame-Options", "DENY"},
+       {"Cross-Origin-Resource-Policy", "same-origin"},
+       {"Content-Security-Policy",
+        "default-src 'none'; connect-src 'self'; img-src 'self' data:; media-src "
+        "'self'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"}});
   server.Get(".*", [&](const httplib::Request& request, httplib::Response& response) {
     PageAnswer given = answer_to(request, bound, token, answer);
     response.status = given.status;

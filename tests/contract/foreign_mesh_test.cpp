@@ -341,6 +341,20 @@ TEST_F(ForeignMesh, NamesOfWindowsAndPercentSignsAreFound) {
   EXPECT_NE(hint_on_name("box.####.obj").find("%04d"), std::string::npos);
 }
 
+TEST_F(ForeignMesh, StlUnderTheNameOfPlyIsNamed) {
+  const std::string binary =
+      std::string(80, 'x') + std::string("\1\0\0\0", 4) + std::string(50, '\0');
+  for (const std::string& text : {std::string("solid box\nfacet normal 0 0 1\n"), binary})
+    EXPECT_NE(error_of([&] { read("box.ply", text); }).find("looks like STL"), std::string::npos);
+}
+
+TEST_F(ForeignMesh, IndicesFromZeroAreSaidToCountFromOne) {
+  const std::string text =
+      error_of([&] { read("box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n"); });
+  EXPECT_NE(text.find("box.obj:4"), std::string::npos) << text;
+  EXPECT_NE(text.find("count from 1"), std::string::npos) << text;
+}
+
 TEST_F(ForeignMesh, VerticesOnFreeEdgesAreWelded) {
   // Two squares that share the line x = 1, each with vertices of its own there.
   const TriangleMesh mesh = read("two.obj",

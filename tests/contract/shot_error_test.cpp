@@ -485,5 +485,11 @@ TEST_F(ShotError, RefusesExtremesOfEveryNumericKey) {
   EXPECT_GT(keys, 60u);
 }
 
+TEST_F(ShotError, OfAnotherEncodingOrAQuotientSaysWhatToWrite) {
+  const std::string utf16 = error_of([&] { parse_shot("\xff\xfe[\0s", folder_ / "scene.toml"); });
+  EXPECT_NE(utf16.find("UTF-8"), std::string::npos) << utf16;
+  expect_messages({{"[shot]\nfps = 24000/1001\n", {"scene.toml:5", "23.976"}}});
+}
+
 }  // namespace
 }  // namespace drench

@@ -121,7 +121,7 @@ class ObjReader {
     int64_t index = 0;
     const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), index);
     if (code != std::errc() || end != word.data() + word.size() || index == 0) {
-      fail(fmt::format("has an index '{}' that is no whole number other than 0",
+      fail(fmt::format("has an index '{}' that is no whole number other than 0: they count from 1",
                        word.substr(0, 40)));
     }
     index += index < 0 ? int64_t(count) : -1;

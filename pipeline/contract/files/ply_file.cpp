@@ -7,6 +7,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -174,11 +175,22 @@ class PlyReader {
     return line;
   }
 
+  /// As text, or as 80 bytes, a count, and 50 bytes a triangle.
+  bool looks_like_stl() const {
+    uint32_t count = 0;
+    if (text_.starts_with("solid")) return true;
+    if (text_.starts_with("ply") || text_.size() < 84) return false;
+    std::memcpy(&count, text_.data() + 80, 4);
+    return text_.size() == 84 + 50 * uint64_t(count);
+  }
+
   PlyHeader read_header() const {
     PlyHeader header;
     // Binary data may begin with a line feed: the first line says how those of the header end.
     const char end_of_line =
         text_.starts_with("ply\r") && !text_.starts_with("ply\r\n") ? '\r' : '\n';
+    if (looks_like_stl())
+      fail("is not a PLY file but looks like STL, which has no vertices that faces share");
     if (words_of(header_line(header.body, end_of_line)) != std::vector<std::string_view>{"ply"})
       fail("is not a PLY file");
     bool format = false;

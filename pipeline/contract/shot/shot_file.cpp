@@ -316,6 +316,8 @@ class Reader {
 };
 
 toml::table parse_toml(std::string_view text, const std::string& label) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+    throw Error(fmt::format("{}: is UTF-16, and TOML is UTF-8; save it as that", label));
   const size_t stray = find_stray_character(text);
   if (stray != no_stray_character) {
     throw Error(
@@ -326,9 +328,10 @@ toml::table parse_toml(std::string_view text, const std::string& label) {
   try {
     return toml::parse(text, label);
   } catch (const toml::parse_error& problem) {
-    throw Error(
-        shot_table::printable(fmt::format("{}:{}: is not valid TOML: {}", label,
-                                          problem.source().begin.line, problem.description())));
+    const bool quotient = problem.description().find("saw '/'") != std::string_view::npos;
+    throw Error(shot_table::printable(fmt::format(
+        "{}:{}: is not valid TOML: {}{}", label, problem.source().begin.line, problem.description(),
+        quotient ? "; give a quotient as a number, 24000/1001 as 23.976" : "")));
   }
 }
 

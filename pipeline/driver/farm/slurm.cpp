@@ -30,8 +30,10 @@ std::string run(const std::string& program, const std::vector<std::string>& argu
   child.send(input.data(), input.size());
   const int status = child.finish();
   if (status != 0) {
-    throw Error(
-        fmt::format("{} ended with status {}: {}", program, status, last_line(child.errors())));
+    throw Error(fmt::format(
+        "{} ended with status {}: {}. If this machine belongs to no Slurm cluster, work "
+        "on one that does, or give --template openjd for another farm",
+        program, status, last_line(child.errors())));
   }
   return child.output();
 }

@@ -279,14 +279,14 @@ std::string report_page(const ReportData& data, const PageImages& images) {
   const bool live = !images.state.empty();
   std::string text = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title>\n"
+      "<link rel=\"icon\" href=\"data:,\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       // Whatever a name in the shot might say, the page asks nobody else and sends nothing.
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src {}; "
       "media-src {}; {}style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
       "<style>{}</style></head><body>\n",
-      html_text(data.job.shot.name),
-      live ? "'self'" : "data:", live ? "'self'" : "data:", live ? "connect-src 'self'; " : "",
-      report_style);
+      html_text(data.job.shot.name), live ? "'self' data:" : "data:", live ? "'self'" : "data:",
+      live ? "connect-src 'self'; " : "", report_style);
   text += head(data, live) + "<main>\n";
   text += section("warnings", "Warnings of the last run", warnings(data));
   text += section("frames", "Frames", sheet(data, images));

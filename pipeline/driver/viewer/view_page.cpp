@@ -52,7 +52,7 @@ constexpr std::string_view body = R"html(
 std::string view_page() {
   return fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>drench "
-      "view</title>\n"
+      "view</title>\n<link rel=\"icon\" href=\"data:,\">\n"
       "<style>{}</style></head><body>{}<script>{}{}</script></body></html>\n",
       style, body, view_graphics, view_script);
 }

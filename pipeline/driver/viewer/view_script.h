@@ -118,7 +118,7 @@ function meshOf(bytes) {
 inline constexpr std::string_view view_script = R"js(
 const $ = id => document.getElementById(id), slider = document.querySelector('#bar input'), button = document.querySelector('#bar button');
 const root = location.pathname, moving = 300000, resting = 4000000;
-let scene, at = 0, playing = 0, shown = {sheets: []}, asked = 0, eye = {yaw: .6, pitch: .35, distance: 2, target: [0, 0, 0]};
+let scene, at = 0, playing = 0, shown = {sheets: []}, asked = 0, eye = {yaw: .6, pitch: .35, distance: 2, target: [0, 0, 0], half_width: .45};
 window.drench = {get state() { return {frame: scene && scene.frames[at].frame, particles: shown.particles ? shown.particles.count : 0, all: shown.particles ? shown.particles.all : 0, sheets: shown.sheets.filter(Boolean).length, fluid: !!shown.fluid, camera: $('camera').checked, playing: !!playing, error: $('said').textContent}; }};
 const get = async what => {
   const answer = await fetch(root + what);
@@ -162,7 +162,15 @@ function pose() {
   if ($('camera').checked) return frame;
   const {yaw, pitch, distance, target} = eye, c = Math.cos(pitch);
   const forward = scale([Math.sin(yaw) * c, Math.sin(pitch), Math.cos(yaw) * c], -1), right = unit(cross(forward, [0, 1, 0]));
-  return {position: sub(target, scale(forward, distance)), right, up: cross(right, forward), forward, half_width: .45};
+  return {position: sub(target, scale(forward, distance)), right, up: cross(right, forward), forward, half_width: eye.half_width};
+}
+// On from where the shot's camera stands, about what it sees of the middle of the domain.
+function leaveCamera() {
+  if (!$('camera').checked) return;
+  const {position, forward, half_width} = scene.frames[at].camera, middle = scale(add(scene.low, scene.high), .5);
+  const distance = Math.max(dot(sub(middle, position), forward), .1 * Math.hypot(...sub(scene.high, scene.low)));
+  eye = {yaw: Math.atan2(-forward[0], -forward[2]), pitch: Math.asin(-forward[1]), distance, target: add(position, scale(forward, distance)), half_width};
+  $('camera').checked = false;
 }
 function use(name, values) {
   const {program, uniforms} = programs[name]; gl.useProgram(program);
@@ -222,7 +230,7 @@ function draw() {
 }
 canvas.addEventListener('pointermove', event => {
   if (!event.buttons || !scene) return;
-  if ($('camera').checked) $('camera').checked = false;
+  leaveCamera();
   if (event.shiftKey || event.buttons & 6) {
     const p = pose(), by = 2 * p.half_width * eye.distance / innerWidth;
     eye.target = add(eye.target, add(scale(p.right, -event.movementX * by), scale(p.up, event.movementY * by)));
@@ -231,7 +239,7 @@ canvas.addEventListener('pointermove', event => {
   }
   draw();
 });
-canvas.addEventListener('wheel', event => { eye.distance *= Math.exp(.0012 * event.deltaY); draw(); event.preventDefault(); }, {passive: false});
+canvas.addEventListener('wheel', event => { if (!scene) return; leaveCamera(); eye.distance *= Math.exp(.0012 * event.deltaY); draw(); event.preventDefault(); }, {passive: false});
 canvas.addEventListener('contextmenu', event => event.preventDefault());
 slider.addEventListener('input', () => { play(false); show(+slider.value); });
 button.addEventListener('click', () => play(!playing));
