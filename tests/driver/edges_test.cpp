@@ -220,6 +220,49 @@ TEST(Edges, PipesAndFoldersInThePlaceOfInputsAreRefusedAtOnce) {
   }
 }
 
+/// What may stand where a file is named: by name, with a line of control characters in one.
+std::vector<std::string> hostile_paths(const fs::path& folder) {
+  EXPECT_EQ(::mkfifo((folder / "a_pipe").c_str(), 0600), 0);
+  fs::create_directory(folder / "a_folder");
+  fs::create_symlink("a_pipe", folder / "link_to_pipe");
+  fs::create_symlink("nowhere", folder / "dangling");
+  fs::create_symlink("loop_b", folder / "loop_a");
+  fs::create_symlink("loop_a", folder / "loop_b");
+  return {"a_pipe",
+          "a_folder",
+          "link_to_pipe",
+          "dangling",
+          "loop_a",
+          "/dev/zero",
+          "/dev/tty",
+          "../../../../../../../../proc/self/mem",
+          "\\u001b[31mred\\u0007"};
+}
+
+// Nine paths in eight places: each is refused at once, and nothing of it reaches a terminal.
+TEST(Edges, HostilePathsOfInputsAreRefusedAtOnce) {
+  const TinyShot shot(2);
+  std::string whole = text_of(shot.file());
+  const std::string sky = "[[light]]\ntype = \"environment\"\nradiance = [1, 1, 1]\n";
+  whole.replace(whole.find(sky), sky.size(), "");  // of which there may be one
+  const std::vector<std::string> paths = hostile_paths(shot.folder());
+  for (const std::string place :
+       {"[[obstacle]]\nname = \"o\"\ntype = \"mesh\"\nmesh", "[[cloth]]\nname = \"c\"\nmesh",
+        "[[fluid.emitter]]\ntype = \"mesh\"\ncenter = [0, 0.3, 0]\nmesh", "[[fluid.volume]]\nmesh",
+        "[[sink]]\nname = \"s\"\ntype = \"mesh\"\nmesh",
+        "[[light]]\nname = \"l\"\ntype = \"environment\"\nmap",
+        "[[material]]\nname = \"ground\"\ntype = \"diffuse\"\ntexture",
+        "[[material]]\nname = \"ground\"\ntype = \"diffuse\"\nnormal_map"})
+    for (const std::string& path : paths) {
+      put_text(shot.file(), whole + place + " = \"" + path + "\"\n");
+      const Ended ended = in_shell("exec timeout 20 \"$@\"", shot.words("plan"), shot.folder());
+      EXPECT_EQ(ended.code, user_error) << place << ' ' << path << ended.err << ended.out;
+      const std::string named = path.find("red") != path.npos ? "red" : fs::path(path).filename();
+      EXPECT_TRUE(has(ended.err, named)) << place << ' ' << path << ended.err;
+      EXPECT_FALSE(has(ended.err + ended.out, "\x1b")) << place;
+    }
+}
+
 // ---- signals ----
 
 // Hashing 64 GiB takes longer than anyone waits.
