@@ -199,26 +199,6 @@ TEST(Structure, EveryFolderOfSourcesIsDescribed) {
   }
 }
 
-// Files that the guides name by path or by name alone, in backquotes; * and NAME stand for others.
-TEST(Structure, GuidesNameFilesThatExist) {
-  const std::regex named("`([A-Za-z0-9_/.]+\\.(?:h|cpp|cu|py|md|toml))`");
-  const std::vector<std::string> files = sources();
-  for (const char* guide : {"README.md", "CONTRIBUTING.md", "examples/README.md"}) {
-    for (const std::string& line : lines_of(root / guide)) {
-      for (std::sregex_iterator match(line.begin(), line.end(), named), end; match != end;
-           ++match) {
-        const std::string name = (*match)[1];
-        if (name.find("NAME") != std::string::npos) continue;
-        const bool there =
-            fs::exists(root / name) || fs::exists((root / guide).parent_path() / name) ||
-            std::any_of(files.begin(), files.end(),
-                        [&](const std::string& file) { return file.ends_with('/' + name); });
-        EXPECT_TRUE(there) << guide << " names " << name;
-      }
-    }
-  }
-}
-
 // Data that no test compares with say nothing.
 TEST(Structure, EveryFileOfValidationDataIsRead) {
   std::string tests;

@@ -1,0 +1,139 @@
+// Documents: whatever they link to or name is there. Names of tests and decisions too, since a page
+// that sends its reader nowhere is worse than none.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace drench {
+namespace {
+
+namespace fs = std::filesystem;
+const fs::path root = DRENCH_SOURCE_DIR;
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// Of the repository, without what is built in it.
+std::vector<fs::path> files_of(const std::string& extension) {
+  std::vector<fs::path> files;
+  for (auto it = fs::recursive_directory_iterator(root); it != fs::end(it); ++it) {
+    const std::string name = it->path().filename().string();
+    if (it->is_directory() && (name.starts_with("build") || name.starts_with(".") || name == "out"))
+      it.disable_recursion_pending();
+    else if (it->path().extension() == extension)
+      files.push_back(it->path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Outside of code, in which brackets are no links.
+std::string prose(const std::string& text) {
+  static const std::regex fences("```[\\s\\S]*?```"), code("`[^`\\n]*`");
+  return std::regex_replace(std::regex_replace(text, fences, ""), code, "``");
+}
+
+std::vector<std::string> matches(const std::string& text, const std::regex& what) {
+  std::vector<std::string> found;
+  for (std::sregex_iterator it(text.begin(), text.end(), what), end; it != end; ++it)
+    found.push_back((*it)[1]);
+  return found;
+}
+
+/// The anchor of a heading, as GitHub makes it.
+std::string anchor_of(const std::string& heading) {
+  std::string anchor;
+  for (const char c : heading) {
+    if (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-')
+      anchor += char(std::tolower(static_cast<unsigned char>(c)));
+    else if (c == ' ')
+      anchor += '-';
+  }
+  return anchor;
+}
+
+std::set<std::string> anchors_of(const fs::path& file) {
+  static const std::regex heading("(?:^|\\n)#+ ([^\\n]+)");
+  std::set<std::string> anchors;
+  for (const std::string& text : matches(text_of(file), heading)) anchors.insert(anchor_of(text));
+  return anchors;
+}
+
+TEST(Docs, LinkToWhatIsThere) {
+  static const std::regex link("\\]\\(([^)\\s]+)\\)"), image("src=\"([^\"]+)\"");
+  int links = 0;
+  for (const fs::path& file : files_of(".md")) {
+    const std::string text = prose(text_of(file));
+    std::vector<std::string> targets = matches(text, link);
+    for (const std::string& source : matches(text, image)) targets.push_back(source);
+    for (const std::string& target : targets) {
+      if (target.starts_with("http")) continue;
+      ++links;
+      const size_t mark = target.find('#');
+      const std::string path = target.substr(0, mark);
+      const fs::path there = path.empty() ? file : file.parent_path() / path;
+      ASSERT_TRUE(fs::exists(there)) << file << " links to " << target;
+      if (mark == target.npos) continue;
+      EXPECT_TRUE(anchors_of(there).contains(target.substr(mark + 1)))
+          << file << " links to " << target;
+    }
+  }
+  EXPECT_GT(links, 100);
+}
+
+// Sources in backquotes, from the root, from where the page is, or by the end of their path; NAME
+// stands for others.
+TEST(Docs, NameFilesThatExist) {
+  static const std::regex named("`([\\w/.-]+\\.(?:h|cpp|cu|py|md|toml))`");
+  const std::set<std::string> made{"shot.lock.toml", "scene.toml",
+                                   "rain.toml"};  // by runs, by readers
+  std::vector<std::string> files;
+  for (const char* ending : {".h", ".cpp", ".cu", ".py", ".md", ".toml"})
+    for (const fs::path& file : files_of(ending)) files.push_back(file.string());
+  int names = 0;
+  for (const fs::path& page : files_of(".md"))
+    for (const std::string& name : matches(text_of(page), named)) {
+      if (name.find("NAME") != name.npos || made.contains(name)) continue;
+      ++names;
+      EXPECT_TRUE(fs::exists(page.parent_path() / name) ||
+                  std::any_of(files.begin(), files.end(),
+                              [&](const std::string& file) { return file.ends_with('/' + name); }))
+          << page << " names " << name;
+    }
+  EXPECT_GT(names, 500);
+}
+
+// --gtest_filter='Suite.Case*' and `Suite.Case` in backquotes.
+TEST(Docs, NameTestsThatExist) {
+  static const std::regex filter("gtest_filter='?\\*?([A-Z]\\w+)"),
+      declared("\\nTEST(?:_F|_P)?\\((\\w+),"), typed("TYPED_TEST(?:_P)?\\((\\w+),"),
+      instance("INSTANTIATE_TEST_SUITE_P\\(\\s*(\\w+),");
+  std::set<std::string> suites;
+  for (const char* ending : {".cpp", ".cu"})
+    for (const fs::path& file : files_of(ending)) {
+      const std::string text = text_of(file);
+      for (const std::regex& kind : {declared, typed, instance})
+        for (const std::string& suite : matches(text, kind)) suites.insert(suite);
+    }
+  for (const fs::path& file : files_of(".md"))
+    for (const std::string& name : matches(text_of(file), filter))
+      EXPECT_TRUE(
+          std::any_of(suites.begin(), suites.end(),
+                      [&](const std::string& suite) { return suite.find(name) != suite.npos; }))
+          << file << " filters tests by " << name;
+}
+
+}  // namespace
+}  // namespace drench
