@@ -21,7 +21,7 @@ struct Parameters {
   float dynamic_viscosity = 0;  // Pa s, fluid on fluid and on cloth
   float wall_viscosity = 0;     // Pa s, fluid on domain walls: the physical one
   // viscosity of the incompressible solver
-  float viscous_tolerance = 1e-4f;  // RMS of what the solve leaves over RMS of the velocity
+  float viscous_tolerance = 1e-4f;  // residual of the solve over its right side, in RMS
   int most_viscous_iterations = 200;
   bool no_slip = false;                                    // at the domain's walls
   bool no_slip_obstacles = false, no_slip_sheets = false;  // at any of them

@@ -1,7 +1,7 @@
 #pragma once
 // The coupled simulator: SPH fluid and cloth that push each other, frame by frame. By default the
 // fluid is incompressible and the cloth implicit; the method of Harada, Koshizuka, Kawaguchi 2007
-// is there as well. docs/design.md lists equation, file and test.
+// is there as well. docs/theory has its equations, files and tests.
 
 #include <array>
 #include <filesystem>

@@ -47,7 +47,7 @@ void settle_cloth_alone(State& state) {
   finish_cloth(state);
   finish_substep(state.cloth);
 }
-// The paper's voxels have the rest distance between centroids as edge: no reach is added.
+// Voxels as wide as any centroid is from a corner of its triangle: no reach is added.
 void paper_grid(State& state) { build_polygon_grid(state, 0.f); }
 void paper_reaction(State& state) {
   sort_contacts(state, 1e30f);

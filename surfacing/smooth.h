@@ -54,8 +54,8 @@ std::vector<V3f> normals_of(const LatticeMesh& mesh, const VertexRings& rings);
 /// passes over it as a number, and bumps stay removed. Across the normals vertices take the first
 /// few passes only, which even out the triangles. (As many passes back over the displacement as a
 /// vector would let threads one particle wide lose nine tenths of their cross-section, since around
-/// a thread it turns once.) Each part then gets back the volume it had, exactly but for rounding: a
-/// small one (a drop) by scaling, others by an even shift along the normals.
+/// a thread it turns once.) Each part then gets back the volume it had: a small one (a drop) by
+/// scaling, others by an even shift along the normals of half a voxel at most.
 void smooth_mesh(LatticeMesh& mesh, const VertexRings& rings, const Components& parts, int passes);
 
 /// Averages unit normals over the ring, `passes` times (factor 1/2).

@@ -112,7 +112,7 @@ struct WendlandC2 {
     const float beyond = t2 * t2 * t2 * (3.5f - t * (4.5f - 1.5f * t));
     return q < 0.f ? 1.f - beyond : beyond;
   }
-  /// pi times the integral of r W (r - q)^2 from q on, W continued so that moment(-q) =
+  /// 2 pi times the integral of r W (r - q)^2 from q on, W continued so that moment(-q) =
   /// moment(q) + 2 q: what a ball misses of the half-space (passes/obstacle/obstacle_density.h).
   /// Times h^4.
   static DRENCH_HD float moment(float q) {

@@ -25,8 +25,8 @@ struct SheetRestState {
 /// A sheet sleeps once it has come less far than its sleeping speed allows in four windows of half
 /// a second, in the last no farther than in the one before: what grows from little, as buckling
 /// does, is no rest. With it sleeps all that is near it, or nothing does. Nothing sleeps without
-/// gravity: what drifts there has no end. Near are sheets whose bounding boxes come within a
-/// thickness, or that a seam joins. What wakes it is fluid,
+/// gravity: what drifts there has no end. Near are sheets whose bounding boxes come within the sum
+/// of their thicknesses, or that a seam joins. What wakes it is fluid,
 /// an obstacle or a pin that moves, a pin that lets go, or another sheet that is awake.
 class SheetRest {
  public:

@@ -47,7 +47,7 @@ TEST(Coupling, WaterOnLightCottonIsStable) {
   EXPECT_LT(largest_energy(CouplingScheme::exact), energy_of_fall);
 }
 
-// The reason for the mended scheme: with the mass of a particle ten times that of a vertex the
+// The reason for the mended scheme: with the mass of a particle fifty times that of a vertex the
 // published one diverges.
 TEST(Coupling, WaterOnLightCottonBlowsUpAsPublished) {
   EXPECT_GT(largest_energy(CouplingScheme::paper), 10 * energy_of_fall);

@@ -24,8 +24,8 @@ Shot tense_shot(double spacing) {
 }
 
 // Rayleigh 1879, n = 2: omega^2 = 8 sigma / (rho R^3); Laplace: 2 sigma / R. What is left is
-// measured (docs/surface_tension.md): a period of this damped drop varies by a few percent with the
-// packing that it settled into. The forces are equal and opposite: momentum is rounding.
+// measured (docs/theory/surface_tension.md): a period of this damped drop varies by a few percent
+// with the packing that it settled into. The forces are equal and opposite: momentum is rounding.
 TEST(SurfaceTension, ADropHasThePeriodOfRayleighAndThePressureOfLaplace) {
   const validation::Drop drop = validation::oscillating_drop(10);
   EXPECT_NEAR(drop.period, 1, 0.05);
@@ -42,7 +42,8 @@ INSTANTIATE_TEST_SUITE_P(Ends, Cylinder,
                                          validation::Ends::boxes, validation::Ends::sheets));
 
 // In a plane, n = 2: omega^2 = 6 sigma / (rho R^3), jump sigma / R. What is left is measured
-// (docs/surface_tension.md): a cylinder is up to 15 % (period) and 22 % (pressure) off, a ball 2 %.
+// (docs/theory/surface_tension.md): a cylinder is up to 15 % (period) and 22 % (pressure) off, a
+// ball 2 %.
 TEST_P(Cylinder, HasThePeriodAndThePressureOfADropInAPlane) {
   const validation::Drop drop = validation::oscillating_cylinder(10, GetParam());
   RecordProperty("all", std::to_string(drop.period) + " " + std::to_string(drop.jump) + " " +

@@ -39,10 +39,11 @@ std::vector<fs::path> files_of(const std::string& extension) {
   return files;
 }
 
-/// Outside of code, in which brackets are no links.
-std::string prose(const std::string& text) {
-  static const std::regex fences("```[\\s\\S]*?```"), code("`[^`\\n]*`");
-  return std::regex_replace(std::regex_replace(text, fences, ""), code, "``");
+/// Outside of code and formulas, in which brackets are no links.
+std::string prose(std::string text) {
+  for (const char* other : {"```[^`]*```", "`[^`\\n]*`", "\\$\\$[^$]*\\$\\$", "\\$[^$\\n]*\\$"})
+    text = std::regex_replace(text, std::regex(other), "");
+  return text;
 }
 
 std::vector<std::string> matches(const std::string& text, const std::regex& what) {

@@ -119,7 +119,7 @@ struct FluidDrops {  // separate spheres with centres drawn evenly in a box, kep
   int particles = 0;  // if > 0: exactly so many particles in all, lattice balls truncated by radius
 };
 
-/// automatic: incompressible without cloth, weakly compressible with it.
+/// automatic: incompressible, but for the published coupling, which is of the other.
 enum class FluidSolver { automatic, incompressible, weakly_compressible };
 
 struct Fluid {

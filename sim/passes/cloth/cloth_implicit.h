@@ -1,6 +1,6 @@
 #pragma once
-// Implicit Euler of the sheets, linearised once a step about where they are (Baraff and Witkin
-// 1998): with w = x_end - x - dt v, the displacement of a vertex off its straight path,
+// The implicit step of the sheets, linearised once about where they are, of springs implicit Euler
+// (Baraff and Witkin 1998; shells: shell_system.h): with w = x_end - x - dt v, the displacement of a vertex off its straight path,
 //   A w = dt^2 (f(x) + m g + f_owed - m c v) - (dt C + dt^2 K) dt v + loads,   A = m (1 + dt c) +
 //   dt C + dt^2 K + dt B,
 // K of a spring being k (n n^T + max(0, 1 - L/l) (1 - n n^T)): without the part that a compressed

@@ -1,5 +1,5 @@
 #pragma once
-// The coupling as published, kept for comparison; docs/design.md lists what is wrong with it.
+// The coupling as published, kept for comparison; what is wrong with it: docs/theory/harada2007.md.
 
 #include "sim/neighbours/sph_kernels.h"
 #include "sim/passes/coupling/contact_rows.h"

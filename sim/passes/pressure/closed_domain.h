@@ -18,7 +18,7 @@ namespace drench::sim::DRENCH_BACKEND {
 template <class Separation>
 struct Relaxation {
   static constexpr int columns = 1;
-  static constexpr float strength = 0.5f;  // of the way to the middle of the neighbours
+  static constexpr float strength = 0.5f;  // of the way from the mean of the neighbours
   const Float4 *place, *wall;
   Float4* shift;  // m
   Separation separation;

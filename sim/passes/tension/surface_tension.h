@@ -8,11 +8,11 @@
 // Teschner 2013) make a solid of particles at rest; t^2 leaves the surface nearly free of stress
 // along its normal; and w vanishes at the spacing a, where neighbours are. What each particle gets
 // is averaged over its neighbourhood, equal and opposite between neighbours, as w does not know how
-// these stand: without it a drop at rest stirs twice as much.
+// these stand: without it a drop at rest stirs 1.2 to 2.1 times as much.
 //
 // sigma is N/m by one constant k, measured: a drop's period and its inner pressure meet Rayleigh
 // and Laplace with the same one at 10 and 15 spacings to the radius; at 7 pressure is 13 % too high
-// (docs/surface_tension.md).
+// (docs/theory/surface_tension.md).
 // Walls, obstacles and sheets are mirrors: surfaces meet them at a right angle.
 
 #include "sim/passes/pressure/pressure_rows.h"
