@@ -116,24 +116,43 @@ TEST(Docs, NameFilesThatExist) {
   EXPECT_GT(names, 500);
 }
 
-// --gtest_filter='Suite.Case*' and `Suite.Case` in backquotes.
-TEST(Docs, NameTestsThatExist) {
-  static const std::regex filter("gtest_filter='?\\*?([A-Z]\\w+)"),
-      declared("\\nTEST(?:_F|_P)?\\((\\w+),"), typed("TYPED_TEST(?:_P)?\\((\\w+),"),
-      instance("INSTANTIATE_TEST_SUITE_P\\(\\s*(\\w+),");
-  std::set<std::string> suites;
-  for (const char* ending : {".cpp", ".cu"})
+/// "Suite.Case" of all tests.
+std::set<std::string> test_names() {
+  static const std::regex test("TEST(?:_F|_P)?\\(\\s*(\\w+),\\s*(\\w+)\\)");
+  std::set<std::string> names;
+  for (const char* ending : {".cpp", ".cu", ".h"})
     for (const fs::path& file : files_of(ending)) {
       const std::string text = text_of(file);
-      for (const std::regex& kind : {declared, typed, instance})
-        for (const std::string& suite : matches(text, kind)) suites.insert(suite);
+      for (std::sregex_iterator it(text.begin(), text.end(), test), end; it != end; ++it)
+        names.insert((*it)[1].str() + '.' + (*it)[2].str());
     }
-  for (const fs::path& file : files_of(".md"))
-    for (const std::string& name : matches(text_of(file), filter))
-      EXPECT_TRUE(
-          std::any_of(suites.begin(), suites.end(),
-                      [&](const std::string& suite) { return suite.find(name) != suite.npos; }))
-          << file << " filters tests by " << name;
+  return names;
+}
+
+// `Suite.Case` and `Suite.Ca*` in backquotes, and --gtest_filter='Suite...'.
+TEST(Docs, NameTestsThatExist) {
+  static const std::regex quoted("`(?:\\w+/)?([A-Z]\\w+\\.(?:[A-Z]\\w*\\*?|\\*))`"),
+      filter("gtest_filter='?\\*?([A-Z]\\w+)");
+  const std::set<std::string> tests = test_names();
+  const auto any = [&](const auto& holds) {
+    return std::any_of(tests.begin(), tests.end(), holds);
+  };
+  int names = 0;
+  for (const fs::path& page : files_of(".md")) {
+    const std::string text = text_of(page);
+    for (const std::string& name : matches(text, quoted)) {
+      ++names;
+      const std::string start = name.substr(0, name.find('*'));
+      EXPECT_TRUE(start == name ? tests.contains(name) : any([&](const std::string& t) {
+        return t.starts_with(start);
+      })) << page
+          << " names the test " << name;
+    }
+    for (const std::string& part : matches(text, filter))
+      EXPECT_TRUE(any([&](const std::string& t) { return t.find(part) != t.npos; }))
+          << page << " filters tests by " << part;
+  }
+  EXPECT_GT(names, 100);
 }
 
 }  // namespace
