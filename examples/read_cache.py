@@ -5,7 +5,7 @@
     build/bin/drench mesh examples/cloth_and_water.toml --out out/example
     examples/read_cache.py out/example
 
-Meshes are PLY (docs/user_guide.md): a header in text, then columns of the vertices, then triangles.
+Meshes are PLY (docs/guide/other_programs.md): a header in text, then columns of the vertices, then triangles.
 """
 import csv
 import json

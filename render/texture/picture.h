@@ -65,7 +65,7 @@ struct Raster {
 
 size_t bytes_of(Raster::Sample sample);
 
-/// What was left out or guessed is a warning; the table of docs/user_guide.md has the rules.
+/// What was left out or guessed is a warning; docs/guide/materials_and_light.md has the rules.
 /// @param memory  what the file and the samples take is taken from it, what the file took is given
 ///                back.
 /// @throws Error naming the file, what it holds and what to do, if it is no picture that can be

@@ -11,7 +11,7 @@ namespace drench::stress_tests {
 
 /// Nothing but gravity and a spacing; no walls.
 Shot water(double spacing);
-/// Cotton: 0.2 kg/m^2, 6000 N/m, damped as in docs/user_guide.md.
+/// Cotton: 0.2 kg/m^2, 6000 N/m, damped as by default.
 void cotton(Cloth& sheet);
 /// Water of 12 x 5 x 12 particles, 20 mm apart, that falls 0.1 m onto a pinned sheet in a shaft of
 /// 0.32 m. @param mass_ratio  rho a / sigma; 100 is cotton.

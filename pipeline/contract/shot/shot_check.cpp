@@ -156,8 +156,8 @@ class Checker : CheckBase {
     const Fluid& fluid = shot_.fluid;
     if (!is_incompressible(shot_)) {
       fail(key, fmt::format("{} is set but the shot's fluid is weakly compressible, which knows "
-                            "walls at rest only. Use fluid.solver = \"incompressible\" without "
-                            "cloth, or remove it",
+                            "walls at rest only. Use fluid.solver = \"incompressible\", or "
+                            "remove it",
                             key));
     }
     if (fluid.kinematic_viscosity == 0) {
