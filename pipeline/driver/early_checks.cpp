@@ -24,7 +24,7 @@ namespace {
 constexpr double gib = double(1 << 30);
 
 void check_memory(const Shot& shot, double memory_gib) {
-  constexpr double least = 165;  // bytes a particle, of the plainest fluid (docs/benchmarks.md)
+  constexpr double least = 165;  // bytes a particle, of the plainest fluid (docs/benchmarks)
   const double count = particles_at_start(shot), needed = count * least,
                machine = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE)),
                there = memory_gib > 0 ? memory_gib * gib : machine;

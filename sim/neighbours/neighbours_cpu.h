@@ -151,7 +151,7 @@ class Found {
 
 /// Particles in strips a few rows wide, plane after plane: the planes before and behind are still
 /// in the cache when their neighbours come. Without strips an iteration takes a fifth longer
-/// (docs/benchmarks.md, fluid_scaling).
+/// (docs/benchmarks, fluid_scaling).
 inline void order_visits(const GridView& grid, std::vector<NeighbourLists::Range>& visits) {
   constexpr int strip_cells = 320, least_rows = 4, most_particles = 512;
   const GridShape& g = grid.shape;

@@ -51,7 +51,7 @@ std::string where_of(const SourceReport& source) {
 // ---- estimates ----
 
 /// Bytes a particle of all columns, measured at a million of water in a block and at 65,536 on a
-/// sheet (docs/benchmarks.md).
+/// sheet (docs/benchmarks).
 double bytes_a_particle(const Parameters& p, const Scene& scene) {
   return scene.cloth.triangles() > 0 ? 719 : p.incompressible ? 359 : 165;
 }

@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(Shell, StripPool,
                          testing::Combine(testing::Values(ClothModel::shell),
                                           testing::Values(15, 20, 30)));
 
-// Two-dimensional in all that can be measured: see strip_pool.h. Measured: docs/benchmarks.md.
+// Two-dimensional in all that can be measured: see strip_pool.h. Measured: docs/benchmarks.
 TEST_P(StripPool, HangsAsAPlaneChainDoes) {
   const auto [model, across] = GetParam();
   const validation::StripPool pool = validation::strip_pool(across, 1, model);

@@ -34,7 +34,7 @@ TEST(PlaneFlow, VorticesDecayByTheirViscosity) {
   }
 }
 
-// The period of two swings was 0.44 % off; height is not kept (docs/benchmarks.md).
+// The period of two swings was 0.44 % off; height is not kept (docs/benchmarks).
 TEST(PlaneFlow, AStandingWaveHasThePeriodOfLinearTheory) {
   const validation::StandingWave wave = validation::standing_wave(20, 1e-4, 2);
   EXPECT_LT(std::abs(wave.period), 0.02);  // measured -0.44 %
@@ -127,7 +127,7 @@ TEST(FullDomain, HasTheSameBitsForAnyNumberOfThreadsAndGoesOn) {
   expect_same_bits_when_resumed(scene, 12, 1e-3);
 }
 
-// Measured at 10, 20 and 30 layers: docs/benchmarks.md, wave_maker.
+// Measured at 10, 20 and 30 layers: docs/benchmarks, wave_maker.
 // Ten layers boil, so that one run says little: these six made 0.918 to 1.142 of the theory's
 // waves, 0.980 to 1.042 times as long, and carried 0.691 to 0.736. Their means are 1.045, 1.013 and
 // 0.714.

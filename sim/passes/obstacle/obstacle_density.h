@@ -7,7 +7,7 @@
 // from cutting shells r < 1 by the ball: a share (r - D) (2 / k - D - r) k / (4 r) of each lies in
 // it. k is half the divergence of the normal, which is how a level set has it too; a concave
 // surface has k < 0. A half-space (k = 0) overrates a sphere of 3 spacings by 29 %
-// (docs/benchmarks.md). A box takes the half-spaces of its three nearest faces, moved in alike, as
+// (docs/benchmarks). A box takes the half-spaces of its three nearest faces, moved in alike, as
 // a product, which is exact on faces and, by symmetry, on edges and corners.
 
 #include "sim/passes/obstacle/obstacle_distance.h"
