@@ -207,7 +207,8 @@ TEST(MeshFile, SaysWhatIsWrongWithABadFile) {
       "property list uchar int vertex_indices\nend_header\n";
   const std::string corners = "0 0 0\n1 0 0\n0 1 0\n";
   const std::vector<std::array<std::string, 3>> cases{
-      {"a.ply", "solid thing", "header"},
+      {"a.ply", "solid thing", "STL"},
+      {"a.ply", "plain thing", "header"},
       {"b.ply", "plx\nend_header\n", "not a PLY"},
       {"c.ply", head + corners + "3 0 1 3\n", "index 3"},
       {"d.ply", head + corners + "3 0 1 -1\n", "index"},
