@@ -1,9 +1,15 @@
-// The driver alone: stages are a few lines of arithmetic on files of some bytes.
+// The driver alone, whose stages are a few lines of arithmetic on files of some bytes, and frames on
+// a farm.
 
+#include <chrono>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "tests/bench/bench.h"
+#include "tests/driver/farm/slurm_cluster.h"
+#include "tests/driver/tiny_shot.h"
 #include "tests/driver/toy_shot.h"
 #include "tests/temporary_folder.h"
 
@@ -60,6 +66,48 @@ void driver_scale(const Emit& emit) {
 
 const Registration scale{"driver_scale", "planning, a step's overhead, a run with nothing to do",
                          driver_scale};
+
+/// Frames of some seconds, on a cluster of two nodes of one core each and on one core alone.
+void farm_scaling(const Emit& emit) {
+  if (const std::string why = SlurmCluster::why_not(); !why.empty())
+    throw std::runtime_error("farm_scaling: " + why);
+  constexpr int frames = 48;
+  const std::vector<std::string> picture{"--set", "render.samples=64", "--set", "render.width=256",
+                                         "--set", "render.height=144"};
+  const auto with_picture = [&](std::vector<std::string> words) {
+    words.insert(words.end(), picture.begin(), picture.end());
+    return words;
+  };
+  const auto must = [](const Ended& ended) {
+    if (ended.code != 0) throw std::runtime_error("farm_scaling: " + ended.err);
+  };
+  const TinyShot local(frames), farmed(frames);
+  for (const TinyShot* shot : {&local, &farmed}) {
+    must(shot->run("simulate", picture));
+    must(shot->run("mesh", picture));
+  }
+  const Measured alone = measure([&] { must(local.run("run", with_picture({"--threads", "1"}))); });
+  const SlurmCluster cluster;
+  const Measured both = measure([&] {
+    must(run_program(DRENCH_PROGRAM, farmed.words("farm", with_picture({"--chunk", "8"})),
+                     farmed.folder(), cluster.environment()));
+    while (cluster.tasks_left() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  });
+  if (farmed.digests() != local.digests()) throw std::runtime_error("farm_scaling: other bits");
+  Line line;
+  line.method = "two nodes of one core, tasks of 8 frames";
+  line.resolution = std::to_string(frames) + " frames";
+  line.threads = 1;
+  line.cost = both;
+  line.error = both.wall_s / (alone.wall_s / 2);
+  line.error_of = "wall time over half of that of one core";
+  line.gate = 1.15;
+  line.more["one_core_wall_s"] = alone.wall_s;
+  emit(line);
+}
+
+const Registration farm{"farm_scaling", "rendering by a Slurm cluster against one core",
+                        farm_scaling};
 
 }  // namespace
 }  // namespace drench::bench
