@@ -3,12 +3,10 @@
 #include <opensubdiv/far/primvarRefiner.h>
 #include <opensubdiv/far/topologyDescriptor.h>
 
-#include <array>
 #include <cmath>
-#include <iterator>
 #include <memory>
-
-#include "pipeline/contract/files/mesh_columns.h"
+#include <stdexcept>
+#include <vector>
 
 namespace drench {
 
@@ -31,15 +29,14 @@ struct Place {
 
 /// What is linear between corners; columns that a mesh has not stay 0.
 struct Linear {
-  V3f position{0}, velocity{0}, rest_position{0};
+  V3f position{0}, velocity{0};
   V2f uv{0};
-  std::array<float, std::size(mesh_columns)> column{};
+  float wetness = 0;
 
   void Clear() { *this = {}; }
   void AddWithWeight(const Linear& other, float weight) {
     position += other.position * weight, velocity += other.velocity * weight;
-    rest_position += other.rest_position * weight, uv += other.uv * weight;
-    for (size_t k = 0; k < column.size(); ++k) column[k] += other.column[k] * weight;
+    uv += other.uv * weight, wetness += other.wetness * weight;
   }
 };
 
@@ -54,9 +51,7 @@ std::vector<Linear> linear_of(const TriangleMesh& mesh) {
       if (!from.empty()) to = from[v];
     };
     take(values[v].position, mesh.position), take(values[v].velocity, mesh.velocity);
-    take(values[v].rest_position, mesh.rest_position), take(values[v].uv, mesh.uv);
-    for (size_t k = 0; k < std::size(mesh_columns); ++k)
-      take(values[v].column[k], mesh.*mesh_columns[k].values);
+    take(values[v].uv, mesh.uv), take(values[v].wetness, mesh.wetness);
   }
   return values;
 }
@@ -118,11 +113,8 @@ V3f within(const V3f& flat, const V3f& smooth, float limit) {
 
 void append(const TriangleMesh& mesh, const Linear& value, TriangleMesh& out) {
   if (!mesh.velocity.empty()) out.velocity.push_back(value.velocity);
-  if (!mesh.rest_position.empty()) out.rest_position.push_back(value.rest_position);
   if (!mesh.uv.empty()) out.uv.push_back(value.uv);
-  for (size_t k = 0; k < std::size(mesh_columns); ++k)
-    if (!(mesh.*mesh_columns[k].values).empty())
-      (out.*mesh_columns[k].values).push_back(value.column[k]);
+  if (!mesh.wetness.empty()) out.wetness.push_back(value.wetness);
 }
 
 }  // namespace
@@ -130,6 +122,7 @@ void append(const TriangleMesh& mesh, const Linear& value, TriangleMesh& out) {
 TriangleMesh subdivided(const TriangleMesh& mesh, int levels, float limit) {
   if (levels == 0 || mesh.triangle.empty()) return mesh;
   const std::unique_ptr<Far::TopologyRefiner> refiner = refiner_of(mesh);
+  if (!refiner) throw std::runtime_error("OpenSubdiv takes no sheet of this topology");
   Far::TopologyRefiner::UniformOptions uniform(levels);
   uniform.fullTopologyInLastLevel = true;  // the limit asks for it
   refiner->RefineUniform(uniform);
@@ -172,12 +165,6 @@ TriangleMesh subdivided(const TriangleMesh& mesh, int levels, float limit) {
       triangle[k] = v;
     }
     out.triangle.push_back(triangle);
-    if (!mesh.contact.empty()) {
-      int parent = face;
-      for (int level = levels; level > 0; --level)
-        parent = refiner->GetLevel(level).GetFaceParentFace(parent);
-      out.contact.push_back(mesh.contact[size_t(parent)]);
-    }
   }
   return out;
 }
