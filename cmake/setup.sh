@@ -42,6 +42,11 @@ drench_use_blender() {
 # ./bench render_skips counts instructions.
 drench_use_valgrind() { drench_packages+=("valgrind:/usr/bin/valgrind"); }
 
+# ./bench --pages.
+drench_use_plots() {
+  drench_packages+=("python3-matplotlib:/usr/lib/python3/dist-packages/matplotlib/__init__.py")
+}
+
 # ./test --fuzz.
 drench_use_clang() { drench_packages+=("clang:/usr/bin/clang++"); }
 

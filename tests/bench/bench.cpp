@@ -8,7 +8,10 @@
 #include <exception>
 #include <fstream>
 #include <map>
+#include <stdexcept>
 #include <vector>
+
+#include "tests/bench/record.h"
 
 namespace drench::bench {
 namespace {
@@ -18,6 +21,7 @@ using nlohmann::ordered_json;
 struct Case {
   std::string description;
   std::function<void(const Emit&)> run;
+  InQuick in_quick;
 };
 
 std::map<std::string, Case>& registry() {  // built on first use: registrations run before main
@@ -82,15 +86,77 @@ int list_cases() {
   return 0;
 }
 
+struct Options {
+  std::vector<std::string> cases;
+  Extent extent = Extent::full;
+  Record record;
+  enum class Which { all, missing } which = Which::all;
+  enum class Do { run, list, help } what = Do::run;
+};
+Options options;  // of this run; the program has one
+
+constexpr const char* usage =
+    "%s [--quick] [--record FILE --commit HASH [--missing]] [CASE...]\n"
+    "Runs cases (all without a name), a JSON line each to stdout.\n\n"
+    "  --list         names the cases\n"
+    "  --quick        without names a choice of cases, all of them at small sizes\n"
+    "  --record FILE  appends the rows of each case that ends, with time, machine and commit\n"
+    "  --commit HASH  the state of the code\n"
+    "  --missing      leaves out cases of which FILE has rows of this commit\n\n"
+    "Example: %s surface_error\n";
+
+/// @throws std::invalid_argument for what is no option and no case.
+Options parse(const std::vector<std::string>& arguments) {
+  Options o;
+  for (size_t k = 0; k < arguments.size(); ++k) {
+    const std::string& argument = arguments[k];
+    const auto value = [&] {
+      if (k + 1 == arguments.size()) throw std::invalid_argument(argument + " needs a value");
+      return arguments[++k];
+    };
+    if (argument == "--list")
+      o.what = Options::Do::list;
+    else if (argument == "--help")
+      o.what = Options::Do::help;
+    else if (argument == "--quick")
+      o.extent = Extent::quick;
+    else if (argument == "--missing")
+      o.which = Options::Which::missing;
+    else if (argument == "--record")
+      o.record.file = value();
+    else if (argument == "--commit")
+      o.record.commit = value();
+    else if (registry().contains(argument))
+      o.cases.push_back(argument);
+    else
+      throw std::invalid_argument("there is no case '" + argument + "'; --list names them");
+  }
+  if (!o.record.file.empty() && o.record.commit.empty())
+    throw std::invalid_argument("--record needs --commit, the state of the code");
+  if (o.which == Options::Which::missing && o.record.file.empty())
+    throw std::invalid_argument("--missing needs --record, the file to look in");
+  if (o.cases.empty())
+    for (const auto& [name, entry] : registry())
+      if (o.extent == Extent::full || entry.in_quick == InQuick::yes) o.cases.push_back(name);
+  return o;
+}
+
 /// @return whether every gate passed.
 bool run_case(const std::string& name) {
+  const std::string command =
+      "./bench " + std::string(options.extent == Extent::quick ? "--quick " : "") + name;
+  if (options.which == Options::Which::missing && has_rows(options.record, command)) return true;
+  const Origin origin = origin_now(options.record, command);
   bool passed = true;
+  std::vector<ordered_json> results;
   registry().at(name).run([&](const Line& line) {
-    const ordered_json json = json_of(name, line);
+    results.push_back(json_of(name, line));
+    const ordered_json& json = results.back();
     passed &= json["pass"].is_null() || json["pass"].get<bool>();
     std::printf("%s\n", json.dump().c_str());
     std::fflush(stdout);
   });
+  if (!options.record.file.empty()) append_rows(options.record, origin, results);
   return passed;
 }
 
@@ -105,9 +171,11 @@ Measured measure(const std::function<void()>& work) {
   return {wall.count(), cpu_seconds() - cpu, peak_mib()};
 }
 
+Extent extent() { return options.extent; }
+
 Registration::Registration(std::string name, std::string description,
-                           std::function<void(const Emit&)> run) {
-  if (!registry().emplace(name, Case{std::move(description), std::move(run)}).second) {
+                           std::function<void(const Emit&)> run, InQuick in_quick) {
+  if (!registry().emplace(name, Case{std::move(description), std::move(run), in_quick}).second) {
     std::fprintf(stderr, "bench: two cases are named %s\n", name.c_str());
     std::terminate();
   }
@@ -120,27 +188,16 @@ int hardware_threads() {
 }
 
 int run_bench(int argc, char** argv) {
-  std::vector<std::string> names;
-  for (int k = 1; k < argc; ++k) {
-    const std::string argument = argv[k];
-    if (argument == "--list") return list_cases();
-    if (argument == "--help") {
-      std::printf(
-          "%s [--list] [CASE...]\nRuns cases (all without a name), a JSON line each to stdout.\n"
-          "Example: %s surface_error\n",
-          argv[0], argv[0]);
-      return 0;
-    }
-    if (!registry().contains(argument)) {
-      std::fprintf(stderr, "bench: there is no case '%s'; --list names them\n", argument.c_str());
-      return 1;
-    }
-    names.push_back(argument);
+  try {
+    options = parse({argv + 1, argv + argc});
+  } catch (const std::invalid_argument& error) {
+    std::fprintf(stderr, "bench: %s\n", error.what());
+    return 1;
   }
-  if (names.empty())
-    for (const auto& [name, entry] : registry()) names.push_back(name);
+  if (options.what == Options::Do::list) return list_cases();
+  if (options.what == Options::Do::help) return std::printf(usage, argv[0], argv[0]), 0;
   bool passed = true;
-  for (const std::string& name : names) {
+  for (const std::string& name : options.cases) {
     try {
       passed &= run_case(name);
     } catch (const std::exception& error) {

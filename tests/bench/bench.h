@@ -17,8 +17,10 @@
 #include <nlohmann/json.hpp>
 
 #include <functional>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace drench::bench {
 
@@ -49,13 +51,28 @@ struct Line {
 /// Writes the line to stdout. `pass` is null without a gate; a gate without an error does not pass.
 using Emit = std::function<void(const Line&)>;
 
+/// How much of a case runs: all of it, or what takes seconds.
+enum class Extent { full, quick };
+Extent extent();
+
+/// Of a case's sizes (or tolerances, or scenes), cheapest first, those of this run: a quick one
+/// has the first `few`.
+template <class T>
+std::vector<T> sizes(std::initializer_list<T> all, size_t few) {
+  return {all.begin(), extent() == Extent::quick ? all.begin() + few : all.end()};
+}
+
+/// Whether --quick without names runs a case.
+enum class InQuick { no, yes };
+
 /// Makes a case known; static objects of it register before main.
 struct Registration {
-  Registration(std::string name, std::string description, std::function<void(const Emit&)> run);
+  Registration(std::string name, std::string description, std::function<void(const Emit&)> run,
+               InQuick in_quick = InQuick::no);
 };
 
-/// The whole of a bench program: [--list] [--help] [CASE...], no name meaning every case in the
-/// order of names. @return 0; 1 for an unknown case or option, or if a gate did not pass.
+/// The whole of a bench program: its --help says what it takes.
+/// @return 0; 1 for an unknown case or option, or if a gate did not pass.
 int run_bench(int argc, char** argv);
 
 /// Threads that parallel work of this process may use.

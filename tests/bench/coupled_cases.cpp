@@ -40,13 +40,13 @@ void both_models(const Emit& emit, const std::vector<int>& resolutions, const Ru
 }
 
 void pools(const Emit& emit) {
-  both_models(emit, {15, 20, 30}, [](int across, ClothModel model) {
+  both_models(emit, sizes({15, 20, 30}, 2), [](int across, ClothModel model) {
     return validation::pinned_pool(across, 1, 0.2, model);
   });
 }
 
 void strips(const Emit& emit) {
-  both_models(emit, {15, 20, 30, 45}, [](int across, ClothModel model) {
+  both_models(emit, sizes({15, 20, 30, 45}, 2), [](int across, ClothModel model) {
     return validation::strip_pool(across, 1, model);
   });
 }
@@ -65,15 +65,16 @@ void momentum(const Emit& emit) {
   }
 }
 
-const Registration coupled_momentum{
-    "coupled_momentum", "momentum of a block of water and the free sheet that it hits", momentum};
+const Registration coupled_momentum{"coupled_momentum",
+                                    "momentum of a block of water and the free sheet that it hits",
+                                    momentum, InQuick::yes};
 
 const Registration strip_pool{
-    "strip_pool", "a pool on a sheet that spans a periodic axis: time and error of the sag",
-    strips};
+    "strip_pool", "a pool on a sheet that spans a periodic axis: time and error of the sag", strips,
+    InQuick::yes};
 
 const Registration sheet_pool{"sheet_pool", "a pool on a pinned sheet: time and error of the sag",
-                              pools};
+                              pools, InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

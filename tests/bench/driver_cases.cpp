@@ -1,5 +1,5 @@
-// The driver alone, whose stages are a few lines of arithmetic on files of some bytes, and frames on
-// a farm.
+// The driver alone, whose stages are a few lines of arithmetic on files of some bytes, and frames
+// on a farm.
 
 #include <chrono>
 #include <filesystem>
@@ -65,7 +65,7 @@ void driver_scale(const Emit& emit) {
 }
 
 const Registration scale{"driver_scale", "planning, a step's overhead, a run with nothing to do",
-                         driver_scale};
+                         driver_scale, InQuick::yes};
 
 /// Frames of some seconds, on a cluster of two nodes of one core each and on one core alone.
 void farm_scaling(const Emit& emit) {

@@ -27,8 +27,10 @@ void run_drop(double radius, const Emit& emit) {
 
 const Registration fluid_drop{"fluid_drop", "a drop: period, pressure, currents",
                               [](const Emit& emit) {
-                                for (const double radius : {7., 10., 15.}) run_drop(radius, emit);
-                              }};
+                                for (const double radius : sizes({7., 10., 15.}, 1))
+                                  run_drop(radius, emit);
+                              },
+                              InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -115,11 +115,15 @@ void run_dam(const Dam& dam, const Quality& quality, const Emit& emit) {
 }
 
 const Registration dam_64k{
-    "fluid_dam_64k", "time and density error of a collapsing cube of water", [](const Emit& emit) {
-      for (const Quality q : {Quality{5e-5, 1.3e-4}, Quality{1e-4, 1.3e-4}, Quality{2e-4, 1.3e-4},
-                              Quality{5e-4, 1e-3}, Quality{1.5e-3, 1e-3}, Quality{3e-3, 1e-3}})
+    "fluid_dam_64k", "time and density error of a collapsing cube of water",
+    [](const Emit& emit) {
+      for (const Quality q :
+           sizes({Quality{3e-3, 1e-3}, Quality{1.5e-3, 1e-3}, Quality{5e-4, 1e-3},
+                  Quality{2e-4, 1.3e-4}, Quality{1e-4, 1.3e-4}, Quality{5e-5, 1.3e-4}},
+                 2))
         run_dam({40, 1.0, 4e-3}, q, emit);
-    }};
+    },
+    InQuick::yes};
 const Registration dam_250k{"fluid_dam_250k", "the same, finer, its first quarter of a second",
                             [](const Emit& emit) {
                               for (const Quality q : {Quality{2e-4, 1.3e-4}})
@@ -127,7 +131,7 @@ const Registration dam_250k{"fluid_dam_250k", "the same, finer, its first quarte
                             }};
 
 void martin_moyce(const Emit& emit) {
-  for (const int across : {10, 20, 40, 60}) {
+  for (const int across : sizes({10, 20, 40, 60}, 2)) {
     validation::Collapse result;
     Line line;
     line.cost = measure([&] { result = validation::martin_moyce(across, 1e-4); });
@@ -146,7 +150,7 @@ void martin_moyce(const Emit& emit) {
 }
 
 void resting_column(const Emit& emit) {
-  for (const int layers : {10, 20, 40}) {
+  for (const int layers : sizes({10, 20, 40}, 1)) {
     validation::Rest result;
     Line line;
     line.cost = measure([&] { result = validation::resting_column(layers, 5, 10, 1e-5); });
@@ -165,7 +169,7 @@ void resting_column(const Emit& emit) {
 }
 
 void lobovsky(const Emit& emit) {
-  for (const int across : {20, 30, 40}) {
+  for (const int across : sizes({20, 30, 40}, 1)) {
     validation::Impact result;
     Line line;
     line.cost = measure([&] { result = validation::lobovsky(across, 1e-4); });
@@ -186,10 +190,10 @@ void lobovsky(const Emit& emit) {
 }
 
 const Registration impact{"fluid_lobovsky", "a collapsing column hits a wall with a pressure probe",
-                          lobovsky};
+                          lobovsky, InQuick::yes};
 const Registration collapse{"fluid_martin_moyce", "a collapsing column against the experiment",
-                            martin_moyce};
-const Registration rest{"fluid_rest", "a column at rest for 10 s", resting_column};
+                            martin_moyce, InQuick::yes};
+const Registration rest{"fluid_rest", "a column at rest for 10 s", resting_column, InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -52,7 +52,7 @@ void cost(const Emit& emit) {
 
 void buoyancy(const Emit& emit) {
   for (const ObstacleType type : {ObstacleType::sphere, ObstacleType::box}) {
-    for (const double spacings : {3., 4.5, 6.}) {
+    for (const double spacings : sizes({3., 4.5, 6.}, 2)) {
       sim_tests::Lift lift;
       Line line;
       line.cost = measure([&] { lift = sim_tests::lift_of(type, spacings); });
@@ -67,8 +67,10 @@ void buoyancy(const Emit& emit) {
   }
 }
 
-const Registration obstacle_cost{"obstacle_cost", "what obstacles add to a step", cost};
-const Registration obstacle_buoyancy{"obstacle_buoyancy", "force on a submerged body", buoyancy};
+const Registration obstacle_cost{"obstacle_cost", "what obstacles add to a step", cost,
+                                 InQuick::yes};
+const Registration obstacle_buoyancy{"obstacle_buoyancy", "force on a submerged body", buoyancy,
+                                     InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -20,7 +20,7 @@ Line line_of(double tolerance, int particles, const std::string& across, const M
 }
 
 void standing_wave(const Emit& emit) {
-  for (const int layers : {10, 20, 40}) {
+  for (const int layers : sizes({10, 20, 40}, 2)) {
     validation::StandingWave wave;
     const Measured cost = measure([&] { wave = validation::standing_wave(layers, 1e-4, 5); });
     Line line = line_of(1e-4, wave.particles, std::to_string(layers) + " layers", cost);
@@ -33,7 +33,7 @@ void standing_wave(const Emit& emit) {
 }
 
 void elliptical_drop(const Emit& emit) {
-  for (const int across : {12, 25, 50}) {
+  for (const int across : sizes({12, 25, 50}, 2)) {
     validation::EllipticalDrop drop;
     const Measured cost = measure([&] { drop = validation::elliptical_drop(across, 1e-4, 0.8); });
     Line line = line_of(1e-4, drop.particles, std::to_string(across) + " to the radius", cost);
@@ -50,7 +50,7 @@ void taylor_green(const Emit& emit) {
     int across;
     double gate;
   };
-  for (const Size size : {Size{50, 0.05}, Size{100, 0.02}, Size{200, 0.01}}) {
+  for (const Size size : sizes({Size{50, 0.05}, Size{100, 0.02}, Size{200, 0.01}}, 1)) {
     validation::TaylorGreen flow;
     const Measured cost = measure([&] { flow = validation::taylor_green(size.across, 1e-4, 1); });
     Line line = line_of(1e-4, flow.particles, std::to_string(size.across) + " to the side", cost);
@@ -69,9 +69,11 @@ void taylor_green(const Emit& emit) {
 }
 
 const Registration wave{"flow_standing_wave", "a standing wave against linear theory",
-                        standing_wave};
-const Registration drop{"flow_elliptical_drop", "a drop in a straining flow", elliptical_drop};
-const Registration vortices{"flow_taylor_green", "decaying vortices at Re = 100", taylor_green};
+                        standing_wave, InQuick::yes};
+const Registration drop{"flow_elliptical_drop", "a drop in a straining flow", elliptical_drop,
+                        InQuick::yes};
+const Registration vortices{"flow_taylor_green", "decaying vortices at Re = 100", taylor_green,
+                            InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -19,8 +19,9 @@ namespace drench::bench {
 namespace {
 
 constexpr int picture_width = small_width, picture_height = small_height;
+std::vector<int> sample_counts() { return sizes({1, 4, 16, 64, 256}, 3); }
 /// A hundred times the most samples measured: 1 % of that error is the reference's own.
-constexpr int reference_samples = 25600;
+int reference_samples() { return 100 * sample_counts().back(); }
 constexpr double most_cost = 1 / 0.3;  // CPU s per million camera samples
 
 /// Slope of the straight line through the points of log y over log x.
@@ -100,14 +101,14 @@ void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
                 const render::FrameGeometry& geometry, const render::Film& reference) {
   std::vector<double> counts, errors;
   std::vector<Sampled> curve;
-  for (const int samples : {1, 4, 16, 64, 256}) {
+  for (const int samples : sample_counts()) {
     curve.push_back(sample(shot, geometry, samples, reference));
     counts.push_back(samples);
     errors.push_back(curve.back().error);
     Line line = line_of(curve.back());
     line.method = name;
     line.error = errors.back();
-    line.error_of = "relMSE against " + std::to_string(reference_samples) + " samples";
+    line.error_of = "relMSE against " + std::to_string(reference_samples()) + " samples";
     if (counts.size() > 1) line.more["slope"] = log_slope(counts, errors);
     emit(line);
   }
@@ -125,16 +126,16 @@ void emit_curve(const Emit& emit, const std::string& name, const Shot& shot,
 void render_convergence(const Emit& emit) {
   const render::FrameGeometry cloth{{}, {{"cloth", pleated_sheet()}}}, pool{wavy_pool(), {}};
   emit_curve(emit, "cloth", cloth_shot(), cloth,
-             render(cloth_shot(), cloth, reference_samples, 1000).film);
+             render(cloth_shot(), cloth, reference_samples(), 1000).film);
   Shot paths = pool_shot();
   paths.render.photons = 0;
   emit_curve(emit, "pool, small lamp", pool_shot(), pool,
-             render(paths, pool, reference_samples, 1000).film);
+             render(paths, pool, reference_samples(), 1000).film);
 }
 
 const Registration render_convergence_case{
     "render_convergence", "error at 1 to 256 samples, its slope, CPU s to an error",
-    render_convergence};
+    render_convergence, InQuick::yes};
 
 void render_cloth(const Emit& emit) {
   const render::FrameGeometry geometry{{}, {{"cloth", pleated_sheet()}}};
@@ -148,7 +149,7 @@ void render_cloth(const Emit& emit) {
 }
 
 const Registration render_cloth_case{
-    "render_cloth", "cloth over ground at depth 8: samples per CPU s", render_cloth};
+    "render_cloth", "cloth over ground at depth 8: samples per CPU s", render_cloth, InQuick::yes};
 
 /// The reference is of paths alone, in two halves, so that its own noise is known and taken off.
 /// Gain: of 1 / (error x CPU s), at as many samples.
@@ -156,8 +157,8 @@ void render_caustics(const Emit& emit) {
   Shot photons = pool_shot(), paths = photons;
   paths.render.photons = 0;
   const render::FrameGeometry geometry{wavy_pool(), {}};
-  render::Film reference = render(paths, geometry, reference_samples / 2, 1000).film;
-  const render::Film half = render(paths, geometry, reference_samples / 2, 1001).film;
+  render::Film reference = render(paths, geometry, reference_samples() / 2, 1000).film;
+  const render::Film half = render(paths, geometry, reference_samples() / 2, 1001).film;
   const double own = relative_mse(reference, half) / 4;
   for (size_t k = 0; k < half.rgba.size(); ++k)
     reference.rgba[k] = 0.5f * (reference.rgba[k] + half.rgba[k]);
@@ -165,7 +166,7 @@ void render_caustics(const Emit& emit) {
   none.walks = render::ManifoldWalks::none;
   const std::tuple<const char*, const Shot*, render::RenderOptions> ways[] = {
       {"paths", &paths, {}}, {"photons", &photons, none}, {"photons and walks", &photons, {}}};
-  for (const int samples : {4, 16, 64, 256}) {
+  for (const int samples : sizes({4, 16, 64, 256}, 2)) {
     double efficiency = 0;
     for (const auto& [name, shot, options] : ways) {
       Sampled sampled = sample(*shot, geometry, samples, reference, options);
@@ -189,7 +190,7 @@ void render_caustics(const Emit& emit) {
 
 const Registration render_caustics_case{
     "render_caustics", "a pool with a small lamp: error and time by paths, photons and walks",
-    render_caustics};
+    render_caustics, InQuick::yes};
 
 /// Relative MSE by two references of paths alone, so that their noise adds nothing.
 double error_beside(const render::Film& film, const render::Film& a, const render::Film& b) {

@@ -91,7 +91,7 @@ Line line_of(const sim::Scene& scene, Where where, const Cost& cost) {
 void fluid_scaling(const Emit& emit) {
   constexpr int smallest = 40;
   Pair reference(smallest, Where::cpu);
-  for (const int side : {smallest, 63, 100, 159}) {
+  for (const int side : sizes({smallest, 63, 100, 159}, 2)) {
     Pair pair(side, Where::cpu);
     Cost cost;
     std::vector<double> ratio;

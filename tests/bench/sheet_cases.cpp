@@ -58,7 +58,7 @@ Hung hang(int layers, double right) {
 
 void sheet_curtain(const Emit& emit) {
   for (const double right : {0., 0.5}) {
-    for (const int layers : {8, 16, 24}) {
+    for (const int layers : sizes({8, 16, 24}, 2)) {
       Hung hung;
       Line line;
       line.cost = measure([&] { hung = hang(layers, right); });
@@ -82,7 +82,7 @@ const Registration cost{"sheet_cost", "what a sheet under a pool costs the incom
                         sheet_cost};
 const Registration curtain{"sheet_curtain",
                            "a curtain between two pools: time and error of its deflection",
-                           sheet_curtain};
+                           sheet_curtain, InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -152,7 +152,7 @@ void springs(const Size& size, const Emit& emit) {
 
 void shell_scaling(const Emit& emit) {
   flat_pair(Flat::falls, {smallest, 20}, emit);
-  for (const Size& size : {Size{smallest, 40}, Size{182, 9}, Size{360, 5}}) {
+  for (const Size& size : sizes({Size{smallest, 40}, Size{182, 9}, Size{360, 5}}, 1)) {
     flat_pair(Flat::hangs, size, emit);
     springs(size, emit);
   }
@@ -350,7 +350,7 @@ void shell_work_precision(const Emit& emit) {
 
 const Registration scaling{"shell_scaling",
                            "time and memory of a shell's triangle to 259k, and of contact",
-                           shell_scaling};
+                           shell_scaling, InQuick::yes};
 const Registration million{"shell_million", "the same of a million triangles",
                            [](const Emit& emit) {
                              flat_pair(Flat::hangs, {708, 2}, emit);
@@ -365,7 +365,7 @@ const Registration gpu_layers{"shell_gpu_layers", "piles of fifty shells on a CU
 const Registration gpu_drape{"shell_gpu_drape", "shell_drape's fine shell on a CUDA device",
                              shell_gpu_drape};
 const Registration precision{"shell_work_precision", "time and error of shells' closed forms",
-                             shell_work_precision};
+                             shell_work_precision, InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

@@ -64,7 +64,7 @@ size_t defects_of(const TriangleMesh& mesh) {
 /// The default settings on shapes with a closed form, five resolutions: no constant is fitted to
 /// one of them.
 void surface_error(const Emit& emit) {
-  for (const double n : {8e3, 24e3, 65e3, 250e3, 1e6}) {
+  for (const double n : sizes({8e3, 24e3, 65e3, 250e3, 1e6}, 2)) {
     for (const surfacing_scenes::Shape& shape : surfacing_scenes::all_shapes(n)) {
       const ParticleFrame frame = surfacing_scenes::relaxed(shape, spacing, 60, 1);
       const Run run = cheapest(frame, {});
@@ -140,7 +140,7 @@ void surface_thin(const Emit& emit) {
 
 /// A splash with both kernels in turns: what the anisotropic one costs.
 void surface_kernels(const Emit& emit) {
-  for (const size_t n : {65000, 1000000}) {
+  for (const size_t n : sizes<size_t>({65000, 1000000}, 1)) {
     const ParticleFrame frame = surfacing_scenes::splash(n, spacing, 1);
     Line best[2];
     for (int turn = 0; turn < 2; ++turn)
@@ -173,7 +173,7 @@ void surface_kernels(const Emit& emit) {
 void surface_scaling(const Emit& emit) {
   const SurfaceSettings settings;
   const ParticleFrame small = surfacing_scenes::splash(65000, spacing, 1);
-  for (const size_t n : {65000, 250000, 1000000, 2000000, 4000000, 8000000}) {
+  for (const size_t n : sizes<size_t>({65000, 250000, 1000000, 2000000, 4000000, 8000000}, 2)) {
     const ParticleFrame frame = surfacing_scenes::splash(n, spacing, 1);
     const auto each = [](const ParticleFrame& f, const Run& run) {
       return 1e6 * run.cost.cpu_s / static_cast<double>(f.position.size());
@@ -204,15 +204,16 @@ void surface_memory(const Emit& emit) {
 }
 
 const Registration error{"surface_error", "surfacing: errors on five shapes, 8k to 1M particles",
-                         surface_error};
+                         surface_error, InQuick::yes};
 const Registration thin{"surface_thin", "surfacing: single particles and stretched sheets",
                         surface_thin};
 const Registration memory{"surface_memory",
                           "surfacing: memory on a splash of 1M at h = r and r / 2", surface_memory};
-const Registration beside{
-    "surface_kernels", "surfacing: cost of anisotropic kernels beside round ones", surface_kernels};
+const Registration beside{"surface_kernels",
+                          "surfacing: cost of anisotropic kernels beside round ones",
+                          surface_kernels, InQuick::yes};
 const Registration scaling{"surface_scaling", "surfacing: cost of a particle from 65k to 8M",
-                           surface_scaling};
+                           surface_scaling, InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench

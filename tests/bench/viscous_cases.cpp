@@ -17,7 +17,7 @@ namespace {
 void channels(const Emit& emit) {
   for (const validation::Flow flow : {validation::Flow::couette, validation::Flow::poiseuille}) {
     for (const double shaken : {0., 0.25}) {
-      for (const int across : {10, 20, 40}) {
+      for (const int across : sizes({10, 20, 40}, 1)) {
         validation::Channel result;
         Line line;
         line.cost = measure([&] { result = validation::start_up(flow, across, shaken); });
@@ -39,7 +39,7 @@ void channels(const Emit& emit) {
 }
 
 void spreading(const Emit& emit) {
-  for (const int high : {8, 12, 16}) {
+  for (const int high : sizes({8, 12, 16}, 1)) {
     validation::Spreading result;
     Line line;
     line.cost = measure([&] { result = validation::huppert(high); });
@@ -57,7 +57,7 @@ void spreading(const Emit& emit) {
 }
 
 void body_drag(const Emit& emit) {
-  for (const int across : {6, 12, 24}) {
+  for (const int across : sizes({6, 12, 24}, 2)) {
     validation::Dragged trough;
     Line line;
     line.cost = measure([&] { trough = validation::lid_driven(across); });
@@ -72,7 +72,7 @@ void body_drag(const Emit& emit) {
   constexpr const char* name[] = {"plane", "box", "sheet"};
   for (const auto floor :
        {validation::Floor::plane, validation::Floor::box, validation::Floor::sheet}) {
-    for (const int layers : {6, 12, 24}) {
+    for (const int layers : sizes({6, 12, 24}, 2)) {
       validation::Dragged film;
       Line line;
       line.cost = measure([&] { film = validation::film(floor, layers); });
@@ -90,11 +90,11 @@ void body_drag(const Emit& emit) {
   }
 }
 const Registration drag{"fluid_body_drag", "fluid that does not slip along obstacles and sheets",
-                        body_drag};
+                        body_drag, InQuick::yes};
 
 /// A block of 24 x 24 x 24 slumps on a no-slip floor for 40 steps of 2 ms.
 void cost(const Emit& emit) {
-  for (const double strength : {0., 0.0099, 0.1, 1., 10., 100.}) {
+  for (const double strength : sizes({0., 0.0099, 0.1, 1., 10., 100.}, 4)) {
     constexpr double dt = 2e-3, a = 0.01;
     constexpr int steps = 40;
     Shot shot = sim_tests::empty_shot();
@@ -124,7 +124,8 @@ void cost(const Emit& emit) {
 }
 
 const Registration viscosity{"fluid_viscosity", "viscous flows against closed forms, and the cost",
-                             [](const Emit& emit) { channels(emit), spreading(emit), cost(emit); }};
+                             [](const Emit& emit) { channels(emit), spreading(emit), cost(emit); },
+                             InQuick::yes};
 
 }  // namespace
 }  // namespace drench::bench
