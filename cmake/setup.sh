@@ -143,3 +143,11 @@ drench_build() {
   fi
   cmake --build "$root/build" -j"$(nproc)" --target "$@" >&2
 }
+
+# The last commit to anything but documents, + behind it where code has changed since: rows and pages
+# make no new state.
+drench_code_commit() {
+  local code=(-- "$root" ":(exclude,top)docs" ":(exclude,top)*.md")
+  git -C "$root" log -1 --abbrev=7 --format=%h "${code[@]}" | tr -d '\n'
+  if [[ -n $(git -C "$root" status --porcelain "${code[@]}") ]]; then printf '+'; fi
+}

@@ -165,5 +165,24 @@ TEST(Scripts, ExplainThemselvesWithoutAShot) {
   EXPECT_NE(ended.err.find("./run shots/"), std::string::npos) << ended.err;
 }
 
+// What ./bench --record calls the state of the code: pages and rows do not change it, code does.
+TEST(Scripts, NameTheLastCommitToTheCode) {
+  const Ended ended = bash(R"sh(
+    source "$root/cmake/setup.sh"
+    root=$(mktemp -d); trap 'rm -r "$root"' EXIT
+    git() { command git -c user.name=a -c user.email=a@a.example "$@"; }
+    commit() { git -C "$root" add .; git -C "$root" commit -q -m "$1"; }
+    git init -q "$root"; mkdir "$root/docs"
+    echo 1 > "$root/code"; commit code; first=$(git -C "$root" log -1 --abbrev=7 --format=%h)
+    echo 1 > "$root/docs/page"; echo 1 > "$root/README.md"; commit docs
+    echo 2 > "$root/docs/page"; [[ $(drench_code_commit) == "$first" ]] || echo docs
+    echo 2 > "$root/code"; [[ $(drench_code_commit) == "$first+" ]] || echo changed
+    commit code; [[ $(drench_code_commit) == "$(git -C "$root" log -1 --abbrev=7 --format=%h)" ]] ||
+      echo committed
+    )sh");
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(ended.out, "");
+}
+
 }  // namespace
 }  // namespace drench
