@@ -143,13 +143,18 @@ def size(row):
     )
 
 
+def short(text):
+    """Its decimals without zeros at their ends."""
+    return re.sub(r"\d+\.\d+", lambda found: f"{float(found[0]):g}", text)
+
+
 derived = {
     "size": size,
     "particles": particles,
     "triangles of sheets": number_before("triangles", "resolution"),
     "tolerance %": number_before("%", "method"),
     "light by": lambda row: row["method"].rpartition(", ")[2],
-    "pools": lambda row: re.sub(r"\d+\.\d+", lambda found: f"{float(found[0]):g}", row["method"]),
+    "pools": lambda row: short(row["method"]),
     "added %": lambda row: 100 * (row["error"] - 1),
     "picture": lambda row: (row["method"] or "").split(",")[0],
 }
@@ -353,7 +358,7 @@ def validation_line(claim, method, rows):
     gate = next((row["gate"] for row in reversed(rows) if row["gate"] is not None), None)
     first = rows[0]
     return [
-        f"[{claim.what}]({claim.page})" + (f": {method}" if method else ""),
+        f"[{claim.what}]({claim.page})" + (f": {short(method)}" if method else ""),
         claim.source,
         ", ".join(text_of(size(row)) for row in rows),
         ", ".join(text_of(row["error"]) for row in rows),
@@ -382,8 +387,9 @@ def validation(of_case):
 What Drench computes against what is known, one line a claim. Errors are relative unless their page
 says otherwise; what exactly each is an error of stands in its rows, under `error_of`. Sizes are
 particles, cells or layers across what matters. The order is the slope of a line fitted to the
-errors over the sizes, both logarithmic: 1 halves the error where the size doubles. A gate is the
-largest error that a case allows; some cases set it for their finest size alone.""",
+errors over the sizes, both logarithmic: 1 halves the error where the size doubles. It means
+nothing where errors are chance or at a floor. A gate is the largest error that a case allows; some
+cases set it for their finest size alone.""",
         lined(heads, lines)
         + (["", "Not recorded: " + ", ".join(dict.fromkeys(missing)) + "."] if missing else []),
     )

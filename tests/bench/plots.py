@@ -113,15 +113,17 @@ def dam(rows, peers):
 
 def sheets(of):
     pools = [
-        Panel(case, series_of(of[case], method, note=size_note(" across")), 5)
+        Panel(
+            f"{case}, particles across", series_of(of.get(case, []), method, note=size_note("")), 5
+        )
         for case in ("sheet_pool", "strip_pool")
     ]
-    curtain = series_of(of["sheet_curtain"], pages.derived["pools"], note=size_note(" layers"))
+    curtain = series_of(of.get("sheet_curtain", []), pages.derived["pools"], note=size_note(""))
     return Plot(
         "sheets",
         TIME,
         "error of the sag or deflection, %",
-        pools + [Panel("sheet_curtain", curtain, 5)],
+        pools + [Panel("sheet_curtain, layers", curtain, 5)],
     )
 
 
@@ -203,13 +205,13 @@ def samples_note(row):
 
 def convergence(of):
     cloth = series_of(
-        of["render_convergence"],
+        of.get("render_convergence", []),
         lambda row: None if "slope" in row["method"] else row["method"],
         y=key("error"),
         note=samples_note,
     )
     caustics = series_of(
-        of["render_caustics"], matching("lamp, (.*)"), y=key("rel_mse"), note=samples_note
+        of.get("render_caustics", []), matching("lamp, (.*)"), y=key("rel_mse"), note=samples_note
     )
     return Plot(
         "render_convergence",
@@ -318,19 +320,13 @@ def skips(of):
     return Bars(
         "skips",
         "instructions added, % (0: what is absent or idle costs nothing)",
-        [(row["method"], 100 * (row["error"] - 1)) for row in rows],
+        [(row["method"].replace("_", " "), 100 * (row["error"] - 1)) for row in rows],
         1,
     )
 
 
 def all_plots(of, peers):
     made = [dam(of["fluid_dam_64k"], peers)] if "fluid_dam_64k" in of else []
-    for needed, build in [
-        (("sheet_pool", "strip_pool", "sheet_curtain"), sheets),
-        (("render_convergence", "render_caustics"), convergence),
-    ]:
-        if all(case in of for case in needed):
-            made.append(build(of))
     for case, build in [
         ("shell_work_precision", shells),
         ("fluid_viscosity", viscous),
@@ -343,7 +339,7 @@ def all_plots(of, peers):
     ]:
         if case in of:
             made.append(build(of[case]))
-    made += [plot(of) for plot in (flows, scaling)]
+    made += [plot(of) for plot in (flows, sheets, convergence, scaling)]
     made = [plot._replace(panels=[panel for panel in plot.panels if panel.series]) for plot in made]
     return [plot for plot in made if plot.panels] + [bars for bars in [skips(of)] if bars.values]
 
@@ -352,7 +348,15 @@ def all_plots(of, peers):
 
 
 def plain(value, _):
-    return f"{value:g}" if 1e-3 <= value < 1e5 else f"$10^{{{round(math.log10(value))}}}$"
+    """A tick's label: with k and M from ten thousand on, with a power of ten below a thousandth."""
+    for unit, name in ((1e6, " M"), (1e3, " k")):
+        if value >= max(unit, 1e4):
+            return f"{value / unit:g}{name}"
+    if value >= 0.99e-3:
+        return f"{value:g}"
+    power = math.floor(math.log10(value) + 1e-9)
+    share = round(value / 10**power, 3)
+    return f"$10^{{{power}}}$" if share == 1 else rf"${share:g}\cdot10^{{{power}}}$"
 
 
 def draw_series(axes, one, number):
