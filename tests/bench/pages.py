@@ -2,7 +2,8 @@
 """Pages of docs/benchmarks from the rows that ./bench --record keeps (results.jsonl).
 
     pages.py                   plots, tables, validation.md, runs.md; build/benchmarks.html
-    pages.py --check           whether rows are valid and the pages say what the rows do
+    pages.py --check pages     whether rows are valid and the pages say what the rows do
+    pages.py --check plots     the same of plots, by the version of Matplotlib that made them
     pages.py --validate FILE   whether the rows of another file are valid
 
 A table of a page stands between two comments, of which the first says what is in it:
@@ -29,6 +30,7 @@ PAGES = ROOT / "docs/benchmarks"
 RESULTS = PAGES / "results.jsonl"
 PEERS = PAGES / "peers.jsonl"
 
+SKIPPED = 77  # the exit status of a test that is left out
 ORIGIN = ["time", "commit", "machine", "command"]
 RESULT = [
     "case",
@@ -398,32 +400,27 @@ cases set it for their finest size alone.""",
 # Runs
 
 
+def run_line(run):
+    first = run[0]
+    gated = [row for row in run if row["gate"] is not None]
+    shares = [
+        row["error"] / row["gate"] for row in gated if row["gate"] and row["error"] is not None
+    ]
+    cpu_s = sum(row["cpu_s"] or 0 for row in run)
+    kept = sum(row["pass"] for row in gated)
+    return [
+        f"`{first['command']}`",
+        first["time"][:16].replace("T", " "),
+        first["commit"],
+        str(len(run)),
+        text_of(cpu_s or None),
+        text_of(max(shares, default=None)),
+        f"{kept} of {len(gated)}" if gated else "",
+    ]
+
+
 def runs_page(rows):
-    lines = []
-    for case, runs in runs_of(rows).items():
-        for run in reversed(runs):
-            first = run[0]
-            cpu = sum(row["cpu_s"] or 0 for row in run)
-            gates = [row["pass"] for row in run if row["gate"] is not None]
-            worst = max(
-                (
-                    row["error"] / row["gate"]
-                    for row in run
-                    if row["gate"] and row["error"] is not None
-                ),
-                default=None,
-            )
-            lines.append(
-                [
-                    f"`{first['command']}`",
-                    first["time"][:16].replace("T", " "),
-                    first["commit"],
-                    str(len(run)),
-                    text_of(cpu),
-                    text_of(worst),
-                    f"{gates.count(True)} of {len(gates)}" if gates else "",
-                ]
-            )
+    lines = [run_line(run) for runs in runs_of(rows).values() for run in reversed(runs)]
     heads = ["command", "UTC", "commit", "rows", "CPU s", "worst error over its gate", "gates met"]
     return page(
         "Runs",
@@ -450,27 +447,32 @@ def texts(rows):
     return files
 
 
-def check(rows):
-    """@return the exit status: 1 where a page says something else than the rows."""
-    stale = [
+def stale_pages(rows):
+    return [
         file for file, text in texts(rows).items() if not file.exists() or file.read_text() != text
     ]
+
+
+def stale_plots(rows):
     try:
         import plots
-
-        stale += plots.stale(latest(rows), read_lines(PEERS))
     except ImportError:
         print("pages: no matplotlib, so plots are not compared", file=sys.stderr)
+        sys.exit(SKIPPED)
+    return plots.stale(latest(rows), read_lines(PEERS))
+
+
+def check(what, rows):
+    """@return the exit status: 1 where a page or plot says something else than the rows."""
+    stale = stale_pages(rows) if what == "pages" else stale_plots(rows)
     for file in stale:
-        print(
-            f"{file.relative_to(ROOT)} is not what the rows make: ./bench --pages", file=sys.stderr
-        )
+        print(f"{file.relative_to(ROOT)} is not what rows make: ./bench --pages", file=sys.stderr)
     return 1 if stale else 0
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--check", action="store_true", help="only compare, change nothing")
+    parser.add_argument("--check", choices=["pages", "plots"], help="only compare, change nothing")
     parser.add_argument(
         "--validate", type=pathlib.Path, metavar="FILE", help="only read these rows"
     )
@@ -480,7 +482,7 @@ def main():
         return 0 if read_rows(arguments.validate) else 1
     rows = read_rows(RESULTS)
     if arguments.check:
-        return check(rows)
+        return check(arguments.check, rows)
     for file, text in texts(rows).items():
         file.write_text(text)
     import plots
