@@ -145,7 +145,11 @@ def viscous(rows):
         TIME,
         "worst L2 error of u over its largest, %",
         [
-            Panel(flow, series_of(rows, matching(rf"{flow}, (.*)"), note=size_note(" across")), 2)
+            Panel(
+                f"{flow}, particles across",
+                series_of(rows, matching(rf"{flow}, (.*)"), note=size_note("")),
+                2,
+            )
             for flow in ("Couette", "Poiseuille")
         ],
     )
