@@ -419,15 +419,22 @@ def run_line(run):
     ]
 
 
+def all_cases():
+    """Of ./bench, as its sources register them."""
+    texts = [file.read_text() for file in sorted((ROOT / "tests/bench").glob("*_case*.cpp"))]
+    return sorted(re.findall(r'Registration \w+\{\s*"(\w+)"', "".join(texts)))
+
+
 def runs_page(rows):
     lines = [run_line(run) for runs in runs_of(rows).values() for run in reversed(runs)]
+    without = [f"`{case}`" for case in all_cases() if case not in runs_of(rows)]
     heads = ["command", "UTC", "commit", "rows", "CPU s", "worst error over its gate", "gates met"]
     return page(
         "Runs",
         """
 Every run that is recorded, of each case the last one first: its lines are its history. CPU seconds
 are the sum of what the rows measured, which leaves references and setting up out.""",
-        lined(heads, lines),
+        lined(heads, lines) + ["", "No run yet: " + ", ".join(without) + "."],
     )
 
 
