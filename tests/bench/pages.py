@@ -341,12 +341,12 @@ CLAIMS = [
 
 
 def order_of(rows):
-    """Least squares slope of log error over log size, falling errors positive; none of one size."""
-    points = [
-        (math.log(size(row)), math.log(row["error"])) for row in rows if size(row) and row["error"]
-    ]
-    if len({x for x, _ in points}) < 2:
+    """Least squares slope of log error over log size; none unless the error falls at each size."""
+    points = [(size(row), row["error"]) for row in rows if size(row)]
+    points = sorted(points)
+    if len(points) < 2 or any(a <= b or not b for (_, a), (_, b) in zip(points, points[1:])):
         return None
+    points = [(math.log(n), math.log(error)) for n, error in points]
     mx, my = (sum(axis) / len(points) for axis in zip(*points))
     return -sum((x - mx) * (y - my) for x, y in points) / sum((x - mx) ** 2 for x, _ in points)
 
@@ -389,8 +389,8 @@ def validation(of_case):
 What Drench computes against what is known, one line a claim. Errors are relative unless their page
 says otherwise; what exactly each is an error of stands in its rows, under `error_of`. Sizes are
 particles, cells or layers across what matters. The order is the slope of a line fitted to the
-errors over the sizes, both logarithmic: 1 halves the error where the size doubles. It means
-nothing where errors are chance or at a floor. A gate is the largest error that a case allows; some
+errors over the sizes, both logarithmic: 1 halves the error where the size doubles. It is left out
+where an error does not fall: there it is chance, or at a floor. A gate is the largest error that a case allows; some
 cases set it for their finest size alone.""",
         lined(heads, lines)
         + (["", "Not recorded: " + ", ".join(dict.fromkeys(missing)) + "."] if missing else []),
