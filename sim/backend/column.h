@@ -1,6 +1,7 @@
 #pragma once
 // A column of the simulation state: an array with capacity in the memory of the backend.
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -30,8 +31,8 @@ class Column {
   }
   ~Column() { cudaFree(data_); }
 
-  void resize(size_t size) {  // contents are kept; grown by halves so that emitters rarely copy
-    if (size > capacity_) {
+  void resize(size_t size) {  // contents are kept, new elements are 0
+    if (size > capacity_) {   // grown by halves so that emitters rarely copy
       const size_t capacity = capacity_ ? size + size / 2 : size;
       T* data = nullptr;
       check_cuda(cudaMalloc(&data, capacity * sizeof(T)), "allocating a column");
@@ -41,9 +42,13 @@ class Column {
                    "growing a column");
       }
       cudaFree(data_);
-      data_ = data, capacity_ = capacity;
+      data_ = data, capacity_ = capacity, used_ = size_;
     }
-    size_ = size;
+    const size_t used = std::min(size, used_);  // a larger size may have left something there
+    if (used > size_) {
+      check_cuda(cudaMemset(data_ + size_, 0, (used - size_) * sizeof(T)), "clearing a column");
+    }
+    size_ = size, used_ = std::max(size, used_);
   }
   void renew(size_t size) {  // contents are lost; never holds old and new memory at once
     *this = {};
@@ -65,12 +70,12 @@ class Column {
   size_t capacity() const { return capacity_; }  // elements that memory is held for
   void swap(Column& other) noexcept {
     std::swap(data_, other.data_), std::swap(size_, other.size_),
-        std::swap(capacity_, other.capacity_);
+        std::swap(capacity_, other.capacity_), std::swap(used_, other.used_);
   }
 
  private:
   T* data_ = nullptr;
-  size_t size_ = 0, capacity_ = 0;
+  size_t size_ = 0, capacity_ = 0, used_ = 0;  // the largest size since memory was taken
 };
 
 #else
@@ -82,7 +87,10 @@ struct Queue;
 template <class T>
 class Column {
  public:
-  void resize(size_t size) { data_.resize(size + 8), size_ = size; }
+  void resize(size_t size) {  // contents are kept, new elements are 0, and the room
+    data_.resize(std::min(size, size_)), data_.resize(size + 8);
+    size_ = size;
+  }
   void renew(size_t size) {  // contents are lost; never holds old and new memory at once
     *this = {};
     resize(size);

@@ -14,8 +14,7 @@ void stable_sort_keys(Queue& queue, const Column<int>& keys, int n, int key_coun
   SortScratch& scratch = queue.sort;
   order.resize(n);
   start.resize(size_t(key_count) + 1);
-  scratch.order_in.resize(n);
-  scratch.key_out.resize(n);
+  if (scratch.order_in.size() < size_t(n)) scratch.order_in.resize(n), scratch.key_out.resize(n);
   int* iota = scratch.order_in.data();
   parallel_for(queue, "sort: iota", n, [=] __device__(int i) { iota[i] = i; });
   int bits = 1;
