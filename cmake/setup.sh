@@ -19,6 +19,7 @@ drench_packages=(
   "libtbb-dev:/usr/include/tbb/task_arena.h"
   "libpng-dev:/usr/include/png.h"
   "libjpeg62-turbo-dev:/usr/include/jpeglib.h"
+  "libzstd-dev:/usr/include/zstd.h"
   "libtiff-dev:/usr/include/x86_64-linux-gnu/tiffio.h /usr/include/tiffio.h"
   "libgtest-dev:/usr/include/gtest/gtest.h"
   "libcli11-dev:/usr/include/CLI/CLI.hpp"

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -43,6 +44,10 @@ Shot pour_on_sheet() {
   return shot;
 }
 
+/// The block rests on the sheet, whose half thickness is 0.5 mm, and pushes it.
+void let_down(Shot& shot) {
+  for (double* y : {&shot.fluid.box[0].min.y, &shot.fluid.box[0].max.y}) *y -= 0.0145;
+}
 /// The water alone, on the domain's floor.
 void without_sheet(Shot& shot) { shot.cloth.clear(), shot.domain.min.y = 0.215; }
 void add_ball(Shot& shot, const V3d& centre, const V3d& end) {
@@ -60,13 +65,16 @@ struct Situation {
 };
 constexpr FluidSolver compressible = FluidSolver::weakly_compressible,
                       projected = FluidSolver::incompressible;
+void as_in_the_paper(Shot& shot) {
+  shot.coupling.scheme = CouplingScheme::paper;
+  shot.cloth[0].areal_density = 50;  // its vertices must be heavier than particles
+}
 const Situation situations[] = {
     {"Exact", compressible, [](Shot&) {}},
-    {"Paper", compressible,
-     [](Shot& s) {
-       s.coupling.scheme = CouplingScheme::paper;
-       s.cloth[0].areal_density = 50;  // its vertices must be heavier than particles
-     }},
+    {"ExactResting", compressible, let_down},
+    {"Paper", compressible, as_in_the_paper},
+    {"PaperResting", compressible, [](Shot& s) { as_in_the_paper(s), let_down(s); }},
+    {"Resting", projected, let_down},
     {"Incompressible", projected, without_sheet},
     {"Strong", projected,
      [](Shot& s) {  // as much water under the sheet as over it
@@ -140,7 +148,9 @@ double largest_particle_difference(const sim::HostState& a, const sim::HostState
   for (size_t k = 0; k < b.id.size(); ++k) place[b.id[k]] = k;
   double largest = 0;
   for (size_t i = 0; i < a.id.size(); ++i) {
-    largest = std::max(largest, distance(a.position, i, b.position, place.at(a.id[i])));
+    const auto there = place.find(a.id[i]);  // a drain may have taken it
+    if (there == place.end()) continue;
+    largest = std::max(largest, distance(a.position, i, b.position, there->second));
   }
   return largest;
 }
@@ -174,14 +184,28 @@ class Cuda : public ::testing::TestWithParam<Situation> {
   sim::Scene scene;
 };
 
+/// The largest distance between particles, and between vertices, of two states, m.
+std::array<double, 2> largest_differences(const sim::HostState& a, const sim::HostState& b) {
+  std::array<double, 2> largest{largest_particle_difference(a, b), 0};
+  for (size_t v = 0; v < a.cloth_position.size(); ++v)
+    largest[1] = std::max(largest[1], distance(a.cloth_position, v, b.cloth_position, v));
+  return largest;
+}
+
 // Only rounding differs (fused multiply-adds, order of sums). Ten steps amplify it by about a
-// hundred.
-TEST_P(Cuda, AgreesWithCpuWithinTenThousandthOfSpacingAfterTenSteps) {
+// hundred, to a ten-thousandth of a spacing, and contact in an incompressible fluid by more: twice
+// what CPU runs that start an ulp apart differ by.
+TEST_P(Cuda, AgreesWithCpuToRoundingAfterTenSteps) {
   const sim::HostState cpu = on_cpu(scene, 10), gpu = on_cuda(scene, 10);
   ASSERT_EQ(cpu.id.size(), gpu.id.size());
-  EXPECT_LT(largest_particle_difference(cpu, gpu), 1e-4 * spacing);
-  for (size_t v = 0; v < cpu.cloth_position.size(); ++v) {
-    ASSERT_LT(distance(cpu.cloth_position, v, gpu.cloth_position, v), 1e-4 * spacing) << v;
+  const auto found = largest_differences(cpu, gpu);
+  std::array<double, 2> noise{};
+  for (uint64_t seed = 1; scene.parameters.incompressible && seed <= 10; ++seed) {
+    const auto one = largest_differences(cpu, on_cpu(sim_tests::jostled(scene, seed), 10));
+    for (const size_t k : {0, 1}) noise[k] = std::max(noise[k], one[k]);
+  }
+  for (const size_t k : {0, 1}) {
+    EXPECT_LT(found[k], std::max(1e-4 * spacing, 2 * noise[k])) << (k ? "sheet" : "fluid");
   }
 }
 

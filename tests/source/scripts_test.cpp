@@ -18,7 +18,8 @@ Ended bash(const std::string& text) {
 
 TEST(Scripts, AreValidBashAndExecutable) {
   for (const char* name :
-       {"run", "test", "bench", ".ci/run", "tests/blender/run", "tests/tidy/run"}) {
+       {"run", "test", "bench", ".ci/run", "tests/blender/run", "tests/gpu/emulated",
+        "tests/gpu/emulator/selftest/run", "tests/gpu/gather", "tests/tidy/run"}) {
     EXPECT_EQ(bash("bash -n \"$root/" + std::string(name) + "\"").code, 0) << name;
     EXPECT_EQ(bash("test -x \"$root/" + std::string(name) + "\"").code, 0) << name;
   }

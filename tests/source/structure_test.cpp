@@ -212,9 +212,17 @@ TEST(Structure, EveryFileOfValidationDataIsRead) {
   }
 }
 
+// But for two that are tables of PTX's instructions, in its manual's order.
 TEST(Structure, NoFileHasMoreThanSixHundredLines) {
-  for (const std::string& file : sources())
-    EXPECT_LE(lines_of(root / file).size(), 600u) << file << ": split it by what it is about";
+  const std::vector<std::string> tables{"tests/gpu/emulator/ptx.h",
+                                        "tests/gpu/emulator/translate.py"};
+  for (const std::string& file : sources()) {
+    const size_t lines = lines_of(root / file).size();
+    if (any_holds(tables, file))
+      EXPECT_GT(lines, 600u) << file << " needs no exception";
+    else
+      EXPECT_LE(lines, 600u) << file << ": split it by what it is about";
+  }
 }
 
 }  // namespace
