@@ -13,7 +13,7 @@ struct ShellLaw {
   float damping_time;                  // s
 };
 
-struct ShellTopology {
+struct ShellTopology {  // NOLINT(bugprone-reserved-identifier): clang-tidy 14, of its copy
   // of a triangle; of springs: zeros
   std::vector<float> area;         // m^2
   std::vector<float> gradient[4];  // 1/m: RestTriangle's gradient_x[0], [1], gradient_y[0], [1]
