@@ -30,6 +30,7 @@ drench_packages=(
   "libcpp-httplib-dev:/usr/include/httplib.h"
   "libopencolorio-dev:/usr/include/OpenColorIO/OpenColorIO.h"
   "ffmpeg:/usr/bin/ffmpeg"
+  "python3:/usr/bin/python3"
 )
 
 # What few need: ./test --blender and ./bench render_vs_cycles.
