@@ -15,7 +15,7 @@ namespace {
 /// An impact stretches what turns far in its one linear step, and soft sheets lie on themselves:
 /// energy and distance stand in the rows (docs/stress.md). Nothing crosses or is thrown.
 constexpr ShellGates impact{.energy = not_gated, .nearest = 0};
-/// What 1e6 N/m or sixteen times the step throw: nothing crosses.
+/// What 1e6 N/m or eight times the step may throw: nothing crosses.
 constexpr ShellGates beyond{.speed = not_gated, .energy = not_gated, .nearest = 0};
 
 double seconds() { return long_form() ? 2 : 0.5; }
@@ -62,7 +62,7 @@ TEST_P(ShellStep, NeitherBlowsUpNorCrosses) {
   ShellWatch watch(fall_on_ball(), {.step = GetParam()});
   watch.until(seconds());
   report("shell's step", fmt::format("solver at {:g}x", GetParam()), watch,
-         GetParam() < 16 ? impact : beyond);
+         GetParam() < 8 ? impact : beyond);
 }
 
 /// Ends of cells, of which two in the middle of either direction are a needle's width apart.
@@ -75,7 +75,7 @@ std::vector<double> lines_with_needles(int cells, double width) {
 
 TEST(ShellNeedles, NeitherBlowUpNorCross) {
   const test::TemporaryFolder folder;
-  for (const double width : {1e-2, 1e-4}) {
+  for (const double width : {1e-1, 1e-2, 1e-4}) {
     Shot shot = fall_on_ball();
     const Cloth like = shot.cloth[0];
     shot.cloth.clear();
@@ -85,8 +85,9 @@ TEST(ShellNeedles, NeitherBlowUpNorCross) {
     ShellWatch watch(shot);
     watch.until(seconds());
     ShellGates gates = impact;
+    gates.energy = ShellGates{}.energy;
     // Single precision does not resolve how stiff the finest are; the solver tells.
-    if (width < 1e-3) gates.speed = not_gated, gates.blow_ups = 1;
+    if (width < 1e-3) gates.speed = gates.energy = not_gated, gates.blow_ups = 1;
     report("shell's cells", fmt::format("needles, 1:{:g}", 1 / width), watch, gates);
   }
 }

@@ -20,7 +20,7 @@ namespace drench::sim::DRENCH_BACKEND {
 /// (docs/decisions/0022-cloth-sweeps.md); one where the sheets' matrix is factored
 /// (cloth_factor.h). What is left at the end is of how sheets bend; the momentum of those that
 /// nothing holds is whole (balance_loose_cloth).
-constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 400;
+constexpr int first_sweeps = 100, next_sweeps = 16, last_sweeps = 4000;
 constexpr float cloth_tolerance = 1e-3f, last_tolerance = 1e-4f;
 
 /// Rows of the near list as the pressure solve has them.
