@@ -273,15 +273,16 @@ void for_each_shell_column(S& state, const Visit& visit) {
   visit({"bend", "N/m", Group::cloth_fixed}, s.bend, none);
   visit({"fan_slot", "1", Group::cloth_fixed}, s.fan_slot, none);
   visit({"push", "N", Group::cloth_fixed}, s.push, none);
-  visit({"curved_start", "1", Group::cloth_fixed}, s.curved_start, none);
-  visit({"curved_node", "1", Group::cloth_fixed}, s.curved_node, none);
-  visit({"curved_of_start", "1", Group::cloth_fixed}, s.curved_of_start, none);
-  visit({"curved_of", "1", Group::cloth_fixed}, s.curved_of, none);
-  visit({"curved_pull", "N", Group::cloth_fixed}, s.curved_pull, none);
-  visit({"curved_of_pull", "N", Group::cloth_fixed}, s.curved_of_pull, none);
-  visit({"curved_shift", "J", Group::cloth_fixed}, s.curved_shift, none);
-  visit({"shell.normal", "1", Group::shell_system}, s.normal, none);
-  visit({"turning", "J", Group::shell_system}, s.turning, none);
+  visit({"patch_start", "1", Group::cloth_fixed}, s.patch_start, none);
+  visit({"patch_node", "1", Group::cloth_fixed}, s.patch_node, none);
+  visit({"patch_of_start", "1", Group::cloth_fixed}, s.patch_of_start, none);
+  visit({"patch_of", "1", Group::cloth_fixed}, s.patch_of, none);
+  visit({"patch_of_triangle", "1", Group::cloth_fixed}, s.patch_of_triangle, none);
+  visit({"patch_weight", "1/m", Group::cloth_fixed}, s.patch_weight, none);
+  visit({"patch_rest", "1", Group::cloth_fixed}, s.patch_rest, none);
+  visit({"patch_shift", "1", Group::cloth_fixed}, s.patch_shift, none);
+  visit({"patch_moment", "N m^(1/2)", Group::shell_system}, s.moment, none);
+  visit({"bend_factor", "s^2", Group::shell_system}, s.bend_factor, none);
   visit({"shell.path", "m/s", Group::shell_system}, s.path, none);
   visit({"about", "m", Group::shell_system}, s.about, none);
   visit({"from", "m", Group::shell_system}, s.from, none);
@@ -303,8 +304,6 @@ void for_each_wet_column(S& state, const Visit& visit) {
   visit({"dry_mass", "kg", Group::cloth_fixed}, w.dry_mass, none);
   visit({"dry_law", "", Group::cloth_fixed}, w.dry_law, none);
   visit({"dry_bend", "N/m", Group::cloth_fixed}, w.dry_bend, none);
-  visit({"dry_pull", "N", Group::cloth_fixed}, w.dry_pull, none);
-  visit({"dry_of_pull", "N", Group::cloth_fixed}, w.dry_of_pull, none);
   visit({"dry_push", "N", Group::cloth_fixed}, w.dry_push, none);
   visit({"softness", "1", Group::wet_cloth}, w.softness, none);
 }

@@ -11,6 +11,17 @@ struct ShellLaw {
   float c11, c22, c12, c66;            // N/m
   float limit_start, limit_stiffness;  // Green strain; N/m
   float damping_time;                  // s
+  float d11, d22, d12, d66;            // N m, of bending
+};
+
+/// Bending patches (sim/setup/shell_rest.h) of triangles, times the roots of the areas that they
+/// stand for: of sheets that are curved at rest, or whose bending is damped. Rows by triangle.
+struct PatchTopology {
+  std::vector<int> start, node;
+  std::vector<float> weight[3];                  // 1/m, xx, yy and xy of a node
+  std::vector<float> rest[3];                    // 1, of a triangle: its curvature at rest
+  std::vector<float> shift_x, shift_y, shift_z;  // 3 a triangle, 1: sums weight shift; or empty
+  bool used = false, curved = false;             // of any sheet
 };
 
 struct ShellTopology {  // NOLINT(bugprone-reserved-identifier): clang-tidy 14, of its copy
@@ -24,12 +35,7 @@ struct ShellTopology {  // NOLINT(bugprone-reserved-identifier): clang-tidy 14, 
   std::vector<float> bend;  // N/m of an entry: what pulls the row's vertex to the entry's
   // N of a vertex: bending across the seams of sheets that are joined to themselves; or empty
   std::vector<float> push_x, push_y, push_z;
-
-  // Of triangles that are curved at rest, else empty: their energy has the term -n . sum q x over
-  // the nodes of their patches (shell_bending.h), n the unit normal.
-  std::vector<int> curved_start, curved_node;                         // rows by triangle
-  std::vector<float> curved_pull;                                     // N, q
-  std::vector<float> curved_shift_x, curved_shift_y, curved_shift_z;  // J: sum q shift; or empty
+  PatchTopology patch;  // of no triangle where no sheet needs them
 
   bool any() const { return !row_start.empty(); }
 };

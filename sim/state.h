@@ -173,7 +173,7 @@ struct ShellState {
   Column<float> area, gradient;  // m^2; 4 fields, 1/m
   Column<int> corner, sheet;     // 3 fields, 1 field
   VecColumn edge_shift;          // m, 2 fields: of corners 1 and 2 against 0; only across seams
-  Column<float> law;             // 7 fields of `sheets`: ShellLaw
+  Column<float> law;             // 11 fields of `sheets`: ShellLaw
   int sheets = 0;
   // rows, by slices of eight vertices (sliced ELLPACK)
   Column<int> ring_start, row_start;  // first slot of a slice's blocks, of its entries
@@ -183,22 +183,25 @@ struct ShellState {
   Column<int> fan_slot;     // 2 a fan entry: slots of the triangle's next corner and the one after
   VecColumn push;           // N, of bending across seams
   int ring_slots = 0;       // of all slices
-  // Of sheets that are curved at rest: ShellTopology, and the same by vertex.
-  bool curved = false;
-  Column<int> curved_start, curved_node, curved_of_start, curved_of;
-  Column<float> curved_pull, curved_of_pull;  // N
-  VecColumn curved_shift;                     // J
+  // Bending patches, PatchTopology: by slices of eight triangles, and of a vertex the entries and
+  // triangles in whose patches it is.
+  bool patches = false, curved = false;
+  Column<int> patch_start, patch_node, patch_of_start, patch_of, patch_of_triangle;
+  Column<float> patch_weight, patch_rest;  // 1/m, 3 fields of entries; 1, 3 fields of triangles
+  VecColumn patch_shift;                   // 1, 3 fields of triangles
+  int patch_entries = 0;
   // rebuilt every step
   VecColumn path;             // m/s, of the straight path
-  VecColumn about, from;      // m, off the straight paths: where triangles are linearised anew, and
+  VecColumn about, from;      // m, off the straight paths: where the step is taken to end, at
+                              // first as accelerated as the last one was, then as solved for; and
                               // where the last solve of the step started
   int linearised = 1;         // times in the step
   Column<float> element;      // 42 fields of `triangles`: ElementFields
   Column<float> block;        // kg, 9 fields of ring entries, by rows
   Column<float> tension;      // kg, of ring entries: see TensionMatrix
   Column<float> diagonal;     // kg, 6 fields of vertices: xx xy xz yy yz zz
-  VecColumn normal, turning;  // unit and J, of triangles that are curved at rest: n, sum q x; two
-                              // fields of `triangles`: at the start, where straight paths end
+  VecColumn moment;           // N m^(1/2), 3 fields of `triangles`: ShellBending
+  Column<float> bend_factor;  // s^2, of a vertex: by it `bend` stands in the matrix
   VecColumn base;             // kg m, the sheet's own part of ClothSystem::base
 };
 
@@ -208,9 +211,9 @@ struct WetState {
   // kept from step to step
   Column<float> wetness;  // of a vertex, 0 to 1
   // fixed
-  Column<WetLaw> law;                                                // of a sheet
-  std::vector<VertexRange> sheets;                                   // their vertices
-  Column<float> dry_mass, dry_law, dry_bend, dry_pull, dry_of_pull;  // as ClothState, ShellState
+  Column<WetLaw> law;                         // of a sheet
+  std::vector<VertexRange> sheets;            // their vertices
+  Column<float> dry_mass, dry_law, dry_bend;  // as ClothState, ShellState
   VecColumn dry_push;
   // rebuilt every step
   Column<float> softness;  // of a sheet: its stiffness over that of the dry one

@@ -83,14 +83,19 @@ BendingMatrix no_bending(size_t nodes) {
           .push = std::vector<V3d>(nodes, V3d(0))};
 }
 
+void end_patch(PatchTopology& p) {
+  p.start.push_back(int(p.node.size()));
+  for (std::vector<float>& rest : p.rest) rest.push_back(0.f);
+  for (std::vector<float>* shift : {&p.shift_x, &p.shift_y, &p.shift_z})
+    shift->insert(shift->end(), 3, 0.f);
+}
+
 /// A sheet of springs in the company of shells.
 void append_nothing(const Sheet& sheet, ShellTopology& t) {
   for (size_t k = 0; k < sheet.triangle.size(); ++k) {
     t.area.push_back(0.f);
     for (auto& gradient : t.gradient) gradient.push_back(0.f);
-    t.curved_start.push_back(int(t.curved_node.size()));
-    t.curved_shift_x.push_back(0.f), t.curved_shift_y.push_back(0.f),
-        t.curved_shift_z.push_back(0.f);
+    end_patch(t.patch);
   }
   t.law.push_back({});
   for (size_t i = 0; i < sheet.point.size(); ++i)
@@ -105,27 +110,46 @@ void append_push(const Sheet& sheet, const BendingMatrix* bending, ShellTopology
   }
 }
 
-/// q of the nodes of patches: see ShellTopology. A triangle that turns by less than a millionth
-/// over its own size is flat.
-void append_curvature(const ShellRest& rest, int base, ShellTopology& t) {
-  const auto is_flat = [&](size_t k) {
-    const auto& r = rest.patch[k].rest;
-    return std::hypot(r.xx, r.yy, r.xy) * std::sqrt(rest.triangle[k].area) < 1e-6;
-  };
-  for (size_t k = 0; k < rest.patch.size(); ++k) {
-    const BendingPatch& p = rest.patch[k];
-    V3d shift(0);
-    for (const PatchNode& n : p.node) {
-      if (is_flat(k)) break;
-      const double q =
-          cpu::bending_weight(rest.triangle[k].area * p.share, rest.bending, n.weight, p.rest);
-      t.curved_node.push_back(n.index + base), t.curved_pull.push_back(float(q));
-      shift += n.shift * q;
+/// A triangle that turns by less than a millionth over its own size is flat.
+bool is_curved(const ShellRest& rest, size_t k) {
+  const auto& r = rest.patch[k].rest;
+  return std::hypot(r.xx, r.yy, r.xy) * std::sqrt(rest.triangle[k].area) >= 1e-6;
+}
+
+void append_patch(const ShellRest& rest, size_t k, int base, PatchTopology& to) {
+  const BendingPatch& p = rest.patch[k];
+  const double root = std::sqrt(rest.triangle[k].area * p.share);
+  V3d shift[3] = {V3d(0), V3d(0), V3d(0)};
+  for (const PatchNode& n : p.node) {
+    const double weight[3] = {n.weight.xx * root, n.weight.yy * root, n.weight.xy * root};
+    to.node.push_back(n.index + base);
+    for (size_t c = 0; c < 3; ++c) {
+      to.weight[c].push_back(float(weight[c]));
+      shift[c] += n.shift * weight[c];
     }
-    t.curved_start.push_back(int(t.curved_node.size()));
-    t.curved_shift_x.push_back(float(shift.x)), t.curved_shift_y.push_back(float(shift.y)),
-        t.curved_shift_z.push_back(float(shift.z));
   }
+  end_patch(to);
+  const double curvature[3] = {p.rest.xx * root, p.rest.yy * root, p.rest.xy * root};
+  for (size_t c = 0; c < 3; ++c) {
+    if (is_curved(rest, k)) to.rest[c].back() = float(curvature[c]);
+    const size_t at = to.shift_x.size() - 3 + c;
+    to.shift_x[at] = float(shift[c].x), to.shift_y[at] = float(shift[c].y),
+    to.shift_z[at] = float(shift[c].z);
+  }
+}
+
+/// @param bends  whether it has rigidity
+void append_patches(const ShellRest& rest, const Cloth& cloth, bool bends, int base,
+                    PatchTopology& to) {
+  bool curved = false;
+  for (size_t k = 0; k < rest.patch.size(); ++k) {
+    if (bends)
+      append_patch(rest, k, base, to), curved = curved || is_curved(rest, k);
+    else
+      end_patch(to);
+  }
+  to.used = to.used || curved || (bends && cloth.damping_time > 0);
+  to.curved = to.curved || curved;
 }
 
 }  // namespace
@@ -133,7 +157,7 @@ void append_curvature(const ShellRest& rest, int base, ShellTopology& t) {
 void append_shell(const Sheet& sheet, const Cloth& cloth, const LocalFrame& frame,
                   ClothTopology& topology) {
   ShellTopology& t = topology.shell;
-  if (t.row_start.empty()) t.row_start.push_back(0), t.curved_start.push_back(0);
+  if (t.row_start.empty()) t.row_start.push_back(0), t.patch.start.push_back(0);
   if (cloth.model != ClothModel::shell) {
     append_push(sheet, nullptr, t);
     return append_nothing(sheet, t);
@@ -142,6 +166,7 @@ void append_shell(const Sheet& sheet, const Cloth& cloth, const LocalFrame& fram
             base_triangle = topology.triangles() - int(sheet.triangle.size());
   const ShellSurface surface = surface_of(sheet, cloth, frame, topology, base_triangle);
   const double stiffest = std::max(cloth.bend_warp, cloth.bend_weft);
+  const bool bends = stiffest > 0;
   const ShellRest rest = shell_rest(
       surface, {.areal_density = cloth.areal_density, .bending = rigidity_of(cloth, stiffest)});
   for (const auto& triangle : rest.triangle) {
@@ -161,12 +186,16 @@ void append_shell(const Sheet& sheet, const Cloth& cloth, const LocalFrame& fram
                    .c66 = float(moduli.c66),
                    .limit_start = float(limit.start),
                    .limit_stiffness = float(limit.stiffness),
-                   .damping_time = float(cloth.damping_time)});
+                   .damping_time = float(cloth.damping_time),
+                   .d11 = float(bends * rest.bending.d11),
+                   .d22 = float(bends * rest.bending.d22),
+                   .d12 = float(bends * rest.bending.d12),
+                   .d66 = float(bends * rest.bending.d66)});
   const BendingMatrix bending =
-      stiffest > 0 ? bending_matrix(rest, sheet.point.size()) : no_bending(sheet.point.size());
+      bends ? bending_matrix(rest, sheet.point.size()) : no_bending(sheet.point.size());
   append_rows(sheet, bending, t, base);
   append_push(sheet, &bending, t);
-  append_curvature(rest, base, t);
+  append_patches(rest, cloth, bends, base, t.patch);
 }
 
 }  // namespace drench::sim

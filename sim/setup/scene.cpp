@@ -505,8 +505,9 @@ void place_sheets(const Shot& shot, Scene& scene) {
     ClothTopology& t = scene.cloth;
     t.corner_shift = t.spring_shift = t.rest_period = {};
     t.shell.push_x = t.shell.push_y = t.shell.push_z = {};
-    t.shell.curved_shift_x = t.shell.curved_shift_y = t.shell.curved_shift_z = {};
+    t.shell.patch.shift_x = t.shell.patch.shift_y = t.shell.patch.shift_z = {};
   }
+  if (!scene.cloth.shell.patch.used) scene.cloth.shell.patch = {};
   tie_sheets(shot, scene);
   // Images across seams are not looked for.
   const std::vector<char>& meets = scene.cloth.meets_sheets;

@@ -2,6 +2,7 @@
 
 #include "sim/passes/cloth/shell_bending.h"
 
+#include <Imath/ImathMatrix.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -350,6 +351,93 @@ TEST(ShellBending, APatchOnAConicIsFinite) {
   }
   auto x = quadratic(surface.rest, 1, 1, 0);  // a paraboloid: all of them at one height
   EXPECT_LT(energy(rest, x), 1e-6);
+}
+
+/// A patch that is bent and strained, and displacements of its nodes.
+struct BentPatch {
+  sim::ShellRest rest;
+  std::vector<V3d> x, u;
+  size_t triangle;
+
+  const sim::BendingPatch& patch() const { return rest.patch[triangle]; }
+  Curvature<V> curvature_of(const std::vector<V3d>& places) const {
+    return curvature(patch(), places);
+  }
+  V corner(const std::vector<V3d>& of, int c) const {
+    const V3d d = of[size_t(patch().node[c].index)] - of[size_t(patch().node[0].index)];
+    return {d.x, d.y, d.z};
+  }
+  TriangleTurn<double> turn() const {
+    return {corner(x, 1), corner(x, 2), rest.triangle[triangle].area};
+  }
+  /// What changes of the curvature beside turning.
+  Curvature<V> change() const {
+    const V theta = turn().of(corner(u, 1), corner(u, 2));
+    return curvature_of(u) - turned(theta, curvature_of(x));
+  }
+};
+
+BentPatch bent_patch(SheetMesh mesh) {
+  const sim::ShellSurface surface = flat_sheet(mesh, {1, 1, 8});
+  BentPatch b{shell_rest(surface, plate(0.3, 0.2)), surface.rest, {}, 0};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto any = [&] { return V3d(uniform(random), uniform(random), uniform(random)); };
+  for (V3d& p : b.x) p = V3d(std::sin(2 * p.x), 1.1 * p.y, std::cos(2 * p.x)) + any() * 5e-3;
+  for (size_t v = 0; v < b.x.size(); ++v) b.u.push_back(any());
+  for (size_t t = 1; t < b.rest.patch.size(); ++t)
+    if (b.rest.patch[t].node.size() > b.patch().node.size()) b.triangle = t;
+  return b;
+}
+
+// Halfway of a rotation by a finite angle: Cayley's form of it.
+TEST(ShellBending, RotationsChangeNoCurvatureAsTheTriangleSeesIt) {
+  for (const SheetMesh mesh : all_meshes) {
+    BentPatch b = bent_patch(mesh);
+    Imath::M44d rotation;
+    rotation.setAxisAngle(V3d(1, -2, 3).normalized(), 0.8);
+    for (size_t v = 0; v < b.x.size(); ++v) {
+      V3d to;
+      rotation.multDirMatrix(b.x[v], to);
+      b.u[v] = to - b.x[v], b.x[v] = (to + b.x[v]) * 0.5;
+    }
+    const auto left = b.change(), was = b.curvature_of(b.x);
+    EXPECT_LT(contract(left, left), 1e-20 * contract(was, was)) << int(mesh);
+  }
+}
+
+TEST(ShellBending, TurningPullsCornersByItsDerivative) {
+  const BentPatch b = bent_patch(SheetMesh::unstructured);
+  const V torque{0.3, -0.7, 0.5};
+  const auto turn = b.turn();
+  const V d1 = b.corner(b.u, 1), d2 = b.corner(b.u, 2);
+  EXPECT_NEAR(dot(torque, turn.of(d1, d2)),
+              dot(turn.derivative(1, torque), d1) + dot(turn.derivative(2, torque), d2), 1e-12);
+}
+
+// J^T D J <= 4/3 (K + 3 kappa^T D kappa |grad u|^2): the matrix that stands for viscosity is at
+// least three quarters of it.
+TEST(ShellBending, ItsMatrixHoldsTheViscousForces) {
+  for (const SheetMesh mesh : all_meshes) {
+    BentPatch b = bent_patch(mesh);
+    std::mt19937 random(9);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    const auto& d = b.rest.bending;
+    const auto kappa = b.curvature_of(b.x);
+    const auto turn = b.turn();
+    for (int k = 0; k < 1000; ++k) {
+      for (V3d& u : b.u) u = V3d(uniform(random), uniform(random), uniform(random));
+      const V d1 = b.corner(b.u, 1), d2 = b.corner(b.u, 2);
+      const double gradient2 = length2(turn.dual[0]) * length2(d1) +
+                               length2(turn.dual[1]) * length2(d2) +
+                               2 * dot(turn.dual[0], turn.dual[1]) * dot(d1, d2);
+      const auto straight = b.curvature_of(b.u), change = b.change();
+      EXPECT_LE(contract(moment(d, change), change),
+                4. / 3 *
+                    (contract(moment(d, straight), straight) +
+                     3 * contract(moment(d, kappa), kappa) * gradient2));
+    }
+  }
 }
 
 }  // namespace

@@ -24,6 +24,9 @@ double plate_error(SheetMesh mesh, int cells);
 /// Period of a cantilever in its first mode, in steps of dt seconds.
 double mode_error(SheetMesh mesh, int cells, double dt);
 
+/// Logarithmic decrement of the same at so much of critical damping, in so many steps a period.
+double mode_loss_error(SheetMesh mesh, int cells, double ratio, int steps);
+
 /// Period of a stiff sheet that swings about a row of held vertices from 90 degrees.
 double pendulum_error(SheetMesh mesh, int cells);
 

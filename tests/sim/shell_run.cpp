@@ -17,7 +17,7 @@ sim::ShellSurface placed(const ShellSheet& sheet) {
   s.uv.clear();
   for (V3d& x : s.rest) {
     s.uv.push_back(Imath::V2f(float(x.x), float(x.y)));
-    x = sheet.corner + sheet.along * x.x + sheet.across * x.y;
+    x = sheet.shape ? sheet.shape(x) : sheet.corner + sheet.along * x.x + sheet.across * x.y;
   }
   return s;
 }

@@ -11,7 +11,8 @@ namespace drench::sim_tests {
 
 constexpr double shell_gravity = 9.81;  // m/s^2, downwards
 
-/// An isotropic sheet that spans size.length along `along` and size.width along `across`.
+/// An isotropic sheet that spans size.length along `along` and size.width along `across`, unless it
+/// has a shape.
 struct ShellSheet {
   SheetMesh mesh = SheetMesh::diagonal;
   SheetSize size{1, 1, 8};
@@ -21,6 +22,7 @@ struct ShellSheet {
   double damping = 0, damping_time = 0;             // 1/s, s
   V3d gravity{0, -shell_gravity, 0};                // m/s^2
   std::function<bool(V3d)> held = {};               // of a place in its plane; empty: nothing is
+  std::function<V3d(V3d)> shape = {};               // from there to its rest shape; empty: flat
 
   double weight() const { return areal_density * shell_gravity; }  // N/m^2
 };

@@ -133,8 +133,15 @@ TEST(Skip, AShellWithoutRigidityHasNoRowsOfBending) {
   EXPECT_EQ(of_bending(sim::build_scene(shot).cloth.shell), 0u);
 }
 
-TEST(Skip, AFlatShellHasNoCurvatureOfRest) {
-  EXPECT_TRUE(sim::build_scene(hanging_shell()).cloth.shell.curved_node.empty());
+TEST(Skip, PatchesAreOfShellsWhoseBendingIsDamped) {
+  Shot shot = hanging_shell();
+  const auto patches = [&] { return sim::build_scene(shot).cloth.shell.patch.node.size(); };
+  shot.cloth[0].damping_time = 0.005;
+  EXPECT_GT(patches(), 0u);
+  shot.cloth[0].bend_warp = shot.cloth[0].bend_weft = shot.cloth[0].bend_bias = 0;
+  EXPECT_EQ(patches(), 0u);
+  shot = hanging_shell(), shot.cloth[0].damping_time = 0;
+  EXPECT_EQ(patches(), 0u);
 }
 
 // Files hold it; steps do not know.

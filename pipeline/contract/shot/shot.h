@@ -212,7 +212,7 @@ struct Cloth {
   double poisson = 0.2;                                                  // geometric mean of both
   double bend_warp = 1.96e-5, bend_weft = 1.37e-5, bend_bias = 1.27e-5;  // N m
   double stretch_limit = 1.05;           // length over rest length where it stiffens
-  double damping_time = 0.005;           // s, viscosity over stiffness in its plane
+  double damping_time = 0.005;           // s, viscosity over stiffness
   double friction = 0.5;                 // Coulomb's coefficient on itself
   bool self_collision = true;            // it meets itself and other shells
   bool soaks = false;                    // it takes up fluid that touches it

@@ -97,8 +97,9 @@ std::vector<Parameter> cloth_rows() {
       row<&Cloth::stretch_limit>("cloth", "stretch_limit", "", {1.0001, 100}, simulate,
                                  "length over rest length beyond which it stiffens, softly")
           .only(ClothModel::automatic, ClothModel::shell),
-      row<&Cloth::damping_time>("cloth", "damping_time", "s", {0, 10}, simulate,
-                                "inner friction in its plane, viscosity over stiffness")
+      row<&Cloth::damping_time>(
+          "cloth", "damping_time", "s", {0, 10}, simulate,
+          "inner friction, viscosity over stiffness of stretching and bending")
           .only(ClothModel::automatic, ClothModel::shell),
       row<&Cloth::friction>("cloth", "friction", "", {0, 10}, simulate,
                             "Coulomb's coefficient of the sheet on itself; of two sheets on each "

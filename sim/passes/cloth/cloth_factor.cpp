@@ -85,7 +85,8 @@ struct Couplings {
       largest = std::max(largest, std::abs(m.bend[ShellRows::entry(slot, i)]));
     for (int slot = inner; slot < end; ++slot) {
       const int at = ShellRows::entry(slot, i), j = m.rows.end[at];
-      if (j != i && std::abs(m.bend[at]) > least * largest) f(j, Block::of(m.bend[at] * m.dt2));
+      if (j != i && std::abs(m.bend[at]) > least * largest)
+        f(j, Block::of(m.bend[at] * m.bend_factor[i]));
     }
   }
 };

@@ -112,7 +112,7 @@ struct LeafEnergies {
     }
     for (int slot = inner; slot < end; ++slot) {
       const int at = ShellRows::entry(slot, i);
-      const float k = matrix.shell.bend[at] * matrix.shell.dt2;
+      const float k = matrix.shell.bend[at] * matrix.shell.bend_factor[i];
       to.trace += 3.f * k;
       add_link(a, i, rows.end[at], k, 0.5f * k, to);
     }

@@ -25,6 +25,19 @@ struct Curvature {
   V xx, yy, xy;
 };
 
+template <class V>
+DRENCH_HD Curvature<V> operator+(const Curvature<V>& a, const Curvature<V>& b) {
+  return {a.xx + b.xx, a.yy + b.yy, a.xy + b.xy};
+}
+template <class V>
+DRENCH_HD Curvature<V> operator-(const Curvature<V>& a, const Curvature<V>& b) {
+  return {a.xx - b.xx, a.yy - b.yy, a.xy - b.xy};
+}
+template <class V, class T>
+DRENCH_HD Curvature<V> operator*(const Curvature<V>& a, T s) {
+  return {a.xx * s, a.yy * s, a.xy * s};
+}
+
 template <class V, class T>
 DRENCH_HD Curvature<V> moment(const Rigidity<T>& d, const Curvature<V>& k) {
   return {k.xx * d.d11 + k.yy * d.d12, k.xx * d.d12 + k.yy * d.d22, k.xy * d.d66};
@@ -98,6 +111,43 @@ DRENCH_HD Vec3<T> turning_force(T area, const Curvature<Vec3<T>>& moments, const
                                 const TurningNormal<T>& normal, int c) {
   const Vec3<T> q = moments.xx * rest.xx + moments.yy * rest.yy + moments.xy * rest.xy;
   return normal.derivative(c, q) * area;
+}
+
+/// How a triangle turns: linear in how corners 1 and 2 move against corner 0, and that of any
+/// motion that is rigid. One of less than a hundredth of its area at rest turns as one of that.
+template <class T>
+struct TriangleTurn {
+  Vec3<T> normal, dual[2];  // 1 and 1/m: dual to the edges in their plane
+
+  DRENCH_HD TriangleTurn(Vec3<T> edge1, Vec3<T> edge2, T rest_area) {
+    const Vec3<T> twice = cross(edge1, edge2);
+    const T least = maximum(T(0.02f) * rest_area, T(1e-12f));  // so that none is an area, too
+    const T inverse = T(1.f) / maximum(square_root(length2(twice)), least);
+    normal = twice * inverse;
+    dual[0] = cross(edge2, normal) * inverse, dual[1] = cross(normal, edge1) * inverse;
+  }
+  /// Radian, of displacements; of a rotation their curl is the axis and the normal part again.
+  DRENCH_HD Vec3<T> of(Vec3<T> d1, Vec3<T> d2) const {
+    const Vec3<T> curl = cross(dual[0], d1) + cross(dual[1], d2);
+    return curl - normal * (T(0.5f) * dot(normal, curl));
+  }
+  /// Derivative of torque . of(d1, d2) by d1 or d2, corner 1 or 2.
+  DRENCH_HD Vec3<T> derivative(int corner, Vec3<T> torque) const {
+    const Vec3<T> q = torque - normal * (T(0.5f) * dot(normal, torque));
+    return cross(q, dual[corner - 1]);
+  }
+};
+
+/// kappa as turned by `turn`, less kappa.
+template <class T>
+DRENCH_HD Curvature<Vec3<T>> turned(Vec3<T> turn, const Curvature<Vec3<T>>& kappa) {
+  return {cross(turn, kappa.xx), cross(turn, kappa.yy), cross(turn, kappa.xy)};
+}
+
+/// The derivative of contract(turned(turn, kappa), moments) by `turn`.
+template <class T>
+DRENCH_HD Vec3<T> torque(const Curvature<Vec3<T>>& kappa, const Curvature<Vec3<T>>& moments) {
+  return cross(kappa.xx, moments.xx) + cross(kappa.yy, moments.yy) + cross(kappa.xy, moments.xy);
 }
 
 }  // namespace drench::sim::DRENCH_BACKEND

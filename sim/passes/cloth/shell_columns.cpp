@@ -14,7 +14,8 @@ void load_triangles(State& state, const ClothTopology& cloth) {
   const ShellTopology& t = cloth.shell;
   const int n = cloth.triangles(), padded = (n + 7) / 8 * 8;
   s.triangles = padded, s.sheets = int(t.law.size());
-  std::vector<float> area(t.area), gradient(size_t(4) * padded, 0.f), law(7 * t.law.size());
+  std::vector<float> area(t.area), gradient(size_t(4) * padded, 0.f),
+      law(shell_law_fields * t.law.size());
   std::vector<int> corner(size_t(3) * padded, 0), sheet(cloth.sheet);
   area.resize(padded, 0.f), sheet.resize(padded, 0);
   for (int k = 0; k < 4; ++k)
@@ -23,9 +24,10 @@ void load_triangles(State& state, const ClothTopology& cloth) {
     for (int c = 0; c < 3; ++c) corner[c * padded + k] = cloth.corner[3 * k + c];
   for (size_t k = 0; k < t.law.size(); ++k) {
     const ShellLaw& l = t.law[k];
-    const float field[7] = {l.c11,         l.c22, l.c12, l.c66, l.limit_start, l.limit_stiffness,
-                            l.damping_time};
-    for (size_t f = 0; f < 7; ++f) law[f * t.law.size() + k] = field[f];
+    const float field[shell_law_fields] = {
+        l.c11,          l.c22, l.c12, l.c66, l.limit_start, l.limit_stiffness,
+        l.damping_time, l.d11, l.d22, l.d12, l.d66};
+    for (size_t f = 0; f < shell_law_fields; ++f) law[f * t.law.size() + k] = field[f];
   }
   from_host(s.area, area), from_host(s.gradient, gradient), from_host(s.law, law);
   from_host(s.corner, corner), from_host(s.sheet, sheet);
@@ -96,30 +98,63 @@ std::vector<int> fan_slots(const ClothTopology& cloth, const Slices& slices) {
   return slot;
 }
 
-/// Rows by triangle, and by vertex.
-void load_curvature(State& state, const ClothTopology& cloth) {
-  const ShellTopology& t = cloth.shell;
-  ShellState& s = state.shell;
-  s.curved = !t.curved_node.empty();
-  if (!s.curved) return;
-  std::vector<int> start(size_t(cloth.vertices()) + 1, 0), of(t.curved_node.size());
-  std::vector<float> pull(of.size());
-  for (const int v : t.curved_node) ++start[size_t(v) + 1];
-  for (size_t v = 1; v < start.size(); ++v) start[v] += start[v - 1];
-  std::vector<int> next(start);
-  for (int k = 0; k < cloth.triangles(); ++k) {
-    for (int e = t.curved_start[k]; e < t.curved_start[k + 1]; ++e) {
-      const int at = next[t.curved_node[e]]++;
-      of[at] = k, pull[at] = t.curved_pull[e];
+/// Patches of eight triangles slot by slot, and where they stand by vertex. One that is shorter
+/// than others of its slice ends on nodes of no weight.
+struct PatchSlices {
+  std::vector<int> start{0}, node, of_start{0}, of, of_triangle;
+  std::vector<float> weight[3];
+
+  PatchSlices(const PatchTopology& p, int triangles, int vertices) {
+    std::vector<std::vector<std::pair<int, int>>> in(static_cast<size_t>(vertices));
+    for (int first = 0; first < triangles; first += 8) {
+      const int last = std::min(first + 8, triangles);
+      int slots = 0;
+      for (int t = first; t < last; ++t) slots = std::max(slots, p.start[t + 1] - p.start[t]);
+      const int base = int(node.size());
+      node.resize(size_t(base + 8 * slots), 0);
+      for (std::vector<float>& w : weight) w.resize(node.size(), 0.f);
+      for (int t = first; t < last; ++t) {
+        for (int k = p.start[t]; k < p.start[t + 1]; ++k) {
+          const int at = base + 8 * (k - p.start[t]) + t - first;
+          node[at] = p.node[k];
+          for (int c = 0; c < 3; ++c) weight[c][at] = p.weight[c][k];
+          in[p.node[k]].emplace_back(at, t);
+        }
+      }
+      start.push_back(start.back() + slots);
+    }
+    for (const auto& entries : in) {
+      for (const auto& [at, t] : entries) of.push_back(at), of_triangle.push_back(t);
+      of_start.push_back(int(of.size()));
     }
   }
-  from_host(s.curved_start, t.curved_start), from_host(s.curved_node, t.curved_node);
-  from_host(s.curved_pull, t.curved_pull), from_host(s.curved_of_pull, pull);
-  from_host(s.curved_of_start, start), from_host(s.curved_of, of);
-  s.normal.resize(s.triangles), s.turning.resize(s.triangles);
+};
+
+void load_patches(State& state, const ClothTopology& cloth) {
+  const PatchTopology& p = cloth.shell.patch;
+  ShellState& s = state.shell;
+  s.patches = p.used, s.curved = p.curved;
+  if (!s.patches) return;
+  const PatchSlices slices(p, cloth.triangles(), cloth.vertices());
+  std::vector<float> weight, rest(size_t(3) * s.triangles, 0.f);
+  for (int c = 0; c < 3; ++c) {
+    weight.insert(weight.end(), slices.weight[c].begin(), slices.weight[c].end());
+    std::copy(p.rest[c].begin(), p.rest[c].end(), rest.begin() + c * s.triangles);
+  }
+  s.patch_entries = int(slices.node.size());
+  from_host(s.patch_start, slices.start), from_host(s.patch_node, slices.node);
+  from_host(s.patch_weight, weight), from_host(s.patch_rest, rest);
+  from_host(s.patch_of_start, slices.of_start), from_host(s.patch_of, slices.of);
+  from_host(s.patch_of_triangle, slices.of_triangle);
+  s.moment.resize(3 * s.triangles);
   if (!state.cloth.joined) return;
-  from_host(s.curved_shift.x, t.curved_shift_x), from_host(s.curved_shift.y, t.curved_shift_y),
-      from_host(s.curved_shift.z, t.curved_shift_z);
+  const auto by_field = [&](const std::vector<float>& shift) {
+    std::vector<float> fields(size_t(3) * s.triangles, 0.f);
+    for (size_t k = 0; k < shift.size(); ++k) fields[k % 3 * s.triangles + k / 3] = shift[k];
+    return fields;
+  };
+  from_host(s.patch_shift.x, by_field(p.shift_x)), from_host(s.patch_shift.y, by_field(p.shift_y)),
+      from_host(s.patch_shift.z, by_field(p.shift_z));
 }
 
 }  // namespace
@@ -136,9 +171,10 @@ void load_shell(State& state, const ClothTopology& cloth) {
   from_host(s.ring_start, slices.ring_start), from_host(s.row_start, slices.row_start);
   from_host(s.end, slices.end), from_host(s.offset, slices.offset), from_host(s.bend, slices.bend);
   from_host(s.fan_slot, fan_slots(cloth, slices));
-  load_curvature(state, cloth);
+  load_patches(state, cloth);
   const size_t entries = size_t(8) * s.ring_slots, padded = state.cloth.padded;
   s.block.resize(9 * entries), s.tension.resize(entries), s.diagonal.resize(6 * padded);
+  s.bend_factor.resize(padded);
   for (VecColumn* v : {&s.path, &s.about, &s.from, &s.base, &s.landed, &s.rounding, &s.left,
                        &s.lost, &s.acceleration, &s.friction, &s.internal})
     v->resize(padded);

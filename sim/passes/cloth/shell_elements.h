@@ -92,7 +92,7 @@ struct ShellElements {
     const auto field = [&](int k) { return load(law + k * sheets, sheet_of); };
     return {.moduli = {field(0), field(1), field(2), field(3), T(0.f), T(0.f)},
             .limit = {field(4), field(5)},
-            .damping_time = field(6)};
+            .damping_time = field(damping_field)};
   }
 
   /// How far along its straight path a triangle is linearised, by the strain of the whole path.
@@ -167,10 +167,12 @@ struct ShellElements {
     return {way, f, response, positive_part(stress)};
   }
 
-  template <class Index>
-  DRENCH_HD void operator()(Index t) const {
+  /// @param patches  what bending adds: ShellPatches
+  template <class Index, class Patches>
+  DRENCH_HD void operator()(Index t, const Patches& patches) const {
     using T = decltype(load(area, t));
     const int stride = corners.stride;
+    const auto bending = patches(t);
     const auto put = [&](int field, T value) { store(element + field * stride, t, value); };
     const RestTriangle<T> rest = rest_of(t);
     const Linear<T> at = linear(t, rest, law_of<T>(load(sheet, t)));
@@ -182,15 +184,17 @@ struct ShellElements {
     for (int pair = 0; pair < 3; ++pair) {
       const int a = pair == 2 ? 1 : 0, b = pair == 0 ? 1 : 2;
       const Block3<T> k = membrane_block(rest, f, pull, at.response.moduli, a, b);
-      const Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
+      Vec3<T> row[3] = {k.x * scale, k.y * scale, k.z * scale};
+      const T turn = bending.stiffness[pair] * T(dt2);
+      row[0].x = row[0].x + turn, row[1].y = row[1].y + turn, row[2].z = row[2].z + turn;
       for (int r = 0; r < 3; ++r) {
         put(blocks + 9 * pair + 3 * r, row[r].x), put(blocks + 9 * pair + 3 * r + 1, row[r].y);
         put(blocks + 9 * pair + 3 * r + 2, row[r].z);
       }
     }
     for (int c = 1; c < 3; ++c) {
-      const Vec3<T> force =
-          membrane_force(rest, f, stress, c) + membrane_force(rest, ahead, pull, c);
+      const Vec3<T> force = membrane_force(rest, f, stress, c) +
+                            membrane_force(rest, ahead, pull, c) + bending.force[c - 1];
       put(forces + 3 * c - 3, force.x), put(forces + 3 * c - 2, force.y);
       put(forces + 3 * c - 1, force.z);
     }

@@ -6,8 +6,7 @@
 #include "sim/passes/cloth/cloth_implicit.h"
 #include "sim/passes/cloth/cloth_pins.h"
 #include "sim/passes/cloth/self_contact.h"
-#include "sim/passes/cloth/shell_bending.h"
-#include "sim/passes/cloth/shell_elements.h"
+#include "sim/passes/cloth/shell_patches.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -19,8 +18,15 @@ void find_paths(State& state) {
   const ConstVecView x = state.cloth.position.view(), v = state.cloth.velocity.view(),
                      landed = s.landed.view(), left = s.left.view();
   const VecView rounding = state.shell.rounding.view(), lost = state.shell.lost.view(),
-                acceleration = state.shell.acceleration.view(), path = state.shell.path.view();
-  const float half = 0.5f * float(std::min(state.dt, s.dt));
+                acceleration = state.shell.acceleration.view(), path = state.shell.path.view(),
+                about = state.shell.about.view();
+  const float half = 0.5f * float(std::min(state.dt, s.dt)), dt = float(state.dt);
+  const int *fan_start = state.cloth.fan_start.data(), *fan_entry = state.cloth.fan_entry.data(),
+            *sheet = s.sheet.data();
+  const float *damping_time = s.law.data() + damping_field * s.sheets,
+              dt2 = shell_matrix_of(state).dt2;
+  float* bend_factor = state.shell.bend_factor.data();
+  const int vertices = state.cloth.vertices;
   parallel_for(
       state.queue, "shell: paths", state.cloth.padded, DRENCH_LAMBDA(int i) {
         const Vec3<float> none{0.f, 0.f, 0.f};
@@ -29,61 +35,16 @@ void find_paths(State& state) {
         if (!so) lost.set(i, none);
         if (!here || !so) acceleration.set(i, none);
         path.set(i, v[i] - acceleration[i] * half);
+        about.set(i, acceleration[i] * (dt * dt));
+        const bool any = i < vertices && fan_start[i] < fan_start[i + 1];
+        bend_factor[i] =
+            any ? dt2 * (1.f + damping_time[sheet[fan_entry[fan_start[i]] / 3]] / dt) : dt2;
       });
-}
-
-/// What a triangle that is curved at rest adds to the forces on its patch: its energy's term
-/// -n . Q, Q = sum q x, pulls nodes by q n, and corners by what turns n.
-struct RestCurvature {
-  ShellCorners corners;
-  const float* area;
-  const int *start, *node, *of_start, *of;
-  const float *pull, *of_pull;
-  ConstVecView shift;
-  VecView normal, turning;
-  bool any;
-
-  DRENCH_HD void prepare(int t) const {
-    if (start[t] == start[t + 1]) return;
-    const int first = corners.vertex(t, 0);
-    Vec3<float> q{0.f, 0.f, 0.f};
-    for (int e = start[t]; e < start[t + 1]; ++e) q = q + corners.between(first, node[e]) * pull[e];
-    if (corners.joined) q = q + shift[t];
-    normal.set(t, turning_normal(t).normal), turning.set(t, q);
-  }
-  DRENCH_HD TurningNormal<float> turning_normal(int t) const {
-    return {{0.f, 0.f, 0.f}, corners.edge(t, 1), corners.edge(t, 2), area[t]};
-  }
-  DRENCH_HD Vec3<float> force_on_node(int v) const {
-    Vec3<float> sum{0.f, 0.f, 0.f};
-    for (int e = of_start[v]; e < of_start[v + 1]; ++e) sum = sum + normal[of[e]] * of_pull[e];
-    return sum;
-  }
-  DRENCH_HD Vec3<float> force_on_corner(int t, int c) const {
-    if (start[t] == start[t + 1]) return {0.f, 0.f, 0.f};
-    return turning_normal(t).derivative(c, turning[t]);
-  }
-};
-
-RestCurvature rest_curvature_of(State& state, const ShellCorners& corners) {
-  ShellState& s = state.shell;
-  return {.corners = corners,
-          .area = s.area.data(),
-          .start = s.curved_start.data(),
-          .node = s.curved_node.data(),
-          .of_start = s.curved_of_start.data(),
-          .of = s.curved_of.data(),
-          .pull = s.curved_pull.data(),
-          .of_pull = s.curved_of_pull.data(),
-          .shift = s.curved_shift.view(),
-          .normal = s.normal.view(),
-          .turning = s.turning.view(),
-          .any = s.curved};
 }
 
 /// Gathers what triangles give to a vertex.
 struct ShellVertices {
-  RestCurvature rest;
+  ShellPatches patches;
   ShellMatrix matrix;
   ConstVecView position, rounding, path, push, internal;
   const int *fan_start, *fan_entry, *fan_slot;
@@ -110,8 +71,7 @@ struct ShellVertices {
       return Vec3<float>{field(forces + 3 * k, t), field(forces + 3 * k + 1, t),
                          field(forces + 3 * k + 2, t)};
     };
-    const Vec3<float> f = c > 0 ? on(c - 1) : -(on(0) + on(1));
-    return rest.any ? f + rest.force_on_corner(t, c) : f;
+    return c > 0 ? on(c - 1) : -(on(0) + on(1));
   }
 
   /// Blocks of the row, and the triangles' forces.
@@ -131,7 +91,7 @@ struct ShellVertices {
       add_block(t, c, (c + 2) % 3, ShellRows::entry(fan_slot[2 * e + 1], i));
       sum = sum + force_on(t, c);
     }
-    return rest.any ? sum + rest.force_on_node(i) : sum;
+    return patches.any ? sum + patches.force_on(i) : sum;
   }
 
   DRENCH_HD void operator()(int i) const {
@@ -141,18 +101,19 @@ struct ShellVertices {
     const int slice = ShellRows::slice(i), ring = rows.ring_start[slice];
     const int first = rows.row_start[slice], last = rows.row_start[slice + 1];
     const int inner = first + rows.ring_start[slice + 1] - ring;
+    const float factor = matrix.bend_factor[i], way = dt * factor / matrix.dt2;
     float stiff = 0.f;
     for (int slot = first; slot < last; ++slot) {
       const int at = ShellRows::entry(slot, i), j = rows.end[at];
       const float b = matrix.bend[at];
       const Vec3<float> away = (position[j] - position[i]) + (rounding[j] - rounding[i]);
-      sum = sum + (away + (path[j] - path[i]) * dt) * b;
-      stiff += b * matrix.dt2;
+      sum = sum + (away + (path[j] - path[i]) * way) * b;
+      stiff += b * factor;
       if (slot >= inner) continue;
       const int to = ShellRows::entry(ring + slot - first, i), stride = matrix.stride;
-      for (int k = 0; k < 9; k += 4) block[k * stride + to] += b * matrix.dt2;
+      for (int k = 0; k < 9; k += 4) block[k * stride + to] += b * factor;
       const auto entry = [&](int k) { return block[k * stride + to]; };
-      stiff -= b * matrix.dt2;
+      stiff -= b * factor;
       d[0] += entry(0), d[3] += entry(4), d[5] += entry(8);
       d[1] += 0.5f * (entry(1) + entry(3)), d[2] += 0.5f * (entry(2) + entry(6)),
           d[4] += 0.5f * (entry(5) + entry(7));
@@ -187,21 +148,39 @@ ShellElements elements_of(State& state, About about) {
           .about = about};
 }
 
+ShellPatches patches_of(State& state, About about) {
+  ShellState& s = state.shell;
+  return {.start = elements_of(state, about).corners,
+          .slots = s.patch_start.data(),
+          .node = s.patch_node.data(),
+          .sheet = s.sheet.data(),
+          .of_start = s.patch_of_start.data(),
+          .of = s.patch_of.data(),
+          .of_triangle = s.patch_of_triangle.data(),
+          .area = s.area.data(),
+          .weight = s.patch_weight.data(),
+          .rest = s.patch_rest.data(),
+          .law = s.law.data(),
+          .shift = s.patch_shift.view(),
+          .moments = s.moment.view(),
+          .sheets = s.sheets,
+          .entries = s.patch_entries,
+          .dt = float(state.dt),
+          .any = s.patches,
+          .curved = s.curved,
+          .anew = about == About::end};
+}
+
 /// What triangles give to the rows.
 ShellVertices linearise_triangles(State& state, About about) {
   ShellState& s = state.shell;
   const ClothState& c = state.cloth;
   const ShellElements elements = elements_of(state, about);
+  const ShellPatches patches = patches_of(state, about);
   for_each_lane(
-      state.queue, "shell: triangles", c.triangles, DRENCH_LAMBDA(auto t) { elements(t); });
-  ShellCorners at_end = elements.corners;
-  at_end.later = float(state.dt), at_end.off = about == About::end;
-  const RestCurvature rest = rest_curvature_of(state, at_end);
-  if (rest.any)
-    parallel_for(
-        state.queue, "shell: rest curvature", c.triangles,
-        DRENCH_LAMBDA(int t) { rest.prepare(t); });
-  return {.rest = rest,
+      state.queue, "shell: triangles", c.triangles,
+      DRENCH_LAMBDA(auto t) { elements(t, patches); });
+  return {.patches = patches,
           .matrix = shell_matrix_of(state),
           .position = c.position.view(),
           .rounding = s.rounding.view(),

@@ -17,7 +17,8 @@
 // these hardly strain it, so that turning costs no stretch, the farther back towards x_0 the more
 // they do. Its part of A are 3 x 3 blocks of vertices that share a triangle (shell_membrane.h, the
 // stress that pulls sideways projected and of x_0: with that of the end limp strips boil),
-// bending's a number for every pair of vertices (shell_bending.h). Positions carry what they round
+// bending's a number for every pair of vertices (shell_bending.h; its viscosity: shell_patches.h).
+// Positions carry what they round
 // off: a stiff sheet feels a tenth of a micrometre.
 
 #include "sim/passes/cloth/shell_membrane.h"
@@ -27,6 +28,8 @@ namespace drench::sim::DRENCH_BACKEND {
 
 /// Of a triangle in ShellState::element.
 constexpr int shell_element_fields = 36;
+/// Of a sheet in ShellState::law, as ShellLaw.
+constexpr int shell_law_fields = 11, damping_field = 6, rigidity_field = 7;
 
 /// Entries of the rows of eight vertices follow each other slot by slot.
 struct ShellRows {
@@ -54,7 +57,7 @@ struct ShellRows {
 /// meets no resistance.
 struct ShellMatrix {
   ShellRows rows;
-  const float *block, *bend;
+  const float *block, *bend, *bend_factor;
   int stride;  // from one field of the blocks to the next
   float dt2;   // s^2, times what of the new force counts
   bool any;
@@ -77,7 +80,7 @@ struct ShellMatrix {
     }
     for (int slot = inner; slot < last; ++slot)
       across = across + (x - rows.at_end(view, i, slot)) * load(bend, ShellRows::entry(slot, i));
-    return y + across * T(dt2);
+    return y + across * load(bend_factor, i);
   }
 };
 
@@ -97,6 +100,7 @@ inline ShellMatrix shell_matrix_of(const State& state) {
   return {.rows = shell_rows_of(s),
           .block = s.block.data(),
           .bend = s.bend.data(),
+          .bend_factor = s.bend_factor.data(),
           .stride = 8 * s.ring_slots,
           .dt2 = float(new_force_share(state) * state.dt * state.dt),
           .any = s.any};

@@ -131,11 +131,9 @@ void find_softness(State& state) {
 void soften_bending(State& state) {
   ShellState& s = state.shell;
   const WetVertices vertices = wet_vertices_of(state);
-  const float *softness = state.wet.softness.data(), *dry = state.wet.dry_bend.data(),
-              *dry_pull = state.wet.dry_of_pull.data();
+  const float *softness = state.wet.softness.data(), *dry = state.wet.dry_bend.data();
   const ShellRows rows = shell_rows_of(s);
-  const int* curved = s.curved ? s.curved_of_start.data() : nullptr;
-  float *bend = s.bend.data(), *pull = s.curved_of_pull.data();
+  float* bend = s.bend.data();
   const bool joined = state.cloth.joined;
   const ConstVecView dry_push = state.wet.dry_push.view();
   const VecView push = s.push.view();
@@ -147,27 +145,22 @@ void soften_bending(State& state) {
           const int at = ShellRows::entry(slot, i);
           bend[at] = dry[at] * soft;
         }
-        for (int e = curved ? curved[i] : 0; curved && e < curved[i + 1]; ++e)
-          pull[e] = dry_pull[e] * soft;
         if (joined) push.set(i, dry_push[i] * soft);
       });
 }
 
-void soften_triangles(State& state) {
+void soften_moduli(State& state) {
   ShellState& s = state.shell;
-  const float *softness = state.wet.softness.data(), *dry = state.wet.dry_law.data(),
-              *dry_pull = state.wet.dry_pull.data();
-  float *law = s.law.data(), *pull = s.curved_pull.data();
-  const int sheets = s.sheets, *sheet = s.sheet.data(), *start = s.curved_start.data();
+  const float *softness = state.wet.softness.data(), *dry = state.wet.dry_law.data();
+  float* law = s.law.data();
+  const int sheets = s.sheets;
   parallel_for(
       state.queue, "wet: moduli", sheets, DRENCH_LAMBDA(int k) {
-        for (int field = 0; field < 4; ++field)
+        const auto soften = [&](int field) {
           law[field * sheets + k] = dry[field * sheets + k] * softness[k];
-      });
-  if (!s.curved) return;
-  parallel_for(
-      state.queue, "wet: rest curvature", state.cloth.triangles, DRENCH_LAMBDA(int t) {
-        for (int e = start[t]; e < start[t + 1]; ++e) pull[e] = dry_pull[e] * softness[sheet[t]];
+        };
+        for (int field = 0; field < 4; ++field) soften(field);
+        for (int field = rigidity_field; field < rigidity_field + 4; ++field) soften(field);
       });
 }
 
@@ -201,7 +194,7 @@ void apply_wetness(State& state) {
   weigh(state);
   find_softness(state);
   soften_bending(state);
-  soften_triangles(state);
+  soften_moduli(state);
 }
 
 void load_wet_cloth(State& state, const ClothTopology& cloth) {
@@ -215,7 +208,6 @@ void load_wet_cloth(State& state, const ClothTopology& cloth) {
   w.wetness.resize(state.cloth.padded);
   copy(w.dry_mass, state.cloth.mass);
   copy(w.dry_law, s.law), copy(w.dry_bend, s.bend);
-  copy(w.dry_pull, s.curved_pull), copy(w.dry_of_pull, s.curved_of_pull);
   copy(w.dry_push.x, s.push.x), copy(w.dry_push.y, s.push.y), copy(w.dry_push.z, s.push.z);
 }
 
