@@ -10,6 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib import ticker  # noqa: E402
+from matplotlib.transforms import Bbox  # noqa: E402
 
 import pages  # noqa: E402
 
@@ -36,7 +37,7 @@ STYLE = {
 # `like` is the number of the series whose colour and mark it has; "_" before a label leaves it out
 # of the legend.
 Series = collections.namedtuple(
-    "Series", "label points notes dashed like notes_at", defaults=((), False, None, "right")
+    "Series", "label points notes dashed like", defaults=((), False, None)
 )
 Panel = collections.namedtuple("Panel", "title series bar", defaults=(None,))
 Plot = collections.namedtuple("Plot", "name xlabel ylabel panels")
@@ -97,8 +98,7 @@ def dam(rows, peers):
         return f"{row.get('tolerance_percent') or pages.derived['tolerance %'](row):g} %"
 
     def panel(title, error):
-        own = series_of(rows, lambda row: "Drench", y=error, note=tolerance)
-        series = [one._replace(notes_at="left") for one in own]
+        series = series_of(rows, lambda row: "Drench", y=error, note=tolerance)
         for run in (1, 2):
             some = [row for row in peers if row["run"] == run]
             for like, one in enumerate(series_of(some, method, y=error, note=tolerance), 1):
@@ -167,12 +167,14 @@ FLOWS = {
 
 
 def flows(of):
-    rows = [row for case in FLOWS for row in of.get(case, [])]
     return Plot(
         "flows",
         TIME,
         "error, %",
-        [Panel("", series_of(rows, lambda row: FLOWS[row["case"]], note=size_note("")))],
+        [
+            Panel(name, series_of(of.get(case, []), lambda row: "_", note=size_note("")))
+            for case, name in FLOWS.items()
+        ],
     )
 
 
@@ -378,16 +380,34 @@ def draw_series(axes, one, number):
         markerfacecolor="white" if one.dashed else colour,
     )
     for at, note in zip(one.points, one.notes):
-        place = (4, 4) if one.notes_at == "right" else (-5, -9)
         axes.annotate(
-            note,
-            at,
-            xytext=place,
-            ha="left" if one.notes_at == "right" else "right",
-            textcoords="offset points",
-            fontsize=7.5,
-            color=colour,
+            note, at, (0, 0), textcoords="offset points", fontsize=7.5, color=colour, gid="note"
         )
+
+
+# Points from a mark, and how the text is aligned there, from the first choice to the last.
+NOTE_PLACES = [(4, 4, "left"), (-5, -9, "right"), (4, -9, "left"), (-5, 4, "right")]
+
+
+def place_notes(figure, all_axes):
+    """Where they are on no mark and no other note; what has no such place is left out."""
+    figure.canvas.draw()
+    for axes in all_axes:
+        marks = [point for line in axes.lines for point in line.get_xydata()]
+        taken = [
+            Bbox.from_extents(x - 4, y - 4, x + 4, y + 4) for x, y in axes.transData.transform(marks)
+        ]
+        for note in axes.texts:
+            if note.get_gid() != "note":
+                continue
+            for *offset, side in NOTE_PLACES:
+                note.set(position=offset, horizontalalignment=side)
+                box = note.get_window_extent()
+                if not any(box.overlaps(other) for other in taken):
+                    taken.append(box)
+                    break
+            else:
+                note.set_visible(False)
 
 
 def draw_panel(axes, panel):
@@ -422,6 +442,8 @@ def number_axis(axis):
 def draw_legends(all_axes, panels):
     """One beside the last panel where all have the same, else one under each."""
     labels = [[one.label for one in panel.series] for panel in panels]
+    if labels[0] == ["_"]:
+        return
     if all(some == labels[0] for some in labels):
         all_axes[-1].legend(fontsize=8.5, loc="center left", bbox_to_anchor=(1.02, 0.5))
         return
@@ -430,23 +452,28 @@ def draw_legends(all_axes, panels):
 
 
 def figure_of(plot):
-    count = len(plot.panels)
-    figure, all_axes = plt.subplots(
-        1,
-        count,
-        figsize=(3.6 * count + 2.4, 3.9),
+    columns = min(len(plot.panels), 4)
+    rows = -(-len(plot.panels) // columns)
+    figure, grid = plt.subplots(
+        rows,
+        columns,
+        figsize=(3.6 * columns + 2.4, 3.9 * rows),
         squeeze=False,
         sharey=True,
         constrained_layout=True,
     )
-    for axes, panel in zip(all_axes[0], plot.panels):
+    all_axes = grid.flatten()[: len(plot.panels)]
+    for unused in grid.flatten()[len(plot.panels) :]:
+        unused.set_visible(False)
+    for axes, panel in zip(all_axes, plot.panels):
         draw_panel(axes, panel)
         axes.set_xlabel(plot.xlabel)
-    for axes in all_axes[0]:
         number_axis(axes.xaxis)
-    number_axis(all_axes[0][0].yaxis)
-    all_axes[0][0].set_ylabel(plot.ylabel)
-    draw_legends(all_axes[0], plot.panels)
+    number_axis(all_axes[0].yaxis)
+    for first in grid[:, 0]:
+        first.set_ylabel(plot.ylabel)
+    draw_legends(all_axes, plot.panels)
+    place_notes(figure, all_axes)
     return figure
 
 
