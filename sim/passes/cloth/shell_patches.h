@@ -12,9 +12,9 @@
 // K that of bending and the second term of the corners alone, stands for it. What is left out is
 // taken at a displacement u_0 where the step is expected to end, -tau/dt J^T D J u_0 + S (u_0 - u):
 // of u_0 the unknown part is that of the last step's acceleration, later the solve's own. From step
-// to step that is stable while J^T D J tau/dt is at most 4/3 S by implicit Euler and 2 S by the
-// second backward formula, as the polynomials of their modes tell by Jury's criterion. It is at
-// most 4/3 S: |a - b|^2 <= 4/3 (|a|^2 + 3 |b|^2).
+// to step that is stable while J^T D J tau/dt is at most 2 S in steps of one length and 4/3 S where
+// one is far longer than the last, as the polynomials of the modes tell by Jury's criterion. It is
+// at most 4/3 S: |a - b|^2 <= 4/3 (|a|^2 + 3 |b|^2).
 // K of all this is in the rows (ShellVertices), forces and matrix by the same numbers: by moments
 // forces would round otherwise. Here is what turns.
 
