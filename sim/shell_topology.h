@@ -16,7 +16,7 @@ struct ShellLaw {
 
 /// Bending patches (sim/setup/shell_rest.h) of triangles, times the roots of the areas that they
 /// stand for: of sheets that are curved at rest, or whose bending is damped. Rows by triangle.
-struct PatchTopology {
+struct PatchTopology {  // NOLINT(bugprone-reserved-identifier): clang-tidy 14, of its copy
   std::vector<int> start, node;
   std::vector<float> weight[3];                  // 1/m, xx, yy and xy of a node
   std::vector<float> rest[3];                    // 1, of a triangle: its curvature at rest
