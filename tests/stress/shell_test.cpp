@@ -15,7 +15,7 @@ namespace {
 /// An impact stretches what turns far in its one linear step, and soft sheets lie on themselves:
 /// energy and distance stand in the rows (docs/stress.md). Nothing crosses or is thrown.
 constexpr ShellGates impact{.energy = not_gated, .nearest = 0};
-/// What 1e6 N/m or eight times the step may throw: nothing crosses.
+/// What 1e6 N/m or sixteen times the step throw: nothing crosses.
 constexpr ShellGates beyond{.speed = not_gated, .energy = not_gated, .nearest = 0};
 
 double seconds() { return long_form() ? 2 : 0.5; }
@@ -62,7 +62,7 @@ TEST_P(ShellStep, NeitherBlowsUpNorCrosses) {
   ShellWatch watch(fall_on_ball(), {.step = GetParam()});
   watch.until(seconds());
   report("shell's step", fmt::format("solver at {:g}x", GetParam()), watch,
-         GetParam() < 8 ? impact : beyond);
+         GetParam() < 16 ? impact : beyond);
 }
 
 /// Ends of cells, of which two in the middle of either direction are a needle's width apart.
