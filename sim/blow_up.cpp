@@ -161,6 +161,39 @@ std::string sheet_beyond_its_length(const Shot& shot, const Scene& scene, const 
   return "";
 }
 
+/// |F|^2, F the deformation gradient of triangle k.
+double stretch2_of(const ClothTopology& t, const HostVec& x, size_t k) {
+  V3d at_rest[2], now[2];
+  const auto of = [&](const HostVec& from, size_t corner) {
+    const auto v = size_t(t.corner[corner]);
+    V3d p(from.x[v], from.y[v], from.z[v]);
+    if (t.corner_shift.size() > 0)
+      p += V3d(t.corner_shift.x[corner], t.corner_shift.y[corner], t.corner_shift.z[corner]);
+    return p;
+  };
+  for (size_t c = 0; c < 2; ++c) {
+    at_rest[c] = of(t.rest, 3 * k + c + 1) - of(t.rest, 3 * k);
+    now[c] = of(x, 3 * k + c + 1) - of(x, 3 * k);
+  }
+  const double a = at_rest[0].length2(), b = at_rest[0].dot(at_rest[1]), c = at_rest[1].length2();
+  return (now[0].length2() * c - 2 * now[0].dot(now[1]) * b + now[1].length2() * a) /
+         (a * c - b * b);
+}
+
+/// A triangle at a vertex that is stretched beyond what any fabric bears.
+std::string triangle_beyond_its_size(const Shot& shot, const Scene& scene, const HostState& state,
+                                     size_t vertex) {
+  const ClothTopology& t = scene.cloth;
+  double most = 0;
+  for (int f = t.fan_start[vertex]; f < t.fan_start[vertex + 1]; ++f)
+    most = std::max(most, stretch2_of(t, state.cloth_position, size_t(t.fan_entry[size_t(f)]) / 3));
+  if (most < 100) return "";
+  return fmt::format(
+      "Cloth \"{}\" has a triangle there that is stretched to {:.3g} times its size: look at what "
+      "pulls it, or give it triangles that are less narrow",
+      shot.cloth[size_t(t.sheet_of(int(vertex)))].name, std::sqrt(most));
+}
+
 }  // namespace
 
 std::string cause_of_blow_up(const Shot& shot, Scene& scene, const HostState& state,
@@ -177,6 +210,7 @@ std::string cause_of_blow_up(const Shot& shot, Scene& scene, const HostState& st
   if (cause.empty() && placed) cause = obstacle_that_closes(shot, scene, p, time);
   if (cause.empty() && scene.cloth.vertices() > 0)
     cause = sheet_beyond_its_length(shot, scene, state);
+  if (cause.empty() && !culprit.particle) cause = triangle_beyond_its_size(shot, scene, state, i);
   const std::string settings = !scene.parameters.incompressible
                                    ? ", a softer cloth or a larger fluid.sound_speed"
                                : culprit.particle ? " or a smaller fluid.tolerance"

@@ -15,7 +15,7 @@ struct Culprit {
 
 /// What rules, and what to do about it: fluid that sources press into a full domain, obstacles that
 /// leave it no room, an obstacle that closes on a wall or another obstacle, a sheet that is
-/// stretched far beyond its length; else the settings of the solver.
+/// stretched far beyond its length, one of its triangles; else the settings of the solver.
 /// @param density  of the particles, kg/m^3. @param crowded  of each emitter: it has no room.
 /// @param time  s since the first frame, dt  s, of the
 /// step.

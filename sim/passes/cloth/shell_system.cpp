@@ -125,18 +125,23 @@ struct ShellVertices {
   }
 };
 
+ShellCorners corners_of(const State& state) {
+  const ShellState& s = state.shell;
+  return {.position = state.cloth.position.view(),
+          .rounding = s.rounding.view(),
+          .path = s.path.view(),
+          .change = s.about.view(),
+          .edge_shift = s.edge_shift.view(),
+          .corner = s.corner.data(),
+          .stride = s.triangles,
+          .later = 0.f,
+          .off = false,
+          .joined = state.cloth.joined};
+}
+
 ShellElements elements_of(State& state, About about) {
   ShellState& s = state.shell;
-  return {.corners = {.position = state.cloth.position.view(),
-                      .rounding = s.rounding.view(),
-                      .path = s.path.view(),
-                      .change = s.about.view(),
-                      .edge_shift = s.edge_shift.view(),
-                      .corner = s.corner.data(),
-                      .stride = s.triangles,
-                      .later = 0.f,
-                      .off = false,
-                      .joined = state.cloth.joined},
+  return {.corners = corners_of(state),
           .area = s.area.data(),
           .gradient = s.gradient.data(),
           .law = s.law.data(),
@@ -294,6 +299,28 @@ void relinearise_shell(State& state) {
       });
   remake_blocks(state);
   if (state.cloth_levels.on) build_cloth_levels(state);
+}
+
+int overstretched_vertex(const State& state) {
+  constexpr float most = 10.f;
+  const ShellCorners corners = corners_of(state);
+  const ShellState& s = state.shell;
+  const float *area = s.area.data(), *gradient = s.gradient.data();
+  const int n = s.triangles, vertices = state.cloth.vertices;
+  const int from_end = parallel_reduce(
+      state.queue, "shell: overstretched", state.cloth.triangles, 0,
+      DRENCH_LAMBDA(int t) {
+        if (area[t] == 0.f) return 0;
+        const RestTriangle<float> rest{
+            area[t], {gradient[t], gradient[n + t]}, {gradient[2 * n + t], gradient[3 * n + t]}};
+        const SurfaceGradient<float> f = surface_gradient(rest, Vec3<float>{0.f, 0.f, 0.f},
+                                                          corners.edge(t, 1), corners.edge(t, 2));
+        // NaN fails the comparison as well.
+        return length2(f.warp) + length2(f.weft) < most * most ? 0
+                                                               : vertices - corners.vertex(t, 0);
+      },
+      Larger{});
+  return from_end > 0 ? vertices - from_end : -1;
 }
 
 /// Whether no more than rounding of a vector is lost.

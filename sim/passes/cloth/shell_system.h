@@ -160,6 +160,10 @@ void search_line(State& state, const ConstVecView& right, int linearised);
 /// iterate of Newton's method.
 void relinearise_shell(State& state);
 
+/// The first vertex of a triangle that is stretched more than tenfold, which no fabric bears, or
+/// whose place is not finite; -1 if there is none.
+int overstretched_vertex(const State& state);
+
 /// Notes what the next step needs of this one, whose end is in ClothState::next.
 void keep_shell_step(State& state);
 

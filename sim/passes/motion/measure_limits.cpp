@@ -1,6 +1,7 @@
 #include "sim/passes/motion/measure_limits.h"
 
 #include "sim/backend/parallel.h"
+#include "sim/passes/cloth/shell_system.h"
 
 namespace drench::sim::DRENCH_BACKEND {
 
@@ -61,6 +62,8 @@ Limits measure_limits(const State& state) {
         },
         JoinLimits{});
     limits = JoinLimits{}(limits, cloth);
+    if (state.shell.any)
+      limits.bad_vertex = JoinLimits::first(limits.bad_vertex, overstretched_vertex(state));
   }
   return limits;
 }
