@@ -187,31 +187,29 @@ bool settle_contacts(State& state, const ConstVecView& given, int most_iteration
   // What nothing meets is nearly linear, and what fluid presses stays what the pressure solve saw.
   const bool obstacles = state.parameters.obstacles > 0, shells = state.shell.any,
              newton = shells && state.contact.near == 0;
-  constexpr int most_searches = 8, most_linearisations = 24;
   constexpr float loose = 30.f;  // until contacts and triangles are the right ones
   const int most_rounds = newton ? 20 : 6;
   const ConstVecView right = state.cloth_system.answer.view();
   const VecView change = state.cloth_system.change.view(), from = state.shell.from.view();
   start_right_side(state, given);
   const auto all_sweeps = [&] { return value_at(state.cloth_system.control, 0).sweeps; };
-  int& linearised = state.shell.linearised = 1;
-  bool met = newton && anything_is_met(state), exact = !met;
-  for (int round = 0, searches = 0, before = all_sweeps();;) {
+  state.shell.linearised = 1;
+  bool met = newton && anything_is_met(state), exact = !met, anew = false;
+  for (int round = 0, before = all_sweeps();;) {
     if (met)
       for_each_lane(
           state.queue, "shell: from", state.cloth.padded,
           DRENCH_LAMBDA(auto i) { from.put(i, change.at(i)); });
-    const bool first = round == 0 && linearised == 1;
+    const bool first = round == 0 && !anew;
     solve_cloth(state, change, right, most_iterations,
                 exact && first ? tolerance.first : (exact ? 1.f : loose) * tolerance.between);
     const int sweeps = all_sweeps() - std::exchange(before, all_sweeps());
     // One that was given up is no place to start from.
-    const bool more =
-        searches < most_searches && linearised < most_linearisations && sweeps < most_iterations;
-    if (met && sweeps > 0 && relinearise(state, right, more)) {
-      ++searches, exact = false;
+    const bool may = !anew && sweeps < most_iterations;
+    if (met && sweeps > 0 && relinearise(state, right, may)) {
+      anew = true, exact = false;
     } else if (round < most_rounds && revise_contacts(state, given, round, settling)) {
-      ++round, searches = 0, met = newton, exact = !newton;
+      ++round, anew = false, met = newton, exact = !newton;
     } else if (exact) {
       return round > 0;
     } else {

@@ -242,8 +242,9 @@ struct RowRevision {
       return true;
     }
     const float force = r.stiffness * (r.target - gap);
-    if (r.obstacle >= 0 && gap < r.target - 0.05f * r.thickness &&
-        r.stiffness < 99.f * row_stiffness * r.mass) {
+    const bool at_obstacle = r.obstacle >= 0;
+    if (gap < r.target - (at_obstacle ? 0.05f : 0.25f) * r.thickness &&
+        r.stiffness < (at_obstacle ? 99.f : 9.f) * row_stiffness * r.mass) {
       r.stiffness *= 10.f;
       return true;
     }

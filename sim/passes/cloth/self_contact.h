@@ -19,8 +19,9 @@
 
 namespace drench::sim::DRENCH_BACKEND {
 
-/// Of a row, over the pair's reduced mass: 50 layers of cotton at rest stay 0.88 thicknesses apart,
-/// and what friction holds on a slope of 1 in 2 creeps by 0.04 mm/s.
+/// Of a row, over the pair's reduced mass, and ten times that where it yields by a quarter of its
+/// thickness (docs/decisions/0038-what-was-tried-on-jammed-contact.md): 50 layers of cotton at rest
+/// stay 0.88 thicknesses apart, and what friction holds on a slope of 1 in 2 creeps by 0.04 mm/s.
 constexpr float row_stiffness = 100.f, row_grip = 100.f;
 
 /// What a row gives beside its part of A: kg m.
