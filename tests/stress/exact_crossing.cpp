@@ -27,9 +27,13 @@ class ExactSum {
     }
     part_[kept++] = x, count_ = kept;
   }
-  void add_product(float a, float b, float c) {
-    const double ab = double(a) * double(b), high = ab * double(c);
-    add(high), add(std::fma(ab, double(c), -high));
+  void add_product(double a, double b) {
+    const double high = a * b;
+    add(high), add(std::fma(a, b, -high));
+  }
+  void add_product(double a, double b, double c) {
+    const double high = a * b;
+    add_product(high, c), add_product(std::fma(a, b, -high), c);
   }
   int sign() const {
     const double top = count_ > 0 ? part_[count_ - 1] : 0;
@@ -42,7 +46,7 @@ class ExactSum {
 };
 
 /// +-det(p, q, r).
-void add_determinant(ExactSum& sum, float sign, const Point& p, const Point& q, const Point& r) {
+void add_determinant(ExactSum& sum, double sign, const Point& p, const Point& q, const Point& r) {
   for (int k = 0; k < 3; ++k) {
     const size_t x = size_t(k), y = size_t(k + 1) % 3, z = size_t(k + 2) % 3;
     sum.add_product(sign * p[x], q[y], r[z]), sum.add_product(-sign * p[x], q[z], r[y]);
@@ -54,7 +58,7 @@ int orientation_along(size_t axis, const Point& a, const Point& b, const Point& 
   const size_t x = (axis + 1) % 3, y = (axis + 2) % 3;
   ExactSum sum;
   const auto add = [&](const Point& p, const Point& q) {
-    sum.add(double(p[x]) * double(q[y])), sum.add(-double(p[y]) * double(q[x]));
+    sum.add_product(p[x], q[y]), sum.add_product(-p[y], q[x]);
   };
   add(b, c), add(c, a), add(a, b);
   return sum.sign();
@@ -87,10 +91,9 @@ bool meet_in_plane(const Point& p, const Point& q, const std::array<Point, 3>& t
   return false;
 }
 
-Point point(const sim::HostVec& x, int v) {
-  return {x.x[size_t(v)], x.y[size_t(v)], x.z[size_t(v)]};
-}
-V3d place(const sim::HostVec& x, int v) { return {x.x[size_t(v)], x.y[size_t(v)], x.z[size_t(v)]}; }
+V3d vec(const Point& p) { return V3d(p[0], p[1], p[2]); }
+V3d place(const sim::HostVec& x, int v) { return vec(place_of(x, size_t(v))); }
+V3d place(const std::vector<Point>& x, int v) { return vec(x[size_t(v)]); }
 
 struct Box {
   V3d low{1e300}, high{-1e300};
@@ -108,7 +111,8 @@ struct Box {
 /// Boxes of triangles as a tree.
 class Boxes {
  public:
-  Boxes(const sim::ClothTopology& cloth, const sim::HostVec& x) : box_(size_t(cloth.triangles())) {
+  template <class Places>
+  Boxes(const sim::ClothTopology& cloth, const Places& x) : box_(size_t(cloth.triangles())) {
     for (size_t k = 0; k < cloth.corner.size(); ++k) box_[k / 3].add(place(x, cloth.corner[k]));
     order_.resize(box_.size());
     std::iota(order_.begin(), order_.end(), 0);
@@ -219,12 +223,11 @@ double distance_at_rest(const sim::ClothTopology& cloth, int p, int q, const int
 }  // namespace
 
 int orientation(const Point& a, const Point& b, const Point& c, const Point& d) {
-  const V3d o(a[0], a[1], a[2]), p = V3d(b[0], b[1], b[2]) - o, q = V3d(c[0], c[1], c[2]) - o,
-                                 r = V3d(d[0], d[1], d[2]) - o;
+  const V3d o = vec(a), p = vec(b) - o, q = vec(c) - o, r = vec(d) - o;
   const auto size = [](const V3d& v) { return V3d(std::abs(v.x), std::abs(v.y), std::abs(v.z)); };
   const V3d m = size(p), n = size(q);
   const V3d most(m.y * n.z + m.z * n.y, m.z * n.x + m.x * n.z, m.x * n.y + m.y * n.x);
-  const double volume = p.cross(q).dot(r), rounding = 1e-15 * most.dot(size(r));
+  const double volume = p.cross(q).dot(r), rounding = 2e-15 * most.dot(size(r));
   if (volume > rounding) return 1;
   if (volume < -rounding) return -1;
   ExactSum sum;
@@ -246,20 +249,22 @@ bool meet(const Point& p, const Point& q, const std::array<Point, 3>& t) {
   return std::min({ab, bc, ca}) >= 0 || std::max({ab, bc, ca}) <= 0;
 }
 
-int count_meetings(const sim::ClothTopology& cloth, const sim::HostVec& position) {
+Point place_of(const sim::HostVec& x, size_t v) { return {x.x[v], x.y[v], x.z[v]}; }
+
+int count_meetings(const sim::ClothTopology& cloth, const std::vector<Point>& position) {
   const std::vector<int> sewn = sim::sewn_points(cloth);
   int count = 0;
   const auto meetings = [&](int t, int u) {
     const int *a = &cloth.corner[3 * size_t(t)], *b = &cloth.corner[3 * size_t(u)];
-    const std::array<Point, 3> of{point(position, b[0]), point(position, b[1]),
-                                  point(position, b[2])};
+    const auto at = [&](int v) { return position[size_t(v)]; };
+    const std::array<Point, 3> of{at(b[0]), at(b[1]), at(b[2])};
     const auto among = [&](int v) {
       const int p = sewn[size_t(v)];
       return p == sewn[size_t(b[0])] || p == sewn[size_t(b[1])] || p == sewn[size_t(b[2])];
     };
     for (int c = 0; c < 3; ++c) {
       const int p = a[c], q = a[(c + 1) % 3];
-      if (among(p) || among(q) || !meet(point(position, p), point(position, q), of)) continue;
+      if (among(p) || among(q) || !meet(at(p), at(q), of)) continue;
       const double keep = joined * 2 * double(cloth.half_thickness[size_t(t)]);
       count += cloth.sheet[size_t(t)] != cloth.sheet[size_t(u)] ||
                0.9 * distance_at_rest(cloth, p, q, b) >= keep;

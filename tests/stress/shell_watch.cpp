@@ -178,16 +178,14 @@ void ShellWatch::measure(double cpu_s) {
   figures_.whole = now.id.size() == size_t(figures_.particles);
   if (!figures_.finite || !figures_.whole) return;
   const sim::ClothTopology& cloth = run.scene.cloth;
-  // Straight paths between two states are not to cross, either: moments of them.
+  // Straight paths between two states are not to cross, either: moments of them, in double, since
+  // what is pressed may be nearer than single precision resolves.
   const int moments = how_.step > 1 ? 8 : 2;
+  std::vector<Point> x(now.cloth_position.size());
   for (int m = 1; m <= moments; ++m) {
-    sim::HostVec x = now.cloth_position;
-    for (size_t k = 0; k < 3 && m < moments; ++k) {
-      std::vector<float>& to = k == 0 ? x.x : k == 1 ? x.y : x.z;
-      const sim::HostVec& p = last_.cloth_position;
-      const std::vector<float>& from = k == 0 ? p.x : k == 1 ? p.y : p.z;
-      for (size_t v = 0; v < to.size(); ++v)
-        to[v] = float(double(from[v]) + (double(to[v]) - double(from[v])) * m / moments);
+    for (size_t v = 0; v < x.size(); ++v) {
+      const Point from = place_of(last_.cloth_position, v), to = place_of(now.cloth_position, v);
+      for (size_t k = 0; k < 3; ++k) x[v][k] = from[k] + (to[k] - from[k]) * m / moments;
     }
     figures_.meetings += count_meetings(cloth, x);
   }

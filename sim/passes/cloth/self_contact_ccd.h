@@ -15,6 +15,14 @@ struct ClosestOnSegments {
   T s, u;
 };
 
+/// The square of the sine of the angle below which segments count as parallel, where rounding hides
+/// in which direction they come nearer. Their distance is then at most that sine times their length
+/// too large.
+template <class T>
+constexpr float parallel_sine2 = 1e-6f;
+template <>
+inline constexpr float parallel_sine2<double> = 1e-12f;
+
 /// Segments a + s d, b + u e, from a - b = r (Ericson 2005, 5.1.9).
 template <class T>
 DRENCH_HD ClosestOnSegments<T> closest_on_segments(Vec3<T> d, Vec3<T> e, Vec3<T> r) {
@@ -22,7 +30,7 @@ DRENCH_HD ClosestOnSegments<T> closest_on_segments(Vec3<T> d, Vec3<T> e, Vec3<T>
   const T tiny(1e-30f), dd = maximum(dot(d, d), tiny), ee = maximum(dot(e, e), tiny),
                         de = dot(d, e), dr = dot(d, r), er = dot(e, r);
   const T det = dd * ee - de * de;
-  T s = det > T(1e-6f) * dd * ee ? clamped((de * er - dr * ee) / det) : T(0);
+  T s = det > T(parallel_sine2<T>) * dd * ee ? clamped((de * er - dr * ee) / det) : T(0);
   T u = (de * s + er) / ee;
   if (u < T(0)) u = T(0), s = clamped(-dr / dd);
   if (u > T(1)) u = T(1), s = clamped((de - dr) / dd);
@@ -61,14 +69,16 @@ DRENCH_HD T approach_of_pieces(bool edges, const Vec3<T> (&d)[4]) {
 }
 
 /// The fraction of their paths up to which two pieces do not come nearer than a tenth of their
-/// distance, or than `clearance`; once nearer than twice that, than half their distance. 1: they
-/// never do.
+/// distance, or than `clearance`; 1: they never do. Once nearer than twice the clearance, the
+/// inverse of their distance grows by half that of the clearance: n steps in a row leave 2 / n
+/// clearances, where halves would soon be lost in what places round off.
 /// @param x  m, at the start. @param d  m, the way. @param clearance  m
 DRENCH_HD double safe_part(bool edges, const Vec3<double> (&x)[4], const Vec3<double> (&d)[4],
                            double clearance) {
   const double approach = approach_of_pieces(edges, d);
   const double start = length(distance_of_pieces(edges, x).apart);
-  const double keep = start > 2 * clearance ? maximum(0.1 * start, clearance) : 0.5 * start;
+  const double keep = start > 2 * clearance ? maximum(0.1 * start, clearance)
+                                            : 2 * clearance * start / (2 * clearance + start);
   double t = 0, distance = start;
   for (int step = 0; step < 128; ++step) {
     if (approach * (1 - t) <= distance - keep) return 1;

@@ -176,7 +176,7 @@ void find_pairs_of_paths(State& state) {
 
 void guard_sheets(State& state) {
   if (!state.self_contact.any) return;
-  constexpr int rounds_at_part = 8, rounds = 16;
+  constexpr int rounds_at_part = 8, rounds_bounded = 16, rounds = 20;
   int round = 0;
   for (;; ++round) {
     // Who is stopped has others come at him that moved along with him.
@@ -184,10 +184,11 @@ void guard_sheets(State& state) {
     const int pairs = count_unsafe(state), triangles = count_unsafe_triangles(state);
     if (pairs + triangles == 0) break;
     if (round == 0) keep_wanted_paths(state);
-    stop_vertices(state, round < rounds_at_part ? Stop::at_part
-                         : round < rounds       ? Stop::bounded
-                         : pairs > 0            ? Stop::at_start
-                                                : Stop::at_base);
+    // An obstacle may take what it carries through others, so that this has its rounds, too.
+    stop_vertices(state, round < rounds_at_part   ? Stop::at_part
+                         : round < rounds_bounded ? Stop::bounded
+                         : round < rounds         ? Stop::at_base
+                                                  : Stop::at_start);
     if (round == rounds) break;
   }
   if (round > 0) give_stopped_velocities(state);
