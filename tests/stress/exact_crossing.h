@@ -11,8 +11,8 @@ namespace drench::stress_tests {
 
 using Point = std::array<double, 3>;
 
-/// Sign of (b - a) x (c - a) . (d - a). Exact: products of three doubles are four each, whose sum is
-/// an expansion (Shewchuk 1997).
+/// Sign of (b - a) x (c - a) . (d - a). Exact: products of three doubles are four each, whose sum
+/// is an expansion (Shewchuk 1997).
 int orientation(const Point& a, const Point& b, const Point& c, const Point& d);
 
 /// Whether a segment and a triangle have a point in common, ends and sides included. A triangle

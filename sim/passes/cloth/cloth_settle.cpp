@@ -185,9 +185,8 @@ void start_right_side(State& state, const ConstVecView& given) {
 bool settle_contacts(State& state, const ConstVecView& given, int most_iterations,
                      const ContactTolerances& tolerance, const Settling& settling) {
   // What nothing meets is nearly linear, and what fluid presses stays what the pressure solve saw.
-  const bool obstacles = state.parameters.obstacles > 0, shells = state.shell.any,
-             newton = shells && state.contact.near == 0;
-  constexpr float loose = 30.f;  // until contacts and triangles are the right ones
+  const bool newton = state.shell.any && state.contact.near == 0;
+  constexpr float loose = 100.f;  // until contacts and triangles are the right ones
   const int most_rounds = newton ? 20 : 6;
   const ConstVecView right = state.cloth_system.answer.view();
   const VecView change = state.cloth_system.change.view(), from = state.shell.from.view();
