@@ -185,7 +185,9 @@ void ShellWatch::measure(double cpu_s) {
   for (int m = 1; m <= moments; ++m) {
     for (size_t v = 0; v < x.size(); ++v) {
       const Point from = place_of(last_.cloth_position, v), to = place_of(now.cloth_position, v);
-      for (size_t k = 0; k < 3; ++k) x[v][k] = from[k] + (to[k] - from[k]) * m / moments;
+      x[v] = to;
+      for (size_t k = 0; k < 3 && m < moments; ++k)
+        x[v][k] = from[k] + (to[k] - from[k]) * m / moments;
     }
     figures_.meetings += count_meetings(cloth, x);
   }
