@@ -137,7 +137,7 @@ def size(row):
     """What says how fine a run is: particles, cells or layers across what matters, samples."""
     if "samples" in row:
         return float(row["samples"])
-    units = r"(?:layers|across|cells|to the|over the|spacings (?:of|to))"
+    units = r"(?:layers|across|cells|rings|to the|over the|spacings (?:of|to))"
     return (
         number_before(units, "resolution")(row)
         or particles(row)
@@ -334,6 +334,15 @@ CLAIMS = [
             "",
         ),
         ("shell_work_precision", "cloth.md", "shells", CLOSED, ""),
+        ("fabric_drape", "cloth.md", "drape coefficient", "measured bands", ""),
+        ("shell_in_water", "coupling.md", "plate under water", CLOSED, "plate"),
+        (
+            "shell_in_water",
+            "coupling.md",
+            "elastic gate",
+            "Antoci et al. 2007, " + EXPERIMENT,
+            "gate",
+        ),
         ("surface_error", "../theory/surfacing.md", "surface of five shapes", CLOSED, ""),
         ("render_leaks", "rendering.md", "rays that leave a closed body", "none may", ""),
     ]

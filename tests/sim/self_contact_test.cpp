@@ -123,8 +123,8 @@ TEST_P(LayersOfCloth, FallOnTheFloorAndStayApart) {
 TEST(SelfContact, ALightSheetOnAPinnedOneIsNotThrown) {
   Shot shot = shells_alone();
   Cloth& lower = add_shell(shot, 0.06, 0, 6);
-  for (int k = 0; k < 7; ++k)
-    for (int at : {k, 42 + k, 7 * k, 7 * k + 6}) lower.pin.emplace_back().vertices = {at};
+  for (uint32_t k = 0; k < 7; ++k)
+    for (uint32_t at : {k, 42 + k, 7 * k, 7 * k + 6}) lower.pin.emplace_back().vertices = {at};
   Cloth& upper = add_shell(shot, 0.05, 0.8 * thickness, 5);
   upper.corner += V3d(0.0013, 0, 0.0007);
   upper.u = V3d(0.05, 0, 0.002), upper.v = V3d(-0.002, 0, 0.05);
