@@ -235,8 +235,9 @@ TEST(Report, IsUsedByKeysInABrowserAndAsksForNothing) {
     const said = [], say = () => said.push((viewer.open ? label.textContent.trim() : 'closed') + ' ' +
                                            (picture.naturalWidth > 0));
     const press = key => document.dispatchEvent(new KeyboardEvent('keydown', {key: key, cancelable: true}));
-    const wait = () => picture.complete ||
-                       new Promise(done => picture.addEventListener('load', done, {once: true}));
+    const wait = () => picture.complete || new Promise(done => {
+      for (const end of ['load', 'error']) picture.addEventListener(end, done, {once: true});
+    });
     (async () => {
       document.querySelectorAll('.sheet button')[1].click(); await wait(); say();
       for (const key of ['ArrowRight', 'End', 'ArrowRight', 'Home', 'ArrowLeft']) { press(key); await wait(); say(); }
